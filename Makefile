@@ -1,0 +1,52 @@
+# `make demo` and `make test` set up all they need; `make help` lists the rest.
+PYTHON ?= python3
+VENV   ?= .venv
+BIN     = $(VENV)/bin
+BUILT   = $(VENV)/.built
+NATIVE  = $(shell find kernel CMakeLists.txt src/livebode/kernel -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
+
+.PHONY: help demo test lint bench system-packages lock clean
+
+help:            ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
+
+$(VENV)/.installed: requirements-dev.lock
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-dev.lock
+	touch $@
+
+$(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+demo: $(BUILT)   ## run the main job on a recording that it synthesises itself
+	$(BIN)/python examples/demo.py
+
+test: $(BUILT) lint  ## lint, types, import contract and every test
+	$(BIN)/python -m pytest -n auto
+
+lint: $(BUILT)   ## style, types and the import contract
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+
+$(VENV)/.bench: $(BUILT) requirements-bench.lock
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-bench.lock
+	touch $@
+
+bench: $(VENV)/.bench  ## side by side with what a user would pick instead
+	$(BIN)/python -m bench
+
+system-packages: ## Debian packages that some tests use (as root)
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends clang
+
+lock:            ## renew the pinned dependencies from pyproject.toml
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv lock --upgrade
+	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
+	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
+
+clean:           ## remove what was built
+	rm -rf build $(VENV)
