@@ -1,0 +1,126 @@
+"""Block: consecutive samples of named channels."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns.errors import InputError
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Name and unit of one recorded signal; the unit is empty where the source does not say it."""
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive samples of named channels at one exact rate. Immutable.
+
+    Parameters
+    ----------
+    data
+        float64, shape (channels, samples); taken without a copy where it is float64 already.
+    channels
+        One Channel (or name) for each row of `data`.
+    rate_hz
+        Samples per second, exact.
+    start
+        Number of the first sample. Numbers count from the start of the source and go on over gaps.
+    origin_s
+        Time of sample number 0 in seconds, in the clock of the source.
+    gap
+        True where samples are missing between this block and the one before, however many.
+
+    Raises
+    ------
+    InputError
+        If names repeat, shapes disagree, or the rate is not a positive number.
+
+    Examples
+    --------
+    >>> block = Block([[0.0, 1.0, 2.0], [5.0, 5.0, 5.0]], ["u", "y"], rate_hz=1000)
+    >>> block["y"]
+    array([5., 5., 5.])
+    >>> len(block), block.stop
+    (3, 3)
+    """
+
+    data: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    start: int = 0
+    origin_s: float = 0.0
+    gap: bool = False
+
+    def __post_init__(self) -> None:
+        data = np.asarray(self.data, dtype=np.float64).view()
+        if data.ndim != 2:
+            raise InputError(f"a block's data has shape {data.shape}; give (channels, samples)")
+        data.flags.writeable = False
+        channels = tuple(c if isinstance(c, Channel) else Channel(c) for c in self.channels)
+        names = [channel.name for channel in channels]
+        if len(names) != len(data):
+            raise InputError(f"{len(names)} channel names for {len(data)} rows of data; give one for each row")
+        if repeated := sorted({name for name in names if names.count(name) > 1}):
+            raise InputError(f"channel name {repeated[0]!r} stands more than once; rename one of them")
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(f"rate_hz={self.rate_hz} is not a positive number of samples per second")
+        object.__setattr__(self, "data", data)
+        object.__setattr__(self, "channels", channels)
+
+    def __len__(self) -> int:
+        return self.data.shape[1]
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return self.data[self.index(name)]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def stop(self) -> int:
+        """Number of the sample that would follow the last one."""
+        return self.start + len(self)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time of every sample, shape (samples,), seconds."""
+        return self.origin_s + np.arange(self.start, self.stop) / self.rate_hz
+
+    def index(self, name: str) -> int:
+        """Row of the channel `name`; InputError with the nearest name where it is missing."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise InputError(missing_channel(name, self.names)) from None
+
+    def cut(self, first: int, last: int) -> Block:
+        """Samples at positions first … last − 1 of this block, without a copy."""
+        first, last, _ = slice(first, last).indices(len(self))
+        return replace(
+            self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0
+        )
+
+
+def missing_channel(name: str, names: Iterable[str]) -> str:
+    """The sentence for a channel that is not there, with the nearest name.
+
+    >>> missing_channel("iq_adX", ["iq_adx", "theta_mx"])
+    "there is no channel 'iq_adX'; did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
+    """
+    known = list(names)
+    folded = {k.casefold(): k for k in known}
+    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
+    hint = f"did you mean {folded[near[0]]!r}? " if near else ""
+    return f"there is no channel {name!r}; {hint}Channels: {', '.join(known) or 'none'}"
+
+

@@ -1,0 +1,22 @@
+"""Event: what a person should know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that a person should know, at one moment of the recording.
+
+    `kind` is a stable word that programs may rely on (``gap``, ``non-finite``, ``spike``), `sample` the number of
+    the first sample that it concerns, `time_s` its time in the source's clock, `message` one sentence for people,
+    and `details` plain data.
+    """
+
+    kind: str
+    sample: int
+    time_s: float
+    message: str
+    details: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,181 @@
+"""Lines: excited frequencies on the exact grid of a sliding DFT."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor, lcm
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns.errors import GridError, InputError
+
+# A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then holds a
+# whole number of periods to a millionth, and the leakage is below every other error.
+_ON_GRID_BINS = 1e-6
+_LINES_MAX = 100_000
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Frequencies k·rate/N with whole k: the lines that a sliding DFT over N samples sees without leakage.
+
+    Nevaranta 2016, eq. (17): a line is on the grid when k = N·Ts·f is a whole number.
+
+    Parameters
+    ----------
+    bins
+        The excited lines as bin numbers k, ascending, 0 < k < N/2.
+    window
+        N, samples.
+    rate_hz
+        Samples per second.
+    quiet
+        Bins that the excitation leaves without power, to estimate the noise from.
+
+    Raises
+    ------
+    GridError
+        If a bin is not between 0 and N/2, repeats, or is both excited and quiet.
+
+    Examples
+    --------
+    >>> lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
+    >>> lines.bins
+    (2, 4, 6, 8, 10, 12, 14)
+    >>> lines.frequency_hz
+    array([ 20.,  40.,  60.,  80., 100., 120., 140.])
+    """
+
+    bins: tuple[int, ...]
+    window: int
+    rate_hz: float
+    quiet: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_window(self.window, self.rate_hz)
+        for name in ("bins", "quiet"):
+            object.__setattr__(self, name, tuple(sorted(int(k) for k in getattr(self, name))))
+        every = self.bins + self.quiet
+        if not self.bins:
+            raise GridError("there is no line; give at least one")
+        if len(set(every)) != len(every):
+            twice = next(k for k in every if every.count(k) > 1)
+            raise GridError(f"bin {twice} ({twice * self.resolution_hz:g} Hz) is named more than once; name it once")
+        for k in every:
+            if not 0 < 2 * k < self.window:
+                raise GridError(
+                    f"bin {k} ({k * self.resolution_hz:g} Hz) is not between 0 and the Nyquist frequency "
+                    f"{self.rate_hz / 2:g} Hz; choose lines inside"
+                )
+
+    @classmethod
+    def parse(cls, text: str, rate_hz: float, window: int) -> Lines:
+        """Lines from text: frequencies in Hz, ``start:stop:step`` inclusive, joined by commas.
+
+        ``k=`` before an item counts in bins instead of Hz, for windows whose lines have no short decimal
+        (``k=1:300`` with a PRBS of 2047). Bins between the first and the last line that are not named are quiet.
+
+        Raises
+        ------
+        GridError
+            If a line is off the grid (the message has the nearest lines and the windows that would fit) or not
+            below the Nyquist frequency.
+        InputError
+            If the text cannot be read.
+
+        Examples
+        --------
+        >>> Lines.parse("25, 40:80:20", rate_hz=4000, window=800).frequency_hz
+        array([25., 40., 60., 80.])
+        >>> Lines.parse("25", rate_hz=4000, window=400)
+        Traceback (most recent call last):
+        ...
+        livebode.nouns.errors.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; the \
+nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
+        """
+        check_window(window, rate_hz)
+        wanted = [f for item in text.split(",") for f in _frequencies(item.strip(), text, rate_hz, window)]
+        resolution_hz = Fraction(rate_hz) / window
+        bins = [round(f / resolution_hz) for f in wanted]
+        for f, k in zip(wanted, bins):
+            if not 0 < f < Fraction(rate_hz) / 2:
+                raise GridError(
+                    f"the line {float(f):g} Hz is not between 0 and the Nyquist frequency {rate_hz / 2:g} Hz; "
+                    "choose lines inside"
+                )
+            if abs(f / resolution_hz - k) > _ON_GRID_BINS:
+                raise GridError(_off_grid(f, wanted, rate_hz, window))
+        return cls.of_bins(bins, window, rate_hz)
+
+    @classmethod
+    def of_bins(cls, bins: list[int], window: int, rate_hz: float) -> Lines:
+        """Lines at these bins, with every bin between the first and the last that is not named left quiet."""
+        named = set(bins)
+        quiet = tuple(k for k in range(min(bins, default=0), max(bins, default=0)) if k not in named)
+        return cls(tuple(bins), window, rate_hz, quiet)
+
+    def __len__(self) -> int:
+        return len(self.bins)
+
+    @property
+    def resolution_hz(self) -> float:
+        """Distance of neighbouring bins, rate/N."""
+        return self.rate_hz / self.window
+
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]:
+        """Frequency of each excited line, shape (lines,), ascending."""
+        return np.asarray(self.bins) * self.rate_hz / self.window
+
+    @property
+    def z(self) -> NDArray[np.complex128]:
+        """e^(jωTs) at each line, shape (lines,)."""
+        return np.exp(2j * np.pi * np.asarray(self.bins) / self.window)
+
+
+def check_window(window: int, rate_hz: float) -> None:
+    if isinstance(window, bool) or not isinstance(window, (int, np.integer)) or window < 3:
+        raise GridError(f"{window=} is not a whole number of at least 3 samples")
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+
+
+def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Fraction]:
+    unit = Fraction(rate_hz) / window if item.startswith("k=") else Fraction(1)
+    try:
+        parts = [Fraction(part.strip()) for part in item.removeprefix("k=").split(":")]
+    except (ValueError, ZeroDivisionError):
+        parts = []
+    if len(parts) == 2 and item.startswith("k="):
+        parts.append(Fraction(1))
+    if len(parts) not in (1, 3):
+        raise InputError(
+            f"{item!r} in lines {text!r} cannot be read; write frequencies in Hz as 20:140:20 (start:stop:step, "
+            "inclusive) or 35, joined by commas"
+        )
+    if len(parts) == 1:
+        return [parts[0] * unit]
+    start, stop, step = parts
+    if step <= 0 or stop < start:
+        raise InputError(f"the range {item!r} is empty; give start:stop:step with start ≤ stop and step > 0")
+    count = floor((stop - start) / step) + 1
+    if count > _LINES_MAX:
+        raise InputError(f"the range {item!r} has {count} lines, more than {_LINES_MAX}; take a larger step")
+    return [(start + i * step) * unit for i in range(count)]
+
+
+def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: int) -> str:
+    resolution = Fraction(rate_hz) / window
+    position = line / resolution
+    near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
+    sentence = (
+        f"the line {float(line):g} Hz is not on the {float(resolution):g} Hz grid of window={window} at "
+        f"{rate_hz:g} Hz; the nearest lines are {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
+    )
+    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**6).denominator for f in wanted))
+    multiples = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
+    if unit > 100 * window:
+        return sentence + ", and no window of a useful length would fit them all"
+    return sentence + f", and windows of {' or '.join(map(str, multiples))} samples would fit"
