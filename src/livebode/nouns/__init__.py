@@ -1,8 +1,31 @@
 """The nouns that every floor above speaks in."""
 
 from livebode.nouns.block import Block, Channel, missing_channel
+from livebode.nouns.controllers import PID, Cascade, PositionPD
 from livebode.nouns.errors import GridError, InputError
 from livebode.nouns.event import Event
 from livebode.nouns.lines import Lines
+from livebode.nouns.loop import Loop
+from livebode.nouns.model import Gain, Model, as_model
+from livebode.nouns.response import Quantity, Response, Responses, widened
 
-__all__ = ["Block", "Channel", "Event", "GridError", "InputError", "Lines", "missing_channel"]
+__all__ = [
+    "PID",
+    "Block",
+    "Cascade",
+    "Channel",
+    "Event",
+    "Gain",
+    "GridError",
+    "InputError",
+    "Lines",
+    "Loop",
+    "Model",
+    "PositionPD",
+    "Quantity",
+    "Response",
+    "Responses",
+    "as_model",
+    "missing_channel",
+    "widened",
+]

@@ -106,9 +106,7 @@ class Block:
     def cut(self, first: int, last: int) -> Block:
         """Samples at positions first … last − 1 of this block, without a copy."""
         first, last, _ = slice(first, last).indices(len(self))
-        return replace(
-            self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0
-        )
+        return replace(self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0)
 
 
 def missing_channel(name: str, names: Iterable[str]) -> str:
@@ -122,5 +120,3 @@ def missing_channel(name: str, names: Iterable[str]) -> str:
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
     hint = f"did you mean {folded[near[0]]!r}? " if near else ""
     return f"there is no channel {name!r}; {hint}Channels: {', '.join(known) or 'none'}"
-
-

@@ -1,0 +1,34 @@
+"""The moment that a window speaks for: its centre, with the scheduling signal there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Centre:
+    """Scheduling signal at the centre of each window, (N − 1)/2 samples before its newest sample.
+
+    For an even N the centre lies between two samples, and their mean is taken.
+    """
+
+    def __init__(self, window: int) -> None:
+        self._early, self._late = window // 2, (window - 1) // 2
+        self._past = np.full(self._early, np.nan)
+
+    def restart(self) -> None:
+        self._past[:] = np.nan
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"past": self._past.copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._past[:] = state["past"]
+
+    def at(self, schedule: Floats, position: NDArray[np.int64]) -> Floats:
+        """Schedule at the centres of the windows that end at these positions of the next stretch, `schedule`."""
+        known = np.concatenate([self._past, schedule])
+        self._past = known[known.size - self._early :]
+        return np.asarray((known[position] + known[position + self._early - self._late]) / 2)

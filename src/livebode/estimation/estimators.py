@@ -1,0 +1,41 @@
+"""The three ways from line spectra to the plant, each a quotient of two spectra correlated with a third."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Role = Literal["excitation", "input", "output"]
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """The quotient S_ry/S_rd of the output y and a denominator d, both correlated with a reference r.
+
+    Over windows i the estimate is Σ Y_i·conj(R_i) / Σ D_i·conj(R_i).
+    """
+
+    name: str
+    reference: Role
+    denominator: Role
+    through_loop: bool = False
+
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """The signals that it needs, without repeats; the output comes first."""
+        return tuple(dict.fromkeys(("output", self.denominator, self.reference)))
+
+
+DIRECT = Estimator("direct", reference="input", denominator="input")
+"""G = S_uy/S_uu, Nevaranta 2016, eq. (1). Biased in closed loop: feedback correlates u with the noise. Right where
+nothing feeds back, and for a closed-loop response whose input is the reference."""
+
+JOINT = Estimator("joint", reference="excitation", denominator="input")
+"""G = S_wy/S_wu, Nevaranta 2016, eq. (2). Unbiased in closed loop, whatever the controller does; w is the
+instrument."""
+
+INDIRECT = Estimator("indirect", reference="excitation", denominator="excitation", through_loop=True)
+"""G = Gcl/(E − Gcl·F) with Gcl = S_wy/S_ww, Nevaranta 2016, eqs. (15) and (16). Needs no u, but the controllers F;
+biased by every wrong word in their description (one forgotten tick of delay is 10 % near the resonance)."""
+
+ESTIMATORS = {estimator.name: estimator for estimator in (DIRECT, JOINT, INDIRECT)}

@@ -1,0 +1,42 @@
+"""The Hann window from three bins, after the DFT."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError, Lines
+
+Complex = NDArray[np.complex128]
+
+
+class Hann:
+    """X_k/2 − (X_{k−1} + X_{k+1})/4, the periodic Hann window in the frequency domain (Jacobsen & Lyons 2003).
+
+    It gives less weight to what a moving axis was at the ends of the window, for 1.5 times the noise. Lines need to be
+    two bins apart, else their neighbours' excitation comes in.
+    """
+
+    def __init__(self, lines: Lines) -> None:
+        apart = np.diff(lines.bins)
+        if apart.size and apart.min() < 2:
+            raise InputError(
+                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) apart, but two are closer; "
+                "take a longer window or fewer lines"
+            )
+        if lines.bins[0] < 2 or 2 * (lines.bins[-1] + 1) >= lines.window:
+            raise InputError(
+                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) from 0 and 1 from "
+                "the Nyquist frequency; leave out the outermost line"
+            )
+        self._window = lines.window
+        at = np.asarray(lines.bins)
+        self.bins = np.unique(np.concatenate([at - 1, at, at + 1]))
+        self._at = np.searchsorted(self.bins, at)
+
+    def combine(self, spectrum: Complex, sample: NDArray[np.int64]) -> Complex:
+        """Windowed lines (channels, rows, lines) from spectra (channels, rows, bins) on the fixed phase grid."""
+        # On the fixed grid bin k lags the window's own phase by k(n + 1)/N turns; neighbours differ by one such step.
+        turn = np.exp(2j * np.pi * ((sample + 1) % self._window) / self._window)[:, np.newaxis]
+        below, above = spectrum[..., self._at - 1], spectrum[..., self._at + 1]
+        return np.asarray(0.5 * spectrum[..., self._at] - 0.25 * (below * turn.conj() + above * turn))

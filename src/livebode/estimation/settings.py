@@ -1,0 +1,137 @@
+"""What a Tracker is told: plain data, checked whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
+from livebode.nouns import InputError, Lines, Loop, Quantity, missing_channel
+
+QUANTITIES: tuple[Quantity, ...] = ("plant", "open loop", "closed loop", "sensitivity")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a Tracker turns samples into Responses.
+
+    Parameters
+    ----------
+    lines
+        Where; also gives the window and the rate.
+    output, input, excitation, schedule
+        Channel names of y, u, w and of the signal that responses are plotted over (position). Direct needs y and u,
+        joint y, u and w, indirect y and w.
+    estimator
+        "direct", "joint" or "indirect"; see `livebode.estimation.estimators` for when each is biased.
+    loop
+        What feeds back, where w enters, and when signals were logged.
+    quantity
+        "plant", "open loop", "closed loop" or "sensitivity".
+    hop
+        Samples between responses, counted within the period; by default a twentieth of the window.
+    average
+        Whether a response speaks for the weighted mean over the remembered periods instead of the newest window alone.
+    forgetting
+        λ per period, 0 < λ ≤ 1: the memory behind `sigma` and coherence, and behind the value when averaging.
+        0.8 remembers about nine periods, 1 all.
+    noise
+        Where sigma comes from: "periods", the scatter between them, or "quiet", the bins between the lines that the
+        excitation leaves without power (for an axis in motion, whose change from period to period is no noise).
+    differenced
+        Channels that are differenced before the DFT (and divided by 1 − z⁻¹ after it): a position that drifts.
+    hann
+        Whether lines come from three bins as by a Hann window.
+    spikes
+        Channels that are watched for spikes; windows that hold one are left out. See `SpikeGate`.
+
+    Raises
+    ------
+    InputError
+        If a signal that the estimator needs is not named, or a number is out of range.
+    """
+
+    lines: Lines
+    output: str
+    input: str | None = None
+    excitation: str | None = None
+    schedule: str | None = None
+    estimator: str = "joint"
+    loop: Loop = field(default_factory=Loop)
+    quantity: Quantity = "plant"
+    hop: int | None = None
+    average: bool = False
+    forgetting: float = 0.8
+    noise: Literal["periods", "quiet"] = "periods"
+    differenced: tuple[str, ...] = ()
+    hann: bool = False
+    spikes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._check_words()
+        if self.hop is None:
+            object.__setattr__(self, "hop", default_hop(self.lines.window))
+        if not 1 <= self.step <= self.lines.window:
+            raise InputError(f"hop={self.hop} is not between 1 and the window of {self.lines.window} samples")
+        if not 0 < self.forgetting <= 1:
+            raise InputError(f"forgetting={self.forgetting} is not in 0 < λ ≤ 1; 0.8 remembers about nine periods")
+        for role in self.roles:
+            if self.channel(role) is None:
+                raise InputError(
+                    f"the {self.estimator} estimator of the {self.quantity} needs the {role} signal; name its channel"
+                )
+        known = [name for role in self.roles if (name := self.channel(role))]
+        for option in ("differenced", "spikes"):
+            for name in getattr(self, option):
+                if name not in known:
+                    raise InputError(f"{option}: {missing_channel(name, known)}")
+        if self.hann and self.noise == "quiet":
+            raise InputError("a Hann window spreads the lines over the quiet bins; take the noise from periods")
+        self._check_loop()
+
+    def _check_words(self) -> None:
+        for name, known in (
+            ("estimator", tuple(ESTIMATORS)),
+            ("quantity", QUANTITIES),
+            ("noise", ("periods", "quiet")),
+        ):
+            if (word := getattr(self, name)) not in known:
+                raise InputError(f"{name}={word!r} is not known; choose {' or '.join(map(repr, known))}")
+
+    def _check_loop(self) -> None:
+        if self.method.through_loop and self.loop.feedback is None:
+            raise InputError("the indirect estimator needs the controllers: describe the loop's feedback, or use joint")
+        if self.quantity != "plant" and self.method is ESTIMATORS["direct"] and self.loop.feedback is None:
+            raise InputError(f"the {self.quantity} from the direct estimator needs the loop's feedback, or use joint")
+
+    @property
+    def method(self) -> Estimator:
+        return ESTIMATORS[self.estimator]
+
+    @property
+    def step(self) -> int:
+        """The hop in samples, chosen or given."""
+        assert self.hop is not None
+        return self.hop
+
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """Signals that go through the DFT, the output first."""
+        return self.method.roles
+
+    def channel(self, role: Role) -> str | None:
+        """Channel name of a signal."""
+        return {"output": self.output, "input": self.input, "excitation": self.excitation}[role]
+
+
+def default_hop(window: int) -> int:
+    """The divisor of the window nearest to a twentieth of it (by ratio), so that all hops are equal.
+
+    >>> default_hop(400), default_hop(2500), default_hop(2047)
+    (20, 125, 89)
+    """
+    wanted = max(1.0, window / 20)
+    divisors = [d for d in range(1, window + 1) if window % d == 0]
+    nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))
+    # A prime window has no divisor near; a longer last step in each period is then the lesser evil.
+    return nearest if max(nearest / wanted, wanted / nearest) <= 4 else round(wanted)

@@ -1,0 +1,45 @@
+"""State of a Tracker as bytes: named arrays, and a fingerprint of the settings that they belong to."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+
+Arrays = dict[str, NDArray[np.generic]]
+
+
+def fingerprint(settings: object) -> bytes:
+    """Of everything in the settings that the state depends on."""
+    return hashlib.sha256(repr(settings).encode()).digest()
+
+
+def pack(parts: dict[str, Arrays], settings: object) -> bytes:
+    """Arrays of named parts as bytes, exact."""
+    flat: dict[str, Any] = {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, settings=np.frombuffer(fingerprint(settings), dtype=np.uint8), **flat)
+    return buffer.getvalue()
+
+
+def unpack(data: bytes, settings: object) -> dict[str, Arrays]:
+    """The parts again; InputError where the bytes are damaged or belong to other settings."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+            flat = {name: stored[name] for name in stored.files}
+        owner = flat.pop("settings").tobytes()
+    except (ValueError, OSError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"the snapshot of {len(data)} bytes is damaged ({error}); start afresh") from None
+    if owner != fingerprint(settings):
+        raise InputError("the snapshot belongs to a tracker with other settings; restore it into one with the same")
+    parts: dict[str, Arrays] = {}
+    for path, array in flat.items():
+        part, name = path.split("/", 1)
+        parts.setdefault(part, {})[name] = array
+    return parts

@@ -1,0 +1,162 @@
+"""From samples to line spectra: which rows are whole, and what is done to a signal before and after the DFT."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.spikes import SpikeGate
+from livebode.kernel import SlidingDFT
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_NONE = np.zeros(0, dtype=np.intp)
+_ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which stays in cache
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Line spectra at the hops of a stretch of samples.
+
+    `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
+    other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds a
+    start, a gap, or a sample that was not finite, `clean` (rows,) False also where it holds a spike; `not_finite` and
+    `spikes` are the positions of such samples in the stretch.
+    """
+
+    spectrum: Complex
+    sample: NDArray[np.int64]
+    whole: NDArray[np.bool_]
+    clean: NDArray[np.bool_]
+    not_finite: NDArray[np.intp]
+    spikes: NDArray[np.intp]
+
+
+class LineSpectra:
+    """Sliding DFT of several signals, with bookkeeping of what each window holds.
+
+    Hops count within the period: rows stand at the multiples of `hop` in each period, so that every row has one
+    exactly a period before it. Where `hop` does not divide N, the last step of each period is longer.
+
+    Parameters
+    ----------
+    window, bins, hop
+        N and hop in samples, bins as whole numbers.
+    differenced
+        For each signal, whether it is differenced before the DFT and divided by 1 − z⁻¹ after it: for a signal that
+        drifts, whose steps from period to period would leak.
+    advanced
+        For each signal, ticks by which its spectrum is advanced (z^ticks).
+    spikes
+        Gate that names samples to leave out, or None.
+    """
+
+    def __init__(
+        self,
+        window: int,
+        bins: NDArray[np.int64],
+        hop: int,
+        differenced: NDArray[np.bool_],
+        advanced: NDArray[np.int64],
+        spikes: SpikeGate | None,
+    ) -> None:
+        self._window, self._bins, self._hop = window, bins, hop
+        self._step = gcd(hop, window)
+        self._differenced = differenced
+        self._spikes = spikes
+        z = np.exp(2j * np.pi * bins / window)
+        self._after = z ** advanced[:, np.newaxis]
+        self._after[differenced] /= 1 - 1 / z
+        self._plain = bool(np.all(self._after == 1))
+        self._dft = self._fresh()
+        self._next = -1
+        self._last_bad = [-1, -1]  # numbers of the last sample that was not finite, and of the last spike
+        self._before = np.zeros(differenced.size)
+        self._started = False
+
+    def _fresh(self) -> SlidingDFT:
+        return SlidingDFT(self._window, self._bins, channels=self._differenced.size)
+
+    def restart(self, sample: int) -> None:
+        """Forget every sample; the next one has this number."""
+        self._dft = self._fresh()
+        # Zeros up to the place in the period, so that the grid of hops and phases is that of the sample numbers.
+        self._dft.process(np.zeros((self._differenced.size, sample % self._window)), hop=self._window)
+        self._next = sample
+        self._last_bad = [sample - 1, sample - 1]
+        self._started = False
+        if self._spikes is not None:
+            self._spikes.restart(sample)
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        spikes = {} if self._spikes is None else {f"spikes.{k}": v for k, v in self._spikes.state().items()}
+        return spikes | {
+            "dft": np.frombuffer(self._dft.snapshot(), dtype=np.uint8),
+            "number": np.array([self._next, *self._last_bad, self._started]),
+            "before": self._before.copy(),
+        }
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._dft.restore(state["dft"].tobytes())
+        self._next, *self._last_bad, started = (int(n) for n in state["number"])
+        self._started = bool(started)
+        self._before[:] = state["before"]
+        if self._spikes is not None:
+            self._spikes.load({k.removeprefix("spikes."): v for k, v in state.items() if k.startswith("spikes.")})
+
+    def process(self, data: Floats) -> Rows:
+        """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
+        finite, not_finite = self._prepare(data)
+        spikes = _NONE if self._spikes is None else self._spikes.process(finite)
+        step = max(self._step, _ROW_VALUES_MAX // (self._after.size or 1) * self._step)
+        parts = [self._spectra(finite[:, i : i + step], i) for i in range(0, finite.shape[1], step)]
+        spectrum = np.concatenate([p[0] for p in parts], axis=1)
+        position = np.concatenate([p[1] for p in parts])
+        whole = self._without(not_finite, 0, data.shape[1], position)
+        clean = whole & self._without(spikes, 1, data.shape[1], position)
+        rows = Rows(spectrum, self._next + position, whole, clean, not_finite, spikes)
+        self._next += data.shape[1]
+        return rows
+
+    def _prepare(self, data: Floats) -> tuple[Floats, NDArray[np.intp]]:
+        if self._differenced.any():
+            if not self._started:  # the first sample has none before it, and so belongs to no whole window
+                self._before = data[:, 0].copy()
+                self._last_bad[0] += 1
+                self._started = True
+            shifted = np.concatenate([self._before[:, np.newaxis], data[:, :-1]], axis=1)
+            self._before = data[:, -1].copy()
+            data = np.where(self._differenced[:, np.newaxis], data - shifted, data)
+        # A finite sum says that every sample is finite, in one pass.
+        if np.isfinite(data.sum()):
+            return data, _NONE
+        bad = ~np.isfinite(data).all(axis=0)
+        return np.where(bad, 0.0, data), np.flatnonzero(bad)
+
+    def _spectra(self, data: Floats, offset: int) -> tuple[Complex, NDArray[np.int64]]:
+        first = (self._next + offset) % self._window
+        spectrum = self._dft.process(data, hop=self._step, demodulate=False)
+        # Rows stand behind the samples whose count is a multiple of the step, which divides the window.
+        position = np.arange(self._step - first % self._step - 1, data.shape[1], self._step)
+        if self._step != self._hop:
+            place = (first + position + 1) % self._window
+            chosen = (place % self._hop == 0) & (place > 0)
+            spectrum, position = spectrum[:, chosen], position[chosen]
+        if not self._plain:
+            spectrum = spectrum * self._after[:, np.newaxis, :]
+        return spectrum, position + offset
+
+    def _without(
+        self, bad: NDArray[np.intp], kind: int, samples: int, position: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        last_bad: int | NDArray[np.int64] = self._last_bad[kind]
+        if bad.size:
+            number = np.full(samples, last_bad)
+            number[bad] = self._next + bad
+            number = np.maximum.accumulate(number)
+            self._last_bad[kind], last_bad = int(number[-1]), number[position]
+        return np.asarray(self._next + position - last_bad >= self._window)

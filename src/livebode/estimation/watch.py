@@ -1,0 +1,85 @@
+"""What a Tracker sees of its input: starts, gaps, samples left out, and whether there is excitation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.spectra import Rows
+from livebode.nouns import Block, Event, InputError
+
+_KINDS = {
+    "non-finite": "a sample is not finite",
+    "spike": "a sample stands out from the periods before it and is left out",
+}
+
+
+class Watch:
+    """Counts and Events of a stream of Blocks, and the largest excitation seen."""
+
+    def __init__(self, window: int) -> None:
+        self._window = window
+        self._next = -1
+        self._largest = 0.0
+        self._last = dict.fromkeys(_KINDS, -window)
+        self.counts = {"samples": 0, "gaps": 0, "missing": 0} | dict.fromkeys(_KINDS, 0)
+        self._events: list[Event] = []
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {
+            "next": np.array([self._next]),
+            "largest": np.array([self._largest]),
+            "last": np.array(list(self._last.values())),
+            "counts": np.array(list(self.counts.values())),
+        }
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._next, self._largest = int(state["next"][0]), float(state["largest"][0])
+        self._last = dict(zip(_KINDS, (int(n) for n in state["last"])))
+        self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
+
+    def drain(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def starts(self, block: Block) -> bool:
+        """Whether this block does not follow the samples before it; says so where something is missing."""
+        first = self._next < 0
+        missing = 0 if first else block.start - self._next
+        if missing < 0:
+            raise InputError(
+                f"samples {block.start} to {self._next - 1} came twice; blocks must follow each other, "
+                "so drop what repeats"
+            )
+        gap = not first and (missing > 0 or block.gap)
+        self._next = block.stop
+        self.counts["samples"] += len(block)
+        if gap:
+            self.counts["gaps"] += 1
+            self.counts["missing"] += missing
+            many = f"{missing} samples are" if missing else "an unknown number of samples is"
+            self._say("gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing)
+        return first or gap
+
+    def take(self, block: Block, rows: Rows) -> None:
+        """Count the samples that were left out; one Event for all that lie within a window of each other."""
+        for kind, position in (("non-finite", rows.not_finite), ("spike", rows.spikes)):
+            if not position.size:
+                continue
+            self.counts[kind] += position.size
+            number = block.start + position
+            apart = np.diff(number, prepend=self._last[kind]) >= self._window
+            self._last[kind] = int(number[-1])
+            for sample in number[apart]:
+                self._say(kind, block, int(sample), _KINDS[kind])
+
+    def excited(self, power: NDArray[np.float64], whole: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
+        """Which lines have at least this share of the largest excitation so far, shape of `power` (rows, lines)."""
+        largest = np.maximum.accumulate(np.r_[self._largest, np.where(whole, power.max(axis=1), 0.0)])
+        self._largest = float(largest[-1])
+        return np.asarray((power > share * largest[1:, np.newaxis]) & (power > 0))
+
+    def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
+        time_s = block.origin_s + sample / block.rate_hz
+        message = f"{what}; responses are invalid until a window of {self._window} samples is whole again"
+        self._events.append(Event(kind, sample, time_s, message, dict(details)))

@@ -1,0 +1,170 @@
+"""Controllers as they run in a drive: each with its own rate, hold, delay and integrator rule.
+
+What a wrong description costs is in docs/loop.md; one forgotten tick of delay is 10 % of the plant's response.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns.errors import InputError
+from livebode.nouns.model import Algebra
+
+Rule = Literal["backward", "forward", "trapezoidal", "continuous"]
+Hold = Literal["zero-order", "none"]
+
+
+def integral(frequency_hz: ArrayLike, rate_hz: float, rule: Rule) -> NDArray[np.complex128]:
+    """Response of an integrator that runs at `rate_hz`, in seconds.
+
+    backward T·z/(z − 1), forward T/(z − 1), trapezoidal T/2·(z + 1)/(z − 1), continuous 1/(jω); T = 1/rate.
+
+    >>> abs(integral(10.0, 4000.0, "backward") * 2j * 3.141592653589793 * 10.0).round(4)
+    np.float64(1.0)
+    """
+    s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
+    if rule == "continuous":
+        return np.asarray(1 / s)
+    z = np.exp(s / rate_hz)
+    numerator = {"backward": z, "forward": 1.0, "trapezoidal": (z + 1) / 2}[rule]
+    return np.asarray(numerator / ((z - 1) * rate_hz))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing(Algebra):
+    """What every controller in a drive has: a rate, a hold towards the faster loop below it, and a delay.
+
+    Parameters
+    ----------
+    rate_hz
+        How often it is computed.
+    held_ticks
+        Ticks of the recorded loop during which one output stands: the recorded rate over `rate_hz`. A
+        controller at half the rate of the recording has 2.
+    hold
+        "zero-order" (the output stands) or "none" (for a Model of a filter that interpolates by itself).
+    delay_ticks
+        Whole ticks of the recorded loop between reading its input and acting, beyond the hold.
+    """
+
+    rate_hz: float
+    held_ticks: int = 1
+    hold: Hold = "zero-order"
+    delay_ticks: int = 0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(f"rate_hz={self.rate_hz} of a controller is not a positive number")
+        if self.held_ticks < 1 or self.delay_ticks < 0:
+            raise InputError(
+                f"held_ticks={self.held_ticks}, delay_ticks={self.delay_ticks}: "
+                "a controller holds at least 1 tick and delays at least 0"
+            )
+        if self.hold not in ("zero-order", "none"):
+            raise InputError(f"hold={self.hold!r} is not known; choose 'zero-order' or 'none'")
+
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        tick = np.exp(-2j * np.pi * f / (self.rate_hz * self.held_ticks))
+        held = 1.0
+        if self.hold == "zero-order":
+            held = np.mean([tick**i for i in range(self.held_ticks)], axis=0)
+        return np.asarray(self.law(f) * held * tick**self.delay_ticks, dtype=np.complex128)
+
+    def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """The control law alone, as computed at `rate_hz`, without hold and delay."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class PID(Timing):
+    """gain·(1 + I/Ti + Td·D/(1 + Tf·D)), the ideal form; P and PI are the same with fewer terms.
+
+    I is the integrator by `integrator`, D the backward difference (1 − z⁻¹)·rate. Without `derivative_time_s` and
+    with an infinite `integral_time_s` (the default) it is a plain gain.
+
+    Raises
+    ------
+    InputError
+        If the integral time is not positive or the integrator rule is not known.
+
+    Examples
+    --------
+    >>> velocity = PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000)
+    >>> abs(velocity.response(100.0)).round(4)
+    np.float64(0.231)
+    """
+
+    gain: float
+    integral_time_s: float = inf
+    derivative_time_s: float = 0.0
+    derivative_filter_s: float = 0.0
+    integrator: Rule = "backward"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.integral_time_s > 0:
+            raise InputError(f"integral_time_s={self.integral_time_s} is not positive; leave it out for a P controller")
+        if self.integrator not in ("backward", "forward", "trapezoidal", "continuous"):
+            raise InputError(
+                f"integrator={self.integrator!r} is not known; choose backward, forward, trapezoidal or continuous"
+            )
+
+    def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        law = np.ones(frequency_hz.shape, dtype=np.complex128)
+        if np.isfinite(self.integral_time_s):
+            law += integral(frequency_hz, self.rate_hz, self.integrator) / self.integral_time_s
+        if self.derivative_time_s:
+            slope = 1 / integral(frequency_hz, self.rate_hz, "backward")
+            law += self.derivative_time_s * slope / (1 + self.derivative_filter_s * slope)
+        return self.gain * law
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionPD(Timing):
+    """Gains on position and on differenced velocity, kv·(kp + D), for a loop that measures position.
+
+    D is the backward difference of the mean of two neighbouring positions when `smoothed` (as in the EMPS
+    benchmark: dq[n] = rate·diff((q[n] + q[n−1])/2)), of the positions themselves otherwise.
+    """
+
+    position_gain: float
+    velocity_gain: float
+    smoothed: bool = False
+
+    def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        before = np.exp(-2j * np.pi * frequency_hz / self.rate_hz)
+        slope = self.rate_hz * (1 - before) * ((1 + before) / 2 if self.smoothed else 1)
+        return np.asarray(self.velocity_gain * (self.position_gain + slope))
+
+
+@dataclass(frozen=True)
+class Cascade(Algebra):
+    """P position loop around a velocity loop, as seen from the measured velocity: Cvel·(1 + Cpos·∫).
+
+    Nevaranta 2016, eq. (16), for sampled loops: the position is the trapezoidal integral of the sampled velocity
+    at the velocity controller's rate, exact to about 2e-6 where the loop samples both. Velocity feedforward acts on
+    the reference only and so does not appear.
+
+    Examples
+    --------
+    >>> loop = Cascade(
+    ...     velocity=PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000),
+    ...     position=PID(gain=1.0, rate_hz=2000, held_ticks=2),
+    ... )
+    >>> loop.response([20.0, 140.0]).shape
+    (2,)
+    """
+
+    velocity: PID
+    position: Timing
+
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        position = integral(f, self.velocity.rate_hz * self.velocity.held_ticks, "trapezoidal")
+        return np.asarray(self.velocity.response(f) * (1 + self.position.response(f) * position))
