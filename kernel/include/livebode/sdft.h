@@ -1,0 +1,92 @@
+/* Modulated sliding DFT at chosen bins: the public face.
+ *
+ *   size → init → push | queue | process → read        (every call returns a status)
+ *
+ * Memory belongs to the caller; nothing here allocates, prints or calls libm. The same functions exist for
+ * double (lb_sdft64_…) and for float (lb_sdft32_…), from one source text. docs/kernel.md explains the method.
+ */
+#ifndef LIVEBODE_SDFT_H
+#define LIVEBODE_SDFT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A limit on everything: all products of these fit 64 bits. */
+#define LB_WINDOW_MAX 16777216u
+#define LB_CHANNELS_MAX 1024u
+
+typedef enum {
+    LB_OK = 0,
+    LB_ERROR_NULL,            /* a pointer is missing */
+    LB_ERROR_WINDOW,          /* window is not in 1 … LB_WINDOW_MAX */
+    LB_ERROR_BINS,            /* no bin, a bin ≥ window, or a bin given twice */
+    LB_ERROR_CHANNELS,        /* channels is not in 1 … LB_CHANNELS_MAX */
+    LB_ERROR_VARIANT,         /* unknown variant */
+    LB_ERROR_DAMPING,         /* damping of the damped variant is not in (0, 1) */
+    LB_ERROR_INSTRUCTION_SET, /* unknown, or this machine or build does not have it */
+    LB_ERROR_SIZE,            /* the configuration needs more memory than size_t can say */
+    LB_ERROR_MEMORY,          /* the memory is smaller than size() said */
+    LB_ERROR_PHASE,           /* unknown phase */
+    LB_ERROR_ROWS,            /* the output has not exactly the rows that these samples make */
+    LB_ERROR_SNAPSHOT_LENGTH, /* a snapshot of another length: cut off, or of another configuration */
+    LB_ERROR_SNAPSHOT_MAGIC,  /* not a snapshot, or one of another byte order or version */
+    LB_ERROR_SNAPSHOT_CONFIG, /* a snapshot of another configuration */
+    LB_ERROR_SNAPSHOT_CRC     /* a damaged snapshot */
+} lb_status;
+
+/* All but the first are there to compare with. Windows are exact taps over neighbouring bins (Jacobsen & Lyons
+ * 2003): three for Hann and Hamming, five for Blackman. */
+typedef enum {
+    LB_MODULATED = 0, /* table-modulated, sums renewed every window: bounded error for ever */
+    LB_PLAIN,         /* Nevaranta 2016, eq. (4): marginally stable, drifts */
+    LB_DAMPED,        /* (4) with a pole inside the unit circle: forgets, but is biased */
+    LB_HANN,
+    LB_HAMMING,
+    LB_BLACKMAN
+} lb_variant;
+
+/* WINDOW: as the DFT of the last `window` samples, oldest first. FIXED: referred to a fixed grid of period
+ * `window`; ratios between channels are the same, and no demodulation is needed. */
+typedef enum { LB_PHASE_WINDOW = 0, LB_PHASE_FIXED } lb_phase;
+
+typedef enum {
+    LB_BEST = 0, /* the widest that this machine has */
+    LB_BASELINE, /* what the compiler's default target has */
+    LB_AVX2,
+    LB_AVX512
+} lb_instruction_set;
+
+typedef struct {
+    uint32_t window;      /* samples, N */
+    uint32_t channels;    /* sharing one index */
+    uint32_t bin_count;   /* K */
+    const uint32_t *bins; /* bin_count different bins, each < window; copied at init */
+    lb_variant variant;
+    double damping; /* pole radius of LB_DAMPED; ignored by the others */
+    lb_instruction_set instruction_set;
+} lb_config;
+
+/* The instruction set that LB_BEST stands for on this machine. */
+lb_instruction_set lb_best_instruction_set(void);
+
+#define LB_SUFFIX 64
+#define LB_REAL double
+#include "livebode/sdft_functions.h"
+#undef LB_SUFFIX
+#undef LB_REAL
+
+#define LB_SUFFIX 32
+#define LB_REAL float
+#include "livebode/sdft_functions.h"
+#undef LB_SUFFIX
+#undef LB_REAL
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

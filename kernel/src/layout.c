@@ -1,0 +1,206 @@
+/* size, init, reset: how an object lies in the caller's memory, and its tables. */
+#include "state.h"
+#include "twiddle.h"
+
+#define LB_ALIGN 64u
+
+static lb_status check(const lb_config *c)
+{
+    if (!c || !c->bins) {
+        return LB_ERROR_NULL;
+    }
+    if (c->window < 1u || c->window > LB_WINDOW_MAX) {
+        return LB_ERROR_WINDOW;
+    }
+    if (c->channels < 1u || c->channels > LB_CHANNELS_MAX) {
+        return LB_ERROR_CHANNELS;
+    }
+    if (c->bin_count < 1u || c->bin_count > c->window) {
+        return LB_ERROR_BINS;
+    }
+    for (uint32_t i = 0; i < c->bin_count; ++i) {
+        if (c->bins[i] >= c->window) {
+            return LB_ERROR_BINS;
+        }
+    }
+    if (c->variant < LB_MODULATED || c->variant > LB_BLACKMAN) {
+        return LB_ERROR_VARIANT;
+    }
+    if (c->variant == LB_DAMPED && !(c->damping > 0.0 && c->damping < 1.0)) {
+        return LB_ERROR_DAMPING;
+    }
+    return LB_OK;
+}
+
+/* Bytes so far, and whether they still fit. */
+typedef struct {
+    uint64_t bytes;
+    unsigned char *base;
+} cursor;
+
+static void *take(cursor *at, uint64_t bytes)
+{
+    unsigned char *here = at->base ? at->base + at->bytes : at->base;
+    at->bytes += (bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN;
+    return here;
+}
+
+/* The one list of what lies where: measures with base = null, lays out with a base. No product overflows: window,
+ * channels and bins are bounded (at most 2^24 · 2^24 · 2^7 bytes). */
+static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
+{
+    const uint64_t bytes = sizeof(real), reach = 2u * lb_reach(c->variant);
+    const uint64_t most = c->bin_count * (1u + reach);
+    const uint64_t inner = most < c->window ? most : c->window;
+    const uint64_t blocks = (inner + LB_BLOCK - 1u) / LB_BLOCK;
+    const uint64_t line = (c->window * bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN / bytes;
+    const uint64_t rows = (c->window + 1u) / 2u + 1u;
+
+    t->row_length = (size_t)(blocks * 2u * LB_BLOCK);
+    t->line_length = (size_t)line;
+    t->blocks = (size_t)blocks;
+    t->table = (real *)take(at, rows * blocks * 2u * LB_BLOCK * bytes);
+    t->sums = (real *)take(at, c->channels * blocks * 4u * LB_BLOCK * bytes);
+    t->line = (real *)take(at, c->channels * line * bytes);
+    t->delta = (real *)take(at, (uint64_t)c->channels * LB_TILE * bytes);
+    t->spectrum = (real *)take(at, reach ? inner * 2u * bytes : 0u);
+    t->bins = (uint32_t *)take(at, inner * sizeof(uint32_t));
+    t->taps = (uint32_t *)take(at, reach ? (uint64_t)c->bin_count * 4u * sizeof(uint32_t) : 0u);
+}
+
+lb_status LB(size)(const lb_config *config, size_t *bytes)
+{
+    if (!bytes) {
+        return LB_ERROR_NULL;
+    }
+    const lb_status status = check(config);
+    if (status != LB_OK) {
+        return status;
+    }
+    LB_DFT measured;
+    cursor at = {0, 0};
+    (void)take(&at, sizeof(LB_DFT) + LB_ALIGN - 1u);
+    lay_out(&measured, &at, config);
+    if (at.bytes > SIZE_MAX / 2u) {
+        return LB_ERROR_SIZE;
+    }
+    *bytes = (size_t)at.bytes;
+    return LB_OK;
+}
+
+/* The place of bin k among the inner bins, appended if new; place[k] is 1 + that place, 0 if unknown. */
+static uint32_t place_of(LB_DFT *t, uint32_t *place, uint32_t k)
+{
+    if (!place[k]) {
+        t->bins[t->inner_count++] = k;
+        place[k] = t->inner_count;
+    }
+    return place[k] - 1u;
+}
+
+static lb_status fill_bins(LB_DFT *t, const lb_config *c)
+{
+    /* The table is filled later and larger than this: room to find duplicates without searching. */
+    uint32_t *place = (uint32_t *)(void *)t->table;
+    const uint32_t N = t->window, reach = lb_reach(c->variant);
+    for (uint32_t k = 0; k < N; ++k) {
+        place[k] = 0;
+    }
+    for (uint32_t i = 0; i < c->bin_count; ++i) {
+        if (place_of(t, place, c->bins[i]) != i) {
+            return LB_ERROR_BINS;
+        }
+    }
+    for (uint32_t i = 0; i < c->bin_count && reach; ++i) {
+        const uint32_t k = c->bins[i];
+        uint32_t *taps = t->taps + (size_t)i * 4u;
+        taps[0] = place_of(t, place, (k + N - 1u) % N);
+        taps[1] = place_of(t, place, (k + 1u) % N);
+        taps[2] = reach < 2u ? i : place_of(t, place, (k + 2u * N - 2u) % N);
+        taps[3] = reach < 2u ? i : place_of(t, place, (k + 2u) % N);
+    }
+    t->blocks = (t->inner_count + LB_BLOCK - 1u) / LB_BLOCK;
+    t->row_length = t->blocks * 2u * LB_BLOCK;
+    return LB_OK;
+}
+
+static void fill_table(LB_DFT *t)
+{
+    for (size_t i = 0; i < t->blocks * LB_BLOCK; ++i) {
+        const uint32_t k = i < t->inner_count ? t->bins[i] : 0u;
+        real *at = t->table + lb_cos_at(i);
+        uint32_t r = 0; /* k·j mod N, without the product */
+        for (uint32_t j = 0; j <= t->half; ++j, at += t->row_length) {
+            double cosine, sine;
+            lb_twiddle(r, t->window, &cosine, &sine);
+            at[0] = (real)cosine;
+            at[LB_BLOCK] = (real)sine;
+            r = r < t->window - k ? r + k : r - (t->window - k);
+        }
+    }
+}
+
+lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT **dft)
+{
+    if (!memory || !dft) {
+        return LB_ERROR_NULL;
+    }
+    *dft = 0;
+    size_t needed;
+    lb_status status = LB(size)(config, &needed);
+    if (status != LB_OK) {
+        return status;
+    }
+    if (bytes < needed) {
+        return LB_ERROR_MEMORY;
+    }
+    const lb_instruction_set set =
+        config->instruction_set == LB_BEST ? lb_best_instruction_set() : config->instruction_set;
+    const lb_tile_function tile = LB(tile_of)(set);
+    if (!tile) {
+        return LB_ERROR_INSTRUCTION_SET;
+    }
+
+    cursor at = {0, (unsigned char *)memory + (LB_ALIGN - (uintptr_t)memory % LB_ALIGN) % LB_ALIGN};
+    LB_DFT *t = (LB_DFT *)take(&at, sizeof(LB_DFT));
+    lay_out(t, &at, config);
+    t->tile = tile;
+    t->set = set;
+    t->variant = config->variant;
+    t->window = config->window;
+    t->channels = config->channels;
+    t->bin_count = config->bin_count;
+    t->inner_count = 0;
+    t->half = (config->window + 1u) / 2u;
+    t->damping = config->variant == LB_DAMPED ? config->damping : 1.0;
+    double power = 1.0;
+    for (uint32_t i = 0; i < t->window; ++i) {
+        power *= t->damping;
+    }
+    t->radius = (real)t->damping;
+    t->radius_window = (real)power;
+    status = fill_bins(t, config);
+    if (status != LB_OK) {
+        return status;
+    }
+    fill_table(t);
+    *dft = t;
+    return LB(reset)(t);
+}
+
+lb_status LB(reset)(LB_DFT *t)
+{
+    if (!t) {
+        return LB_ERROR_NULL;
+    }
+    t->count = 0;
+    t->index = 0;
+    t->pending = 0;
+    for (size_t i = 0; i < t->channels * t->blocks * 4u * LB_BLOCK; ++i) {
+        t->sums[i] = 0;
+    }
+    for (size_t i = 0; i < t->channels * t->line_length; ++i) {
+        t->line[i] = 0;
+    }
+    return LB_OK;
+}

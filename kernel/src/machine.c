@@ -1,0 +1,15 @@
+/* Which instruction set this machine has. One object for both number types. */
+#include "livebode/sdft.h"
+
+lb_instruction_set lb_best_instruction_set(void)
+{
+#ifdef LB_DISPATCH
+    if (__builtin_cpu_supports("avx512f")) {
+        return LB_AVX512;
+    }
+    if (__builtin_cpu_supports("avx2")) {
+        return LB_AVX2;
+    }
+#endif
+    return LB_BASELINE;
+}

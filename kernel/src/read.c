@@ -1,0 +1,93 @@
+/* read: the spectra now, also through the taps of a window. */
+#include "state.h"
+
+/* a0, a1/2, a2/2 of w(n) = a0 − a1·cos(2πn/N) + a2·cos(4πn/N). */
+static const real window_taps[3][3] = {
+    {(real)0.5, (real)0.25, (real)0},      /* Hann */
+    {(real)0.54, (real)0.23, (real)0},     /* Hamming */
+    {(real)0.42, (real)0.25, (real)0.04}, /* Blackman */
+};
+
+/* out *= e^(±jθ), θ of the next sample: + makes the phase the window's, − makes it that of the fixed grid. */
+static void rotate(const LB_DFT *t, size_t bins, int sign, real *out)
+{
+    int backwards;
+    const real *row = lb_row(t, t->index, &backwards);
+    for (size_t b = 0; b < bins; ++b) {
+        const real re = out[2 * b], im = out[2 * b + 1];
+        const real c = row[lb_cos_at(b)], sine = row[lb_cos_at(b) + LB_BLOCK];
+        const real s = backwards == (sign < 0) ? sine : -sine;
+        out[2 * b] = re * c - im * s;
+        out[2 * b + 1] = im * c + re * s;
+    }
+}
+
+static void raw(const LB_DFT *t, size_t channel, size_t bins, real *out)
+{
+    const real *sums = lb_sums(t, channel);
+    for (size_t b = 0; b < bins; ++b) {
+        out[2 * b] = sums[lb_sum_at(b)];
+        out[2 * b + 1] = sums[lb_sum_at(b) + LB_BLOCK];
+    }
+}
+
+static void apply_taps(const LB_DFT *t, real *out)
+{
+    const real *w = window_taps[t->variant - LB_HANN];
+    for (size_t i = 0; i < 2 * (size_t)t->bin_count; ++i) {
+        const uint32_t *taps = t->taps + i / 2 * 4;
+        const real *x = t->spectrum + i % 2;
+        const real near = x[2 * (size_t)taps[0]] + x[2 * (size_t)taps[1]];
+        const real far = x[2 * (size_t)taps[2]] + x[2 * (size_t)taps[3]];
+        out[i] = w[0] * t->spectrum[i] - w[1] * near + w[2] * far;
+    }
+}
+
+void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
+{
+    if (lb_is_windowed(t->variant)) {
+        raw(t, channel, t->inner_count, t->spectrum);
+        rotate(t, t->inner_count, 1, t->spectrum);
+        apply_taps(t, out);
+    } else {
+        raw(t, channel, t->bin_count, out);
+    }
+    if (t->variant == LB_MODULATED && phase == LB_PHASE_WINDOW) {
+        rotate(t, t->bin_count, 1, out);
+    } else if (t->variant != LB_MODULATED && phase == LB_PHASE_FIXED) {
+        rotate(t, t->bin_count, -1, out);
+    }
+}
+
+lb_status LB(read)(LB_DFT *t, lb_phase phase, real *out)
+{
+    if (!t || !out) {
+        return LB_ERROR_NULL;
+    }
+    if (phase != LB_PHASE_WINDOW && phase != LB_PHASE_FIXED) {
+        return LB_ERROR_PHASE;
+    }
+    LB(catch_up)(t);
+    for (size_t c = 0; c < t->channels; ++c) {
+        LB(emit)(t, c, phase, out + c * 2 * t->bin_count);
+    }
+    return LB_OK;
+}
+
+lb_status LB(count)(const LB_DFT *t, uint64_t *count)
+{
+    if (!t || !count) {
+        return LB_ERROR_NULL;
+    }
+    *count = t->count;
+    return LB_OK;
+}
+
+lb_status LB(instruction_set)(const LB_DFT *t, lb_instruction_set *set)
+{
+    if (!t || !set) {
+        return LB_ERROR_NULL;
+    }
+    *set = t->set;
+    return LB_OK;
+}

@@ -1,0 +1,37 @@
+/* The number type of this object: compile with LB_BITS=32 or 64. Private. */
+#ifndef LB_REAL_H
+#define LB_REAL_H
+
+#include "livebode/sdft.h"
+
+#if LB_BITS == 64
+typedef double real;
+typedef int64_t lb_lane_index;
+#define LB_DFT lb_sdft64
+#define LB(name) lb_sdft64_##name
+#elif LB_BITS == 32
+typedef float real;
+typedef int32_t lb_lane_index;
+#define LB_DFT lb_sdft32
+#define LB(name) lb_sdft32_##name
+#else
+#error "compile with -DLB_BITS=32 or -DLB_BITS=64"
+#endif
+
+/* Bins are padded to blocks of 64 bytes, the widest vector; without vector units to single bins. */
+#if !defined(LB_SCALAR) && !(defined(__GNUC__) || defined(__clang__))
+#define LB_SCALAR 1
+#endif
+#ifdef LB_SCALAR
+#define LB_BLOCK 1
+#else
+#define LB_BLOCK (512 / LB_BITS)
+#endif
+
+/* Samples whose sums are done in one go: long enough that loading and storing the sums is cheap, short enough
+ * that samples, differences and table rows stay in the first-level cache. */
+#ifndef LB_TILE
+#define LB_TILE 64
+#endif
+
+#endif

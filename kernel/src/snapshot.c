@@ -1,0 +1,143 @@
+/* snapshot, restore: header, bins, delay lines, sums, and a checksum over it all. Sums lie bin by bin, so that a
+ * snapshot does not depend on the width of the vectors. */
+#include "state.h"
+
+#define LB_SNAPSHOT_MAGIC 0x4642424Cu /* "LBBF" where the least byte comes first */
+#define LB_SNAPSHOT_VERSION 1u
+
+typedef struct {
+    uint32_t magic, version, bits, variant;
+    uint32_t window, channels, bin_count, reserved;
+    uint64_t count;
+    double damping;
+} header;
+
+/* Bytes, not memcpy: the object's undefined symbols stay few and known. */
+static void copy(unsigned char *to, const unsigned char *from, size_t bytes)
+{
+    for (size_t i = 0; i < bytes; ++i) {
+        to[i] = from[i];
+    }
+}
+
+/* CRC-32 (IEEE 802.3), four bits at a time. */
+static uint32_t crc32(const unsigned char *data, size_t bytes)
+{
+    static const uint32_t of_nibble[16] = {
+        0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
+        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu};
+    uint32_t crc = 0xFFFFFFFFu;
+    for (size_t i = 0; i < bytes; ++i) {
+        crc ^= data[i];
+        crc = (crc >> 4) ^ of_nibble[crc & 15u];
+        crc = (crc >> 4) ^ of_nibble[crc & 15u];
+    }
+    return ~crc;
+}
+
+static header header_of(const LB_DFT *t)
+{
+    header h = {LB_SNAPSHOT_MAGIC, LB_SNAPSHOT_VERSION, LB_BITS, (uint32_t)t->variant, t->window, t->channels,
+                t->bin_count, 0u, t->count, t->damping};
+    return h;
+}
+
+static size_t length_of(const LB_DFT *t)
+{
+    const size_t per_channel = t->window + 4u * (size_t)t->inner_count;
+    return sizeof(header) + t->bin_count * sizeof(uint32_t) + t->channels * per_channel * sizeof(real) +
+           sizeof(uint32_t);
+}
+
+lb_status LB(snapshot_size)(const LB_DFT *t, size_t *bytes)
+{
+    if (!t || !bytes) {
+        return LB_ERROR_NULL;
+    }
+    *bytes = length_of(t);
+    return LB_OK;
+}
+
+lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
+{
+    if (!t || !out) {
+        return LB_ERROR_NULL;
+    }
+    if (bytes != length_of(t)) {
+        return LB_ERROR_SNAPSHOT_LENGTH;
+    }
+    LB(catch_up)(t);
+    const header h = header_of(t);
+    unsigned char *at = (unsigned char *)out;
+    copy(at, (const unsigned char *)&h, sizeof h);
+    at += sizeof h;
+    copy(at, (const unsigned char *)t->bins, t->bin_count * sizeof(uint32_t));
+    at += t->bin_count * sizeof(uint32_t);
+    for (size_t c = 0; c < t->channels; ++c) {
+        copy(at, (const unsigned char *)(t->line + c * t->line_length), t->window * sizeof(real));
+        at += t->window * sizeof(real);
+        for (size_t i = 0; i < 4u * (size_t)t->inner_count; ++i, at += sizeof(real)) {
+            const real *sum = lb_sums(t, c) + lb_sum_at(i / 4) + i % 4 * LB_BLOCK;
+            copy(at, (const unsigned char *)sum, sizeof(real));
+        }
+    }
+    const uint32_t crc = crc32((unsigned char *)out, bytes - sizeof(uint32_t));
+    copy(at, (const unsigned char *)&crc, sizeof crc);
+    return LB_OK;
+}
+
+static lb_status examine(const LB_DFT *t, const unsigned char *from, size_t bytes, header *h)
+{
+    uint32_t crc;
+    if (bytes < sizeof(header) + sizeof crc) {
+        return LB_ERROR_SNAPSHOT_LENGTH;
+    }
+    copy((unsigned char *)h, from, sizeof *h);
+    if (h->magic != LB_SNAPSHOT_MAGIC || h->version != LB_SNAPSHOT_VERSION) {
+        return LB_ERROR_SNAPSHOT_MAGIC;
+    }
+    copy((unsigned char *)&crc, from + bytes - sizeof crc, sizeof crc);
+    if (crc != crc32(from, bytes - sizeof crc)) {
+        return LB_ERROR_SNAPSHOT_CRC;
+    }
+    const header own = header_of(t);
+    if (h->bits != own.bits || h->variant != own.variant || h->window != own.window ||
+        h->channels != own.channels || h->bin_count != own.bin_count || h->damping != own.damping) {
+        return LB_ERROR_SNAPSHOT_CONFIG;
+    }
+    if (bytes != length_of(t)) {
+        return LB_ERROR_SNAPSHOT_LENGTH;
+    }
+    for (size_t i = 0; i < t->bin_count * sizeof(uint32_t); ++i) {
+        if (from[sizeof(header) + i] != ((const unsigned char *)t->bins)[i]) {
+            return LB_ERROR_SNAPSHOT_CONFIG;
+        }
+    }
+    return LB_OK;
+}
+
+lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
+{
+    if (!t || !snapshot) {
+        return LB_ERROR_NULL;
+    }
+    header h;
+    const unsigned char *at = (const unsigned char *)snapshot;
+    const lb_status status = examine(t, at, bytes, &h);
+    if (status != LB_OK) {
+        return status;
+    }
+    at += sizeof h + t->bin_count * sizeof(uint32_t);
+    t->count = h.count;
+    t->index = (uint32_t)(h.count % t->window);
+    t->pending = 0;
+    for (size_t c = 0; c < t->channels; ++c) {
+        copy((unsigned char *)(t->line + c * t->line_length), at, t->window * sizeof(real));
+        at += t->window * sizeof(real);
+        for (size_t i = 0; i < 4u * (size_t)t->inner_count; ++i, at += sizeof(real)) {
+            real *sum = lb_sums(t, c) + lb_sum_at(i / 4) + i % 4 * LB_BLOCK;
+            copy((unsigned char *)sum, at, sizeof(real));
+        }
+    }
+    return LB_OK;
+}

@@ -1,0 +1,74 @@
+/* What an object is, inside the caller's memory. Private. */
+#ifndef LB_STATE_H
+#define LB_STATE_H
+
+#include "tile.h"
+
+struct LB_DFT {
+    lb_tile_function tile;
+    lb_instruction_set set;
+    lb_variant variant;
+    double damping;
+    uint32_t window, channels, bin_count;
+    uint32_t inner_count; /* the bins asked for, then the neighbours that a window's taps need */
+    uint32_t half;        /* ⌈N/2⌉: from this index on the table is walked backwards */
+    size_t blocks;        /* of inner bins */
+    size_t row_length;    /* reals per table row */
+    size_t line_length;   /* reals per channel's delay line */
+    real radius;          /* LB_DAMPED: r; else 1 */
+    real radius_window;   /* r^N */
+    uint64_t count;       /* samples seen */
+    uint32_t index;       /* of the next sample in its period: count mod N */
+    uint32_t pending;     /* newest samples that the sums have not seen yet, ≤ LB_TILE, in one half period */
+    real *table;          /* [half + 1][blocks][2][LB_BLOCK]: cos, sin */
+    real *sums;           /* [channels][blocks][4][LB_BLOCK] */
+    real *line;           /* [channels][line_length], the newest N samples, by index */
+    real *delta;          /* [channels][LB_TILE], of the pending samples */
+    real *spectrum;       /* [inner_count][2], scratch of the windows */
+    uint32_t *bins;       /* [inner_count] */
+    uint32_t *taps;       /* [bin_count][4]: places among the inner bins of k−1, k+1, k−2, k+2 */
+};
+
+static inline int lb_renews(lb_variant v) { return v != LB_PLAIN && v != LB_DAMPED; }
+static inline int lb_is_windowed(lb_variant v) { return v > LB_DAMPED; }
+
+/* Neighbours on each side that a variant's taps need. */
+static inline uint32_t lb_reach(lb_variant v)
+{
+    return v == LB_BLACKMAN ? 2u : lb_is_windowed(v) ? 1u : 0u;
+}
+
+/* Place of a bin's S_re among the channel's sums; S_im, F_re, F_im follow at LB_BLOCK each. */
+static inline size_t lb_sum_at(size_t bin)
+{
+    return bin / LB_BLOCK * 4 * LB_BLOCK + lb_slot(bin % LB_BLOCK);
+}
+
+/* Place of a bin's cos in a table row; sin follows at LB_BLOCK. */
+static inline size_t lb_cos_at(size_t bin)
+{
+    return bin / LB_BLOCK * 2 * LB_BLOCK + lb_slot(bin % LB_BLOCK);
+}
+
+/* The table row of the index, and whether it is to be conjugated. */
+static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards)
+{
+    *backwards = index >= t->half;
+    return t->table + (size_t)(*backwards ? t->window - index : index) * t->row_length;
+}
+
+static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + channel * t->blocks * 4 * LB_BLOCK; }
+
+/* The instruction set's kernel, or null. */
+lb_tile_function LB(tile_of)(lb_instruction_set set);
+
+/* Brings the sums up to date with the pending samples. */
+void LB(catch_up)(LB_DFT *t);
+
+/* The unrenewed variants' recursion over a tile. */
+void LB(recur)(const LB_DFT *t, size_t channel, const real *delta, size_t length);
+
+/* One channel's spectrum; nothing may be pending. out[bin_count][2] */
+void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out);
+
+#endif

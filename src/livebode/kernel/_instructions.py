@@ -1,0 +1,38 @@
+"""Which instruction set the kernel uses."""
+
+import os
+from typing import Final
+
+from livebode.kernel import _native
+
+VARIABLE: Final = "LIVEBODE_INSTRUCTION_SET"
+# In the order of lb_instruction_set; 0 is "the best".
+NAMES: Final = ("best", "baseline", "avx2", "avx512")
+
+
+def chosen() -> int:
+    """The number of the set that a new SlidingDFT uses: the environment's, else the best."""
+    name = os.environ.get(VARIABLE, "best")
+    if name not in NAMES:
+        raise ValueError(f"{VARIABLE}={name!r} is not one of {', '.join(NAMES)}")
+    return NAMES.index(name)
+
+
+def instruction_set() -> str:
+    """The instruction set that a new SlidingDFT uses on this machine.
+
+    The widest that the machine has, unless the environment variable LIVEBODE_INSTRUCTION_SET names another. The
+    results are the same to the bit with each.
+
+    Returns:
+        "baseline", "avx2" or "avx512".
+
+    Raises:
+        ValueError: the environment names an unknown instruction set.
+    """
+    return NAMES[chosen() or _native.best_instruction_set()]
+
+
+def instruction_sets() -> tuple[str, ...]:
+    """All instruction sets that this machine can run, narrowest first."""
+    return NAMES[1 : _native.best_instruction_set() + 1]
