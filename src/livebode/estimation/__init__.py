@@ -2,5 +2,6 @@
 
 from livebode.estimation.settings import Settings
 from livebode.estimation.tracker import Tracker
+from livebode.estimation.welch import welch
 
-__all__ = ["Settings", "Tracker"]
+__all__ = ["Settings", "Tracker", "welch"]

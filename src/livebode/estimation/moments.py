@@ -15,16 +15,17 @@ _FIELDS = ("weights", "mean", "power", "scatter", "cross", "moment", "first")
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Weighted moments of numerator and denominator, one row for each place in the period or each moment in time.
+    """Weighted moments of line spectra, one row for each place in the period or each moment in time.
 
-    The weights are λ^i over the windows i that were taken in, the newest first.
+    Numerator and denominator are those of the estimate, each times conj(reference). The weights are λ^i over the
+    windows i that were taken in, the newest first.
 
     Attributes
     ----------
     weights
         Σλ^i, Σλ^2i, Σλ^3i, shape (3, rows).
     mean
-        Means of numerator and denominator, shape (2, rows, lines).
+        Means of numerator, denominator and reference, shape (3, rows, lines).
     power
         Means of what is averaged besides, shape (3, rows, lines).
     scatter, cross
@@ -48,7 +49,7 @@ class Moments:
     def zeros(cls, rows: int, lines: int) -> Moments:
         return cls(
             weights=np.zeros((3, rows)),
-            mean=np.zeros((2, rows, lines), dtype=np.complex128),
+            mean=np.zeros((3, rows, lines), dtype=np.complex128),
             power=np.zeros((3, rows, lines)),
             scatter=np.zeros((2, rows, lines)),
             cross=np.zeros((1, rows, lines), dtype=np.complex128),
@@ -68,7 +69,8 @@ class Moments:
     @property
     def unbiased(self) -> Floats:
         """What the scatter is to be divided by for the variance of one window, shape (rows,); 0 for one window."""
-        return np.asarray(self.weights[0] - self.weights[1] / self.weights[0])
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.weights[0] - self.weights[1] / self.weights[0])
 
     @property
     def of_mean(self) -> Floats:
@@ -83,8 +85,9 @@ class Moments:
         M = diag(v) − vvᵀ/Σv, v = λ^i (Satterthwaite 1946).
         """
         one, two, three = self.weights
-        spread = two - 2 * three / one + (two / one) ** 2
-        return np.where(self.unbiased > 1e-9, self.unbiased**2 / spread, np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            spread = two - 2 * three / one + (two / one) ** 2
+            return np.where(self.unbiased > 1e-9, self.unbiased**2 / spread, np.nan)
 
 
 class PeriodMoments:
@@ -111,6 +114,11 @@ class PeriodMoments:
     def state(self) -> dict[str, NDArray[np.generic]]:
         return {name: getattr(self._now, name).copy() for name in _FIELDS}
 
+    @property
+    def now(self) -> Moments:
+        """The moments at every place in the period."""
+        return self._now
+
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         for name in _FIELDS:
             getattr(self._now, name)[...] = state[name]
@@ -118,7 +126,7 @@ class PeriodMoments:
     def update(
         self,
         place: int,
-        pair: Complex,
+        spectra: Complex,
         power: Floats,
         moment: Floats,
         first: NDArray[np.int64],
@@ -129,7 +137,7 @@ class PeriodMoments:
         Shapes as in Moments, but `first` and `usable` (rows,); windows that are not usable leave their place's moments
         as they are.
         """
-        rows, lines = pair.shape[1:]
+        rows, lines = spectra.shape[1:]
         after = Moments.zeros(rows, lines)
         done = 0
         while done < rows:
@@ -137,20 +145,21 @@ class PeriodMoments:
             now, new = self._now.rows(slice(place, place + n)), slice(done, done + n)
             for start, stop in _stretches(usable[new]):
                 at = slice(done + start, done + stop)
-                self._take(now.rows(slice(start, stop)), pair[:, at], power[:, at], moment[:, at], first[at])
+                self._take(now.rows(slice(start, stop)), spectra[:, at], power[:, at], moment[:, at], first[at])
             after.put(new, now)
             done, place = done + n, 0
         return after
 
-    def _take(self, now: Moments, pair: Complex, power: Floats, moment: Floats, first: NDArray[np.int64]) -> None:
+    def _take(self, now: Moments, spectra: Complex, power: Floats, moment: Floats, first: NDArray[np.int64]) -> None:
         forgetting = self._forgetting
         old = forgetting * now.weights[0]
         now.first[...] = np.where(old > 0, now.first, first)
         now.weights[...] = now.weights * forgetting ** np.array([[1.0], [2.0], [3.0]]) + 1.0
         share = 1.0 / now.weights[0]
         line_share, kept = share[:, np.newaxis], (old * share)[:, np.newaxis]
-        deviation = pair - now.mean
+        deviation = spectra - now.mean
         now.mean[...] += deviation * line_share
+        deviation = deviation[:2]
         now.power[...] += (power - now.power) * line_share
         now.moment[...] += (moment - now.moment) * share
         now.scatter[...] = forgetting * now.scatter + kept * (deviation.real**2 + deviation.imag**2)

@@ -23,9 +23,9 @@ class Rows:
     """Line spectra at the hops of a stretch of samples.
 
     `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
-    other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds a
-    start, a gap, or a sample that was not finite, `clean` (rows,) False also where it holds a spike; `not_finite` and
-    `spikes` are the positions of such samples in the stretch.
+    other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds
+    a start, a gap, or a sample that was not finite, `clean` (rows,) False also where it holds a spike; `not_finite`
+    and `spikes` are the positions of such samples in the stretch.
     """
 
     spectrum: Complex
@@ -85,7 +85,7 @@ class LineSpectra:
         """Forget every sample; the next one has this number."""
         self._dft = self._fresh()
         # Zeros up to the place in the period, so that the grid of hops and phases is that of the sample numbers.
-        self._dft.process(np.zeros((self._differenced.size, sample % self._window)), hop=self._window)
+        self._dft.advance(np.zeros((self._differenced.size, sample % self._window)))
         self._next = sample
         self._last_bad = [sample - 1, sample - 1]
         self._started = False
@@ -139,7 +139,7 @@ class LineSpectra:
 
     def _spectra(self, data: Floats, offset: int) -> tuple[Complex, NDArray[np.int64]]:
         first = (self._next + offset) % self._window
-        spectrum = self._dft.process(data, hop=self._step, demodulate=False)
+        spectrum = self._dft.process(data, hop=self._step, phase="fixed")
         # Rows stand behind the samples whose count is a multiple of the step, which divides the window.
         position = np.arange(self._step - first % self._step - 1, data.shape[1], self._step)
         if self._step != self._hop:

@@ -31,8 +31,8 @@ class Tracker:
     """Frequency responses of a machine in closed loop, sample by sample, from a sliding DFT at excited lines.
 
     Any cutting of the same samples into Blocks gives the same Responses, and a restored Tracker goes on as if it had
-    never stopped. A Response speaks for its window's centre: it is (N − 1)/2 samples late, and what changed within the window
-    is averaged over it. The first whole one comes N samples after a start, a gap or a sample that is not finite.
+    never stopped. A Response speaks for its window's centre: it is (N − 1)/2 samples late, and what changed within the
+    window is averaged over it. The first whole one comes N samples after a start, a gap or a sample that is not finite.
 
     Parameters
     ----------
@@ -89,6 +89,25 @@ class Tracker:
     def counts(self) -> dict[str, int]:
         """How many samples came, were missing, were not finite and were left out as spikes."""
         return self._watch.counts
+
+    def excitation_power(self) -> Floats:
+        """Mean |R|² of the reference at each line over the remembered windows, shape (lines,); NaN before the first."""
+        return self._over_places(self._moments.now.power[0])
+
+    def repeatability(self) -> Floats:
+        """Share of the reference's power that repeats from period to period, shape (lines,): 1 for a periodic one.
+
+        About 1/m over m periods at a line where there is only noise, or where the window is not a whole number of
+        periods; NaN before the second window.
+        """
+        now = self._moments.now
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(np.isfinite(now.dof)[:, np.newaxis], power(now.mean[2]) / now.power[0], np.nan)
+        return self._over_places(share)
+
+    def _over_places(self, values: Floats) -> Floats:
+        seen = self._moments.now.weights[0] > 0
+        return values[seen].mean(axis=0) if seen.any() else np.full(values.shape[1], np.nan)
 
     def drain_events(self) -> list[Event]:
         """Events since the last call: gaps, samples that are not finite, spikes."""
@@ -148,7 +167,8 @@ class Tracker:
         usable = rows.clean & excited.all(axis=1)
         place = int((rows.sample[0] + 1) % s.lines.window // s.step - 1) % self._places if usable.size else 0
         first = rows.sample - s.lines.window + 1
-        moments = self._moments.update(place, pair, powers, moment, first, usable)
+        spectra = np.concatenate([pair, reference[np.newaxis]])
+        moments = self._moments.update(place, spectra, powers, moment, first, usable)
         value, sigma, dof = self._estimate(pair, powers, moments)
         if s.average:
             first, moment = moments.first[0], moments.moment
@@ -184,7 +204,7 @@ class Tracker:
     def _estimate(self, pair: Complex, powers: Floats, moments: Moments) -> tuple[Complex, Floats, Floats]:
         """Value and sigma (rows, lines), and the degrees of freedom (rows,)."""
         s, f = self.settings, self.settings.lines.frequency_hz
-        numerator, denominator = moments.mean if s.average else pair
+        numerator, denominator = moments.mean[:2] if s.average else pair
         ratio = numerator / denominator
         share = moments.of_mean if s.average else np.ones(len(ratio))
         if self._quiet:

@@ -77,10 +77,10 @@ class Block:
         object.__setattr__(self, "channels", channels)
 
     def __len__(self) -> int:
-        return self.data.shape[1]
+        return int(self.data.shape[1])
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        return self.data[self.index(name)]
+        return np.asarray(self.data[self.index(name)])
 
     @property
     def names(self) -> tuple[str, ...]:

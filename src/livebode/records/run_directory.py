@@ -1,0 +1,136 @@
+"""The directory that a run leaves: written beside its place, and moved there when it is whole."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import Event, InputError, Responses
+from livebode.records.response_table import ResponseTable
+
+_DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
+
+
+class RunDirectory:
+    """Responses, events and a summary of one run in a new directory that appears only when it is whole.
+
+    Use it as a context manager: leaving it without an exception puts the directory in its place, any exception removes
+    what was written. What any tool reads: ``responses.parquet`` (see `ResponseTable`), ``events.jsonl`` (one object
+    a line: kind, sample, time_s, message, details) and ``run.json``.
+
+    Parameters
+    ----------
+    path
+        Where the directory is to stand.
+    force
+        Whether to replace a directory that stands there already. Only a directory that a run left is replaced.
+
+    Raises
+    ------
+    InputError
+        If something stands there and is not to be or must not be replaced, or the disk refuses to take it.
+    """
+
+    def __init__(self, path: Path, *, force: bool = False) -> None:
+        self.path = path
+        self._force = force
+
+    def __enter__(self) -> RunDirectory:
+        self._check_free()
+        with _disk_errors(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.partial = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.partial-", dir=self.path.parent))
+            self.partial.chmod(0o755)
+            self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
+            self._responses = ResponseTable(self.partial / "responses.parquet")
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        try:
+            with _disk_errors(self.path):
+                self._responses.close()
+                self._events.close()
+                if kind is None:
+                    self._check_free()
+                    self._put_in_place()
+        finally:
+            shutil.rmtree(self.partial, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise _disk_sentence(self.path, error) from None
+
+    def write(self, responses: Responses) -> None:
+        """Append responses."""
+        with _disk_errors(self.path):
+            self._responses.write(responses)
+
+    def write_event(self, event: Event) -> None:
+        """Append an event."""
+        with _disk_errors(self.path):
+            self._events.write(_json(asdict(event)) + "\n")
+
+    def write_summary(self, summary: dict[str, Any]) -> None:
+        """Write run.json."""
+        with _disk_errors(self.path):
+            (self.partial / "run.json").write_text(_json(summary, indent=2) + "\n", encoding="utf-8")
+
+    def _check_free(self) -> None:
+        if not self.path.exists() and not self.path.is_symlink():
+            return
+        if not self._force:
+            raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
+        if not (self.path / "run.json").is_file() and (not self.path.is_dir() or any(self.path.iterdir())):
+            raise InputError(
+                f"{str(self.path)!r} is not the directory of a run, so --force leaves it; take another --out"
+            )
+
+    def _put_in_place(self) -> None:
+        old = None
+        if self.path.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.old-", dir=self.path.parent))
+            self.path.rename(old / "run")
+        try:
+            self.partial.rename(self.path)
+        except OSError:
+            if old is not None:
+                (old / "run").rename(self.path)
+            raise
+        finally:
+            if old is not None:
+                shutil.rmtree(old, ignore_errors=True)
+
+
+def _json(value: Any, indent: int | None = None) -> str:
+    return json.dumps(_plain(value), ensure_ascii=False, indent=indent, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """The value with what JSON cannot say (NaN, infinity) as null."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _disk_sentence(path: Path, error: OSError) -> InputError:
+    why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
+    return InputError(f"the run could not be written to {str(path)!r}: {why}; nothing was left there")
+
+
+@contextmanager
+def _disk_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise _disk_sentence(path, error) from None
