@@ -4,7 +4,8 @@
 
 #include "real.h"
 
-#ifdef LB_SCALAR
+#ifdef LB_LANES
+#elif defined(LB_SCALAR)
 #define LB_LANES 1
 #elif defined(__AVX512F__)
 #define LB_LANES (512 / LB_BITS)
@@ -83,10 +84,7 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 #define LB_UNROLL_4
 #endif
 
-/* Vectors worked on at once: enough independent sums to hide the adder's latency, few enough for the registers. */
-#if LB_BLOCK / LB_LANES >= 2
-#define LB_ABREAST 2
-#else
+#ifndef LB_ABREAST
 #define LB_ABREAST 1
 #endif
 

@@ -22,12 +22,8 @@ def between_periods(moments: Moments) -> Floats:
     Feedback carries noise into both; the difference holds only what the plant does not explain, to first order the
     output noise that joint and indirect estimates have in common.
     """
-    ratio = moments.mean[0] / moments.mean[1]
-    shared = (ratio.conj() * moments.cross[0]).real
-    total = moments.scatter[0] - 2 * shared + power(ratio) * moments.scatter[1]
-    unbiased = moments.unbiased[:, np.newaxis]
-    # What rounding leaves below zero is zero.
-    return np.where(unbiased > 1e-9, np.maximum(total, 0.0) / unbiased, np.nan)
+    numerator, denominator, _ = moments.mean
+    return np.asarray(moments.unexplained(numerator / denominator) / moments.unbiased[:, np.newaxis])
 
 
 def coherence(moments: Moments) -> Floats:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_FIELDS = ("weights", "mean", "power", "scatter", "cross", "moment", "first")
+_MEANS, _PLANES = 9, 13
+_SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,72 +23,81 @@ class Moments:
 
     Attributes
     ----------
-    weights
-        Σλ^i, Σλ^2i, Σλ^3i, shape (3, rows).
-    mean
-        Means of numerator, denominator and reference, shape (3, rows, lines).
-    power
-        Means of what is averaged besides, shape (3, rows, lines).
-    scatter, cross
-        Σλ^i|δnum|² and Σλ^i|δden|², shape (2, rows, lines), and Σλ^i·δnum·conj(δden), shape (rows, lines), with δ the
-        deviation from the mean.
-    moment
-        Means of the window centre's time and schedule, shape (2, rows).
-    first
-        Number of the oldest sample that went in, shape (1, rows).
+    planes
+        Real, shape (13, rows, lines): means of the real and imaginary parts of numerator, denominator and reference
+        (6) and of three powers (3); then Σλ^i|δnum|², Σλ^i|δden|² and Σλ^i·δnum·conj(δden) (real, imaginary) with δ the
+        deviation from the mean. One array, so that a period is taken in by few calls.
+    rows
+        Shape (6, rows): Σλ^i, Σλ^2i, Σλ^3i; means of the window centre's time and schedule; number of the oldest
+        sample.
     """
 
-    weights: Floats
-    mean: Complex
-    power: Floats
-    scatter: Floats
-    cross: Complex
-    moment: Floats
-    first: NDArray[np.int64]
+    planes: Floats
+    rows: Floats
 
     @classmethod
     def zeros(cls, rows: int, lines: int) -> Moments:
-        return cls(
-            weights=np.zeros((3, rows)),
-            mean=np.zeros((3, rows, lines), dtype=np.complex128),
-            power=np.zeros((3, rows, lines)),
-            scatter=np.zeros((2, rows, lines)),
-            cross=np.zeros((1, rows, lines), dtype=np.complex128),
-            moment=np.zeros((2, rows)),
-            first=np.zeros((1, rows), dtype=np.int64),
-        )
+        return cls(np.zeros((_PLANES, rows, lines)), np.zeros((6, rows)))
 
-    def rows(self, at: slice) -> Moments:
+    def at(self, rows: slice) -> Moments:
         """These rows, as views."""
-        return Moments(*(getattr(self, name)[:, at] for name in _FIELDS))
+        return Moments(self.planes[:, rows], self.rows[:, rows])
 
-    def put(self, at: slice, other: Moments) -> None:
-        """Write the rows of `other` over these."""
-        for name in _FIELDS:
-            getattr(self, name)[:, at] = getattr(other, name)
+    @property
+    def mean(self) -> Complex:
+        """Means of numerator, denominator and reference, shape (3, rows, lines)."""
+        return np.asarray(self.planes[0:6:2] + 1j * self.planes[1:6:2])
+
+    @property
+    def power(self) -> Floats:
+        """Means of the powers, shape (3, rows, lines)."""
+        return self.planes[6:_MEANS]
+
+    @property
+    def weight(self) -> Floats:
+        """Σλ^i, shape (rows,); 0 before the first window."""
+        return np.asarray(self.rows[0])
+
+    @property
+    def moment(self) -> Floats:
+        """Means of time and schedule, shape (2, rows)."""
+        return self.rows[3:5]
+
+    @property
+    def first(self) -> NDArray[np.int64]:
+        """Number of the oldest sample that went in, shape (rows,)."""
+        return self.rows[5].astype(np.int64)
 
     @property
     def unbiased(self) -> Floats:
-        """What the scatter is to be divided by for the variance of one window, shape (rows,); 0 for one window."""
+        """What a scatter is to be divided by for the variance of one window, shape (rows,); NaN for less than two."""
+        one, two, _ = self.rows[:3]
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.weights[0] - self.weights[1] / self.weights[0])
+            rest = one - two / one
+            return np.where(rest > _SEVERAL, rest, np.nan)
 
     @property
     def of_mean(self) -> Floats:
         """Variance of the weighted mean over that of one window, shape (rows,)."""
-        return np.asarray(self.weights[1] / self.weights[0] ** 2)
+        return np.asarray(self.rows[1] / self.rows[0] ** 2)
 
     @property
     def dof(self) -> Floats:
-        """Complex degrees of freedom of the scatter, shape (rows,); NaN for fewer than two windows.
+        """Complex degrees of freedom of a scatter, shape (rows,); NaN for fewer than two windows.
 
         Exactly m − 1 for m windows of equal weight; else matched in two moments, tr(M)²/tr(M²) with
         M = diag(v) − vvᵀ/Σv, v = λ^i (Satterthwaite 1946).
         """
-        one, two, three = self.weights
+        one, two, three = self.rows[:3]
         with np.errstate(divide="ignore", invalid="ignore"):
-            spread = two - 2 * three / one + (two / one) ** 2
-            return np.where(self.unbiased > 1e-9, self.unbiased**2 / spread, np.nan)
+            return np.asarray(self.unbiased**2 / (two - 2 * three / one + (two / one) ** 2))
+
+    def unexplained(self, ratio: Complex) -> Floats:
+        """Σλ^i|δnum − ratio·δden|², shape (rows, lines)."""
+        numerator, denominator, re, im = self.planes[_MEANS:]
+        shared = ratio.real * re + ratio.imag * im
+        total = numerator - 2 * shared + (ratio.real**2 + ratio.imag**2) * denominator
+        return np.asarray(np.maximum(total, 0.0))  # what rounding leaves below zero is zero
 
 
 class PeriodMoments:
@@ -107,63 +117,62 @@ class PeriodMoments:
     """
 
     def __init__(self, places: int, lines: int, forgetting: float) -> None:
-        self._places = places
         self._forgetting = forgetting
-        self._now = Moments.zeros(places, lines)
+        self._decay = forgetting ** np.array([[1.0], [2.0], [3.0]])
+        self.now = Moments.zeros(places, lines)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        return {name: getattr(self._now, name).copy() for name in _FIELDS}
-
-    @property
-    def now(self) -> Moments:
-        """The moments at every place in the period."""
-        return self._now
+        return {"planes": self.now.planes.copy(), "rows": self.now.rows.copy()}
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in _FIELDS:
-            getattr(self._now, name)[...] = state[name]
+        self.now.planes[...], self.now.rows[...] = state["planes"], state["rows"]
 
-    def update(
-        self,
-        place: int,
-        spectra: Complex,
-        power: Floats,
-        moment: Floats,
-        first: NDArray[np.int64],
-        usable: NDArray[np.bool_],
-    ) -> Moments:
+    def update(self, place: int, spectra: Complex, power: Floats, moment: Floats, usable: NDArray[np.bool_]) -> Moments:
         """Take in windows at consecutive places from `place` on and return the Moments after each.
 
-        Shapes as in Moments, but `first` and `usable` (rows,); windows that are not usable leave their place's moments
-        as they are.
+        Parameters
+        ----------
+        spectra, power
+            Numerator, denominator, reference, and three powers, each shape (3, rows, lines).
+        moment
+            Time, schedule and oldest sample, shape (3, rows).
+        usable
+            Shape (rows,); windows that are not usable leave their place's moments as they are.
         """
+        places = self.now.planes.shape[1]
         rows, lines = spectra.shape[1:]
+        new = np.empty((_MEANS, rows, lines))
+        new[0:6:2], new[1:6:2], new[6:] = spectra.real, spectra.imag, power
         after = Moments.zeros(rows, lines)
         done = 0
         while done < rows:
-            n = min(rows - done, self._places - place)
-            now, new = self._now.rows(slice(place, place + n)), slice(done, done + n)
-            for start, stop in _stretches(usable[new]):
+            n = min(rows - done, places - place)
+            now = self.now.at(slice(place, place + n))
+            for start, stop in _stretches(usable[done : done + n]):
                 at = slice(done + start, done + stop)
-                self._take(now.rows(slice(start, stop)), spectra[:, at], power[:, at], moment[:, at], first[at])
-            after.put(new, now)
+                self._take(now.at(slice(start, stop)), new[:, at], moment[:, at])
+            after.planes[:, done : done + n], after.rows[:, done : done + n] = now.planes, now.rows
             done, place = done + n, 0
         return after
 
-    def _take(self, now: Moments, spectra: Complex, power: Floats, moment: Floats, first: NDArray[np.int64]) -> None:
-        forgetting = self._forgetting
-        old = forgetting * now.weights[0]
-        now.first[...] = np.where(old > 0, now.first, first)
-        now.weights[...] = now.weights * forgetting ** np.array([[1.0], [2.0], [3.0]]) + 1.0
-        share = 1.0 / now.weights[0]
-        line_share, kept = share[:, np.newaxis], (old * share)[:, np.newaxis]
-        deviation = spectra - now.mean
-        now.mean[...] += deviation * line_share
-        deviation = deviation[:2]
-        now.power[...] += (power - now.power) * line_share
-        now.moment[...] += (moment - now.moment) * share
-        now.scatter[...] = forgetting * now.scatter + kept * (deviation.real**2 + deviation.imag**2)
-        now.cross[0] = forgetting * now.cross[0] + kept * (deviation[0] * deviation[1].conj())
+    def _take(self, now: Moments, new: Floats, moment: Floats) -> None:
+        weights, means, scatter = now.rows[:3], now.planes[:_MEANS], now.planes[_MEANS:]
+        old = self._forgetting * weights[0]
+        now.rows[5] = np.where(old > 0, now.rows[5], moment[2])
+        weights *= self._decay
+        weights += 1.0
+        share = 1.0 / weights[0]
+        now.rows[3:5] += (moment[:2] - now.rows[3:5]) * share
+        deviation = new - means
+        means += deviation * share[:, np.newaxis]
+        numerator, denominator = deviation[0:2], deviation[2:4]
+        squares = deviation[:4] ** 2
+        straight, crosswise = numerator * denominator, numerator[::-1] * denominator
+        product = np.stack(
+            [squares[0] + squares[1], squares[2] + squares[3], straight[0] + straight[1], crosswise[0] - crosswise[1]]
+        )
+        scatter *= self._forgetting
+        scatter += product * (old * share)[:, np.newaxis]
 
 
 def _stretches(usable: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -106,7 +106,7 @@ class Tracker:
         return self._over_places(share)
 
     def _over_places(self, values: Floats) -> Floats:
-        seen = self._moments.now.weights[0] > 0
+        seen = self._moments.now.weight > 0
         return values[seen].mean(axis=0) if seen.any() else np.full(values.shape[1], np.nan)
 
     def drain_events(self) -> list[Event]:
@@ -167,11 +167,12 @@ class Tracker:
         usable = rows.clean & excited.all(axis=1)
         place = int((rows.sample[0] + 1) % s.lines.window // s.step - 1) % self._places if usable.size else 0
         first = rows.sample - s.lines.window + 1
+        moment = np.concatenate([moment, first[np.newaxis]])
         spectra = np.concatenate([pair, reference[np.newaxis]])
-        moments = self._moments.update(place, spectra, powers, moment, first, usable)
+        moments = self._moments.update(place, spectra, powers, moment, usable)
         value, sigma, dof = self._estimate(pair, powers, moments)
         if s.average:
-            first, moment = moments.first[0], moments.moment
+            first, moment = moments.first, moments.moment
         # An average goes on through windows that it leaves out.
         seen = rows.whole if s.average else rows.clean
         valid = seen[:, np.newaxis] & excited & np.isfinite(value)
