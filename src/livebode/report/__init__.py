@@ -1,0 +1,11 @@
+"""The pictures of a run: Bode plot and tracking as PNG, and a Bode plot for the terminal.
+
+Importing this costs nothing: Matplotlib and plotext are loaded when the first picture is made.
+"""
+
+from livebode.report.bode import bode_figure
+from livebode.report.pictures import save_pictures
+from livebode.report.terminal import terminal_bode
+from livebode.report.tracking import tracking_figure
+
+__all__ = ["bode_figure", "save_pictures", "terminal_bode", "tracking_figure"]

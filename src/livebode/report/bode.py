@@ -1,0 +1,218 @@
+"""The Bode plot of a run: magnitude, phase and coherence over frequency, with what the run spanned and the bounds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Responses
+from livebode.report import ticks, words
+from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
+from livebode.report.summary import PROBABILITY, Summary, decibels, summarised
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+_LEFT = 0.085
+# A bound that reaches below this is drawn to the lower edge: the response cannot be told from zero.
+_FLOOR_DB = -1000.0
+
+
+def bode_figure(
+    responses: Responses, *, title: str = "", names: tuple[str, str] | None = None, dark: bool = False
+) -> Figure:
+    """Magnitude (dB), unwrapped phase (degrees) and, where known, coherence over logarithmic frequency.
+
+    A line shows the median over the valid responses (magnitude and phase apart, the phase around its mean direction:
+    summary.py says why not the complex mean), a light band what 5–95 % of them spanned, and in another colour the
+    newest valid response with the bound that holds the truth with a probability of 99.7 %. Lines that were never valid
+    are left open.
+
+    Parameters
+    ----------
+    responses
+        (rows, lines); may be thinned, partly or wholly invalid, or empty.
+    title
+        Heading, from the recording; shortened where it does not fit.
+    names
+        Names of the input and the output channel.
+    dark
+        Light on dark.
+    """
+    look = style(dark)
+    summary = summarised(responses)
+    with drawing(look):
+        coherent = bool(np.isfinite(summary.coherence).any())
+        figure = new_figure(9.0, 7.6 if coherent else 6.6)
+        heading(figure, look, title or "Bode plot", words.facts(responses, summary.count, names), _LEFT)
+        magnitude, phase, *rest = _panels(figure, coherent)
+        _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary))
+        _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary))
+        magnitude.set_ylabel(words.magnitude_label(responses, 46))
+        phase.set_ylabel("phase in degrees")
+        if rest:
+            _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary))
+            rest[0].set_ylabel("coherence γ²")
+        _scales(figure, look, summary, magnitude, phase, *rest)
+    return figure
+
+
+def _panels(figure: Figure, coherent: bool) -> list[Axes]:
+    height_in = figure.get_size_inches()[1]
+    grid = figure.add_gridspec(
+        3 if coherent else 2,
+        1,
+        height_ratios=[3, 2, 1.1] if coherent else [3, 2],
+        left=_LEFT,
+        right=0.98,
+        top=1 - 1.1 / height_in,
+        bottom=0.52 / height_in,
+        hspace=0.09,
+    )
+    first = figure.add_subplot(grid[0])
+    return [first, *(figure.add_subplot(cell, sharex=first) for cell in (grid[i] for i in range(1, grid.nrows)))]
+
+
+def _newest_db(summary: Summary) -> tuple[Floats, Floats, Floats]:
+    size = np.abs(summary.newest_value)
+    with np.errstate(all="ignore"):
+        low = np.maximum(decibels(np.maximum(size - summary.newest_bound, 0.0)), _FLOOR_DB)
+        return decibels(size), low, decibels(size + summary.newest_bound)
+
+
+def _newest_deg(summary: Summary) -> tuple[Floats, Floats, Floats]:
+    with np.errstate(all="ignore"):
+        ratio = summary.newest_bound / np.abs(summary.newest_value)
+        half = np.where(ratio >= 1, 180.0, np.degrees(np.arcsin(np.minimum(ratio, 1.0))))
+    return summary.newest_phase_deg, summary.newest_phase_deg - half, summary.newest_phase_deg + half
+
+
+def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
+    nothing = np.full(len(summary.responses.lines), np.nan)
+    if summary.newest is None:
+        return nothing, nothing, nothing
+    return np.where(np.isfinite(summary.newest_value), summary.newest.coherence, np.nan), nothing, nothing
+
+
+def _draw(axes: Axes, look: Style, summary: Summary, run: Floats, value: Floats, low: Floats, high: Floats) -> None:
+    """One panel: span, median, newest; `run` is (3, lines), the rest (lines,)."""
+    f = summary.responses.lines.frequency_hz
+    few = len(f) <= FEW_LINES
+    run_marker: dict[str, Any] = {"marker": "o", "markersize": 4.5} if few else {}
+    if summary.count > 1:
+        _band(axes, f, run[0], run[2], look.run, 0.2, gid="span")
+        axes.plot(f, run[1], color=look.run, linewidth=1.6, zorder=3, gid="median", **run_marker)
+    if few:
+        known = np.isfinite(low)
+        axes.vlines(f[known], low[known], high[known], color=look.newest, linewidth=1.6, zorder=4, gid="bound")
+        axes.plot(f, value, "_", markersize=9, markeredgewidth=2.0, color=look.newest, zorder=5, gid="newest")
+    else:
+        _band(axes, f, low, high, look.newest, 0.28, gid="bound")
+        axes.plot(f, value, color=look.newest, linewidth=0.9, zorder=4, gid="newest")
+        alone = _alone(value)
+        axes.plot(f[alone], value[alone], color=look.newest, linestyle="", marker="o", markersize=3, zorder=4)
+
+
+def _band(axes: Axes, f: Floats, low: Floats, high: Floats, colour: str, alpha: float, gid: str) -> None:
+    """Filled between neighbours; a line with no neighbour gets a bar instead, or its span would be invisible."""
+    axes.fill_between(f, low, high, color=colour, alpha=alpha, linewidth=0, zorder=2, gid=gid)
+    alone = _alone(low + high)
+    if alone.any():
+        axes.vlines(f[alone], low[alone], high[alone], color=colour, alpha=alpha * 1.5, linewidth=8, zorder=2)
+
+
+def _alone(values: Floats) -> NDArray[np.bool_]:
+    known = np.isfinite(values)
+    beside = np.zeros_like(known)
+    beside[1:] |= known[:-1]
+    beside[:-1] |= known[1:]
+    return known & ~beside
+
+
+def _scales(figure: Figure, look: Style, summary: Summary, *panels: Axes) -> None:
+    magnitude, phase, *rest = panels
+    for axes in panels:
+        plain(axes)
+        axes.yaxis.set_label_coords(-0.066, 0.5)
+        _frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
+    panels[-1].set_xlabel("frequency in Hz")
+    _limits(magnitude, summary.magnitude_db, _newest_db(summary), room=3.0)
+    low_deg, high_deg = _limits(phase, summary.phase_deg, _newest_deg(summary), room=10.0)
+    phase.set_yticks(ticks.phase_ticks(low_deg, high_deg))
+    if rest:
+        rest[0].set_ylim(-0.04, 1.06)
+        rest[0].set_yticks([0.0, 0.5, 1.0])
+    if summary.count:
+        _legend(figure, look, summary)
+    else:
+        empty_note(magnitude, look)
+        for axes in (magnitude, phase):
+            axes.set_yticks([])
+
+
+def _frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
+    """Logarithmic frequency with plain numbers."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullFormatter
+
+    low_hz, high_hz = ticks.frequency_limits(frequency_hz)
+    axes.set_xscale("log")
+    axes.set_xlim(low_hz, high_hz)
+    major = ticks.line_ticks(frequency_hz, low_hz, high_hz)
+    axes.xaxis.set_major_locator(FixedLocator(major))
+    axes.xaxis.set_major_formatter(FixedFormatter([ticks.frequency_label(f) for f in major]))
+    axes.xaxis.set_minor_locator(FixedLocator(ticks.minor_frequency_ticks(low_hz, high_hz)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(axis="x", labelbottom=labels)
+
+
+def _limits(axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], room: float) -> tuple[float, float]:
+    """Limits that hold span and newest, and bounds as far as they do not squeeze the rest to a stripe."""
+    drawn = np.concatenate([run.ravel(), newest[0]])
+    drawn = drawn[np.isfinite(drawn)]
+    if not drawn.size:
+        low, high = axes.get_ylim()
+        return low, high
+    low, high = float(drawn.min()), float(drawn.max())
+    reach = max(0.35 * (high - low), room)
+    least, most = (np.nanmin(newest[1], initial=low), np.nanmax(newest[2], initial=high))
+    low, high = max(float(least), low - reach), min(float(most), high + reach)
+    margin = max(0.04 * (high - low), room / 3)
+    axes.set_ylim(low - margin, high + margin)
+    return low - margin, high + margin
+
+
+def _legend(figure: Figure, look: Style, summary: Summary) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    assert summary.newest is not None
+    few = len(summary.responses.lines) <= FEW_LINES
+    handles: list[Any] = []
+    if summary.count > 1:
+        handles = [
+            Line2D([], [], color=look.run, linewidth=1.6, marker="o" if few else "", markersize=4.5),
+            Patch(facecolor=look.run, alpha=0.25),
+        ]
+    mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
+    handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
+    texts = [f"median of {words.counted(summary.count, 'valid response')}", "5–95 % of them"][: len(handles) - 1]
+    at_s = summary.newest.time_s
+    newest = f"newest, at {at_s:.1f} s" if abs(at_s) >= 1e5 else f"newest, at {at_s:.6g} s"
+    if np.isfinite(summary.newest_bound).any():
+        newest += f", bound: {100 * PROBABILITY:.1f} % (3σ)"
+    figure.legend(
+        handles,
+        [*texts, newest],
+        loc="upper left",
+        bbox_to_anchor=(_LEFT, 1 - 0.76 / figure.get_size_inches()[1]),
+        ncols=3,
+        borderpad=0.0,
+        borderaxespad=0.0,
+        handlelength=1.6,
+        columnspacing=2.0,
+    )

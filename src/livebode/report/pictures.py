@@ -1,0 +1,47 @@
+"""The two pictures that every run leaves."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from livebode.nouns import Responses
+from livebode.report.style import Style, drawing, quiet_about_letters, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def save_pictures(
+    responses: Responses,
+    directory: str | PathLike[str],
+    *,
+    title: str = "",
+    schedule_name: str = "",
+    names: tuple[str, str] | None = None,
+    dark: bool = False,
+) -> list[Path]:
+    """Write bode.png and tracking.png into an existing directory and return their paths; see the two figures.
+
+    The same responses give the same bytes: no date and no version stand in the files.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    from livebode.report.bode import bode_figure
+    from livebode.report.tracking import tracking_figure
+
+    pictures = {
+        "bode.png": bode_figure(responses, title=title, names=names, dark=dark),
+        "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
+    }
+    return [_save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
+
+
+def _save(figure: Figure, path: Path, look: Style) -> Path:
+    with drawing(look), quiet_about_letters():
+        figure.savefig(path, format="png", metadata={"Software": None})
+    return path

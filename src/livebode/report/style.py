@@ -1,0 +1,190 @@
+"""Light and dark: the colours and sizes of every picture, and what text from data needs before it is drawn.
+
+Figures are made with Matplotlib's objects, never with pyplot, and Matplotlib is imported where a picture is made, so
+that importing livebode stays cheap. Nothing here changes the settings of a program that uses Matplotlib itself.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+DPI = 110
+# A line's own marker and error bar are drawn up to this many lines; more would be a hedge, and become a band.
+FEW_LINES = 40
+
+
+@dataclass(frozen=True)
+class Style:
+    """Colours of one look, after Okabe and Ito, so that people who see fewer hues can tell them apart.
+
+    `run` and `newest` are the two of the Bode plot, `traces` one for each line of the tracking plot, in an order in
+    which neighbours differ most.
+    """
+
+    paper: str
+    ink: str
+    muted: str
+    grid: str
+    run: str
+    newest: str
+    nothing: str
+    change_map: str
+    traces: tuple[str, ...]
+
+
+LIGHT = Style(
+    paper="#ffffff",
+    ink="#1d2733",
+    muted="#5b6775",
+    grid="#e3e7ec",
+    run="#0072b2",
+    newest="#d55e00",
+    nothing="#d9dde2",
+    change_map="RdBu_r",
+    traces=(
+        *("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#1d2733"),
+        *("#56b4e9", "#d55e00", "#a39a00", "#6a3d9a", "#8c564b"),
+    ),
+)
+DARK = Style(
+    paper="#12181f",
+    ink="#e8edf2",
+    muted="#a3afbc",
+    grid="#2a333d",
+    run="#56b4e9",
+    newest="#f0a04b",
+    nothing="#39424c",
+    change_map="berlin",
+    traces=(
+        *("#4aa3df", "#e69f00", "#1fc297", "#e29ac4", "#e8edf2"),
+        *("#8fd3ff", "#f0723a", "#f0e442", "#b497e7", "#c49a8a"),
+    ),
+)
+
+
+def style(dark: bool) -> Style:
+    return DARK if dark else LIGHT
+
+
+@contextmanager
+def drawing(look: Style) -> Iterator[None]:
+    """Matplotlib's own defaults with this look, whatever the user's matplotlibrc says; undone at the end."""
+    import matplotlib
+
+    settings: Any = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith("backend")}
+    settings |= {
+        "axes.edgecolor": look.muted,
+        "axes.facecolor": look.paper,
+        "axes.labelcolor": look.ink,
+        "axes.labelsize": 10.0,
+        "axes.linewidth": 0.8,
+        "axes.spines.right": False,
+        "axes.spines.top": False,
+        "axes.unicode_minus": True,
+        "figure.facecolor": look.paper,
+        "font.family": ["sans-serif"],
+        "font.sans-serif": ["DejaVu Sans"],
+        "font.size": 10.0,
+        "grid.color": look.grid,
+        "legend.fontsize": 9.0,
+        "legend.frameon": False,
+        "legend.labelcolor": look.ink,
+        "path.simplify": True,
+        "text.color": look.ink,
+        "text.usetex": False,
+        "xtick.color": look.muted,
+        "xtick.labelcolor": look.ink,
+        "xtick.labelsize": 9.0,
+        "ytick.color": look.muted,
+        "ytick.labelcolor": look.ink,
+        "ytick.labelsize": 9.0,
+    }
+    with matplotlib.rc_context(settings):
+        yield
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure on an Agg canvas."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), dpi=DPI)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def heading(figure: Figure, look: Style, title: str, facts: str, left: float) -> None:
+    """Title and a line of facts at the upper left, in inches from the top, so that every picture has the same head."""
+    width_in, height_in = figure.get_size_inches()
+    for text, down_in, size, weight, colour in (
+        (title, 0.36, 13, "bold", look.ink),
+        (facts, 0.62, 9.5, "normal", look.muted),
+    ):
+        line = figure.text(left, 1 - down_in / height_in, "", size=size, weight=weight, color=colour, parse_math=False)
+        _fit(line, shortened(text, 300), (1 - left) * width_in * DPI)
+
+
+def _fit(line: Text, text: str, width_px: float) -> None:
+    """Write `text` with as many letters as are not wider than `width_px`."""
+    line.set_text(text)
+    with quiet_about_letters():
+        while len(text) > 8 and (measured := line.get_window_extent().width) > width_px:
+            text = shortened(text, min(columns(text) - 1, int(columns(text) * width_px / measured)))
+            line.set_text(text)
+
+
+@contextmanager
+def quiet_about_letters() -> Iterator[None]:
+    """A name from the data may hold letters that the font has not; they show as boxes, which is no reason to warn."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
+
+
+def plain(axes: Axes, grid: bool = True) -> None:
+    """The look of one panel: a quiet grid behind the data, short ticks."""
+    axes.tick_params(length=3.5, width=0.8)
+    axes.tick_params(which="minor", length=2.0, width=0.6)
+    axes.set_axisbelow(True)
+    if grid:
+        axes.grid(True, linewidth=0.7)
+
+
+def empty_note(axes: Axes, look: Style, text: str = "no valid response") -> None:
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=12, color=look.muted)
+
+
+def shortened(text: str, letters: int) -> str:
+    """One line of at most `letters` columns: control characters become spaces, and the middle gives way.
+
+    >>> shortened("a channel name that goes on", 15)
+    'a chann…goes on'
+    """
+    text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    if columns(text) <= letters:
+        return text
+    head = tail = ""
+    rest = text
+    while rest:
+        if columns(head) <= columns(tail):
+            head, rest = head + rest[0], rest[1:]
+        else:
+            tail, rest = rest[-1] + tail, rest[:-1]
+        if columns(head) + columns(tail) >= letters - 1:
+            break
+    return f"{head}…{tail}"
+
+
+def columns(text: str) -> int:
+    """Width in columns of a terminal or in letters of the usual width; wide (East Asian) ones count twice."""
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 0 if unicodedata.combining(c) else 1 for c in text)

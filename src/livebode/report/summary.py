@@ -1,0 +1,135 @@
+"""What a run comes to, line by line: the middle, the span, and the newest response.
+
+The middle is the median over the valid responses, taken apart for magnitude and phase. A machine that moves changes
+its response; the complex mean would then round off a peak that wanders, the more the sharper it is, and one spike
+moves it. The median does neither, and always lies in the span drawn around it. It is biased upwards where the noise is
+as large as the response itself: there the bound says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Response, Responses
+
+Floats = NDArray[np.float64]
+
+# The probability of ±3 standard deviations of a normal number, given to the circle around a complex response.
+PROBABILITY = 0.9973
+BOUND_C = sqrt(-log(1 - PROBABILITY))
+SPAN = (0.05, 0.95)
+# The middle of an unwrapped phase curve lies between −225° and 135°: the cut is as far as can be from the angles at
+# which machines dwell (multiples of 90°, a little late), so that noise does not turn a curve by a whole turn.
+_TURN_FROM_DEG = -225.0
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Low, middle and high over the run, each of shape (3, lines); NaN for a line that was never valid.
+
+    `magnitude_db` in dB, `phase_deg` unwrapped along frequency, `coherence` between 0 and 1. `newest` is the last row
+    in which any line is valid, and None where there is none; `newest_phase_deg` is on the branch of the middle.
+    """
+
+    responses: Responses
+    count: int
+    magnitude_db: Floats
+    phase_deg: Floats
+    coherence: Floats
+    newest: Response | None
+    newest_value: NDArray[np.complex128]
+    newest_bound: Floats
+    newest_phase_deg: Floats
+
+
+def summarised(responses: Responses) -> Summary:
+    """Middle, span and newest of a run; never raises, whatever is missing."""
+    use = usable(responses)
+    value = np.where(use, responses.value, np.nan)
+    rows = np.flatnonzero(use.any(axis=1))
+    newest = responses[int(rows[-1])] if rows.size else None
+    newest_value = value[rows[-1]] if rows.size else np.full(len(responses.lines), complex(np.nan))
+    bound = responses[int(rows[-1])].bound(BOUND_C) if rows.size else np.full(len(responses.lines), np.nan)
+    magnitude_db = quantiles(decibels(value))
+    middle_deg, deviation_deg = _circular(value)
+    weak = np.isfinite(bound) & (bound > np.abs(newest_value))
+    phase = unwrapped(middle_deg, weak)
+    return Summary(
+        responses=responses,
+        count=int(rows.size),
+        magnitude_db=magnitude_db,
+        phase_deg=phase + deviation_deg - deviation_deg[1],
+        coherence=quantiles(np.where(use & np.isfinite(responses.coherence), responses.coherence, np.nan)),
+        newest=newest,
+        newest_value=newest_value,
+        newest_bound=np.where(np.isfinite(newest_value), bound, np.nan),
+        newest_phase_deg=_near(np.degrees(np.angle(newest_value)), phase),
+    )
+
+
+def usable(responses: Responses) -> NDArray[np.bool_]:
+    """Where a response can be drawn: valid, finite and not zero, shape (rows, lines)."""
+    return np.asarray(responses.valid & np.isfinite(responses.value) & (responses.value != 0))
+
+
+def decibels(value: NDArray[np.complex128] | Floats) -> Floats:
+    """20·log10|value|, −inf for zero, NaN for NaN, without warnings."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(20 * np.log10(np.abs(value)))
+
+
+def quantiles(values: Floats) -> Floats:
+    """5 %, 50 % and 95 % of each column without its NaN, interpolated, shape (3, columns); NaN for an empty column.
+
+    >>> quantiles(np.array([[1.0], [np.nan], [3.0]])).T
+    array([[1.1, 2. , 2.9]])
+    """
+    if not values.shape[0]:
+        return np.full((3, values.shape[1]), np.nan)
+    ordered = np.sort(np.ascontiguousarray(values.T), axis=1)
+    count = np.count_nonzero(np.isfinite(ordered), axis=1)
+    every = np.arange(len(ordered))
+    found = []
+    for q in (SPAN[0], 0.5, SPAN[1]):
+        position = q * np.maximum(count - 1, 0)
+        below = position.astype(np.intp)
+        above = np.minimum(below + 1, np.maximum(count - 1, 0))
+        low, high = ordered[every, below], ordered[every, above]
+        found.append(low + (high - low) * (position - below))
+    return np.array(found)
+
+
+def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
+    """Phase along frequency without jumps of whole turns; shape (lines,), degrees.
+
+    Lines whose phase nothing is known about (`weak`: the bound is larger than the response) follow the others and do
+    not lead them, so that noise cannot wind the curve up.
+    """
+    known = np.isfinite(phase_deg)
+    lead = known & ~weak if np.any(known & ~weak) else known
+    if not np.any(lead):
+        return phase_deg.copy()
+    at = np.arange(len(phase_deg))
+    led = np.unwrap(phase_deg[lead], period=360.0)
+    middle = (led.min() + led.max()) / 2
+    led -= 360.0 * np.floor((middle - _TURN_FROM_DEG) / 360.0)
+    return _near(phase_deg, np.interp(at, at[lead], led))
+
+
+def _near(phase_deg: Floats, reference_deg: Floats) -> Floats:
+    """The same angles on the branch within half a turn of the reference."""
+    return np.asarray(phase_deg - 360.0 * np.rint((phase_deg - reference_deg) / 360.0))
+
+
+def _circular(value: NDArray[np.complex128]) -> tuple[Floats, Floats]:
+    """Median angle of each column (columns,), and quantiles of the deviation from the mean direction (3, columns)."""
+    with np.errstate(all="ignore"):
+        turned = value / np.abs(value)
+        direction = np.nansum(turned, axis=0)
+        direction = np.where(np.abs(direction) > 0, direction, 1.0)
+        deviation_deg = quantiles(np.degrees(np.angle(turned * direction.conj())))
+    return np.degrees(np.angle(direction)) + deviation_deg[1], deviation_deg
