@@ -131,7 +131,7 @@ def heading(figure: Figure, look: Style, title: str, facts: str, left: float) ->
         (facts, 0.62, 9.5, "normal", look.muted),
     ):
         line = figure.text(left, 1 - down_in / height_in, "", size=size, weight=weight, color=colour, parse_math=False)
-        _fit(line, shortened(text, 300), (1 - left) * width_in * DPI)
+        _fit(line, shortened(text, 300), ((1 - left) * width_in - 0.2) * DPI)
 
 
 def _fit(line: Text, text: str, width_px: float) -> None:

@@ -160,10 +160,11 @@ def _against_schedule(
     x = responses.schedule
     falling = is_falling(x)
     size = float(np.clip(60.0 / np.sqrt(max(len(x), 1)), 2.0, 4.5))
+    faint = float(np.clip(64.0 / max(len(x), 1), 0.04, 0.16))  # many strokes lie on top of each other
     for i, colour in enumerate(colours):
         known = np.isfinite(bounds[0][:, i]) & np.isfinite(x)
         axes.vlines(
-            x[known], bounds[0][known, i], bounds[1][known, i], color=colour, alpha=0.16, linewidth=1.5, gid="bound"
+            x[known], bounds[0][known, i], bounds[1][known, i], color=colour, alpha=faint, linewidth=1.5, gid="bound"
         )
         for fall, face in ((False, colour), (True, look.paper)):
             at = falling == fall
