@@ -1,0 +1,97 @@
+"""CSV, TSV and their kin: found out by `dialect`, parsed in a stream by Arrow, errors located by `locate`."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pyarrow as pa
+from pyarrow import csv
+
+from livebode.nouns import InputError
+from livebode.sources.columnar import to_numpy
+from livebode.sources.dialect import EMPTY, Kind, find_dialect
+from livebode.sources.locate import locate
+from livebode.sources.recording import Chunk, Column, Recording, Skipped
+from livebode.sources.tidy import Tidied
+from livebode.sources.units import split_units
+
+ARROW_BLOCK_BYTES = 1 << 22
+"""Arrow parses pieces of this size; no line can be longer."""
+
+
+class DelimitedRecording(Recording):
+    """A table in text. Its length is known from reading only."""
+
+    format: ClassVar[str] = "csv"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._dialect = find_dialect(path)
+        columns: list[Column] = []
+        skipped: list[Skipped] = []
+        headings = self._dialect.headings
+        for at, ((name, unit), kind) in enumerate(zip(split_units(headings), self._dialect.kinds, strict=True)):
+            unit = self._dialect.units[at] or unit
+            aliases = (headings[at],) if headings[at] != name else ()
+            if kind in (Kind.NUMBER, Kind.MOMENT):
+                is_moment = kind is Kind.MOMENT
+                columns.append(Column(name, "ns" if is_moment else unit, None, aliases, temporal=is_moment, key=at))
+            elif headings[at]:
+                skipped.append(Skipped(name, "it holds text"))
+        self.columns, self.skipped = tuple(columns), tuple(skipped)
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        del rows
+        dialect = self._dialect
+        wanted = list(dict.fromkeys(column.key for column in columns))
+        names = [str(at) for at in range(dialect.width)]
+        moment = pa.timestamp("ns", dialect.zone)
+        types = {names[at]: moment if dialect.kinds[at] is Kind.MOMENT else pa.float64() for at in wanted}
+        try:
+            with self._opened() as file, csv.open_csv(
+                file,
+                read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
+                parse_options=csv.ParseOptions(
+                    delimiter=dialect.delimiter or "\x1f",
+                    quote_char=False if dialect.spaced else '"',
+                    invalid_row_handler=skip_comment,
+                ),
+                convert_options=csv.ConvertOptions(
+                    column_types=types,
+                    include_columns=[names[at] for at in wanted],
+                    decimal_point=dialect.decimal,
+                    null_values=list(EMPTY),
+                    check_utf8=False,
+                ),
+            ) as reader:  # fmt: skip
+                for batch in reader:
+                    if batch.num_rows:
+                        yield [to_numpy(batch.column(wanted.index(column.key))) for column in columns]
+        except pa.ArrowInvalid as error:
+            raise locate(self.path, dialect, wanted, ARROW_BLOCK_BYTES) or InputError(
+                f"cannot read {self.path}: {str(error).splitlines()[0][:200]}; repair the file"
+            ) from error
+
+    @contextmanager
+    def _opened(self) -> Iterator[Any]:
+        """The file from its first row of numbers on, as bytes that Arrow understands."""
+        dialect = self._dialect
+        if dialect.spaced or dialect.encoding.startswith("utf-16"):
+            with self.path.open("rb") as raw:
+                raw.seek(dialect.offset)
+                yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)
+        else:
+            with pa.OSFile(str(self.path)) as file:
+                file.seek(dialect.offset)
+                yield file
+
+
+def skip_comment(row: csv.InvalidRow) -> str:
+    return "skip" if row.text.lstrip().startswith(("#", "%")) else "error"
+
+
+READER = DelimitedRecording

@@ -1,0 +1,118 @@
+"""Which format a file has, told by its content. A new format is one line in FORMATS."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from livebode.nouns import InputError
+from livebode.sources.recording import Recording, contained
+
+HEAD_BYTES = 1024
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: the endings it goes by, how its first bytes look, and the class that reads it.
+
+    The class is named by module so that h5py and the like are imported only for the files that need them.
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    matches: Callable[[bytes], bool]
+    module: str
+
+    def open(self, path: Path) -> Recording:
+        reader: type[Recording] = import_module(f"livebode.sources.{self.module}").READER
+        with contained(path, self.title):
+            return reader(path)
+
+
+def is_text(head: bytes) -> bool:
+    """True where bytes may be a table in text: a byte order mark, or no control bytes.
+
+    >>> is_text(b"t,u\\n0,1\\n"), is_text(b"\\x00\\x01\\x02")
+    (True, False)
+    """
+    if head.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return True
+    return bool(head) and not any(byte < 9 or 13 < byte < 27 for byte in head)
+
+
+def is_xml(head: bytes) -> bool:
+    return head.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
+
+
+ARROW_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
+
+FORMATS = (
+    Format("Parquet", (".parquet", ".pq"), lambda head: head.startswith(b"PAR1"), "parquet"),
+    Format("Arrow", (".arrow", ".feather", ".ipc"), lambda head: head.startswith(ARROW_MAGIC), "arrow"),
+    Format("MATLAB", (".mat",), lambda head: head.startswith(b"MATLAB 5.0 MAT-file"), "matlab"),
+    Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), "matlab73"),
+    Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(HDF5_MAGIC), "hdf5"),
+    Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
+    Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
+    Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
+)  # fmt: skip
+"""All formats; the first that matches reads the file."""
+
+
+def open_recording(path: Path) -> Recording:
+    """Open `path` with the format that its content has.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, empty, unreadable, or of none of the formats.
+    """
+    head = read_head(path)
+    for format_ in FORMATS:
+        if format_.matches(head):
+            return checked(format_.open(path))
+    suffix = path.suffix.lower()
+    named = [format_.title for format_ in FORMATS if suffix in format_.suffixes]
+    if named:
+        raise InputError(
+            f"{path} is not {named[0]}, whatever its ending says: it begins with {head[:8]!r}; is it whole?"
+        )
+    known = " ".join(dict.fromkeys(suffix for format_ in FORMATS for suffix in format_.suffixes))
+    raise InputError(f"{path} is of no known format (it begins with {head[:8]!r}); convert it to one of: {known}")
+
+
+def read_head(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise InputError(f"{path} is a directory; name the file in it")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is no regular file; write the recording to a file first")
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}; check the name") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot read {path}: {reason}; check its name and permissions") from None
+    if not head:
+        raise InputError(f"{path} is empty; is the recording whole?")
+    return head
+
+
+def checked(recording: Recording) -> Recording:
+    """The recording, if no two of its columns share a name."""
+    seen: dict[str, int] = {}
+    for at, column in enumerate(recording.columns, start=1):
+        if column.name in seen:
+            raise InputError(
+                f"channel name {column.name!r} stands more than once in {recording.path} (columns {seen[column.name]} "
+                f"and {at}); rename one of them"
+            )
+        seen[column.name] = at
+    return recording

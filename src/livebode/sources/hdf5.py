@@ -1,0 +1,122 @@
+"""HDF5: every numeric dataset by its path, streamed by slices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from livebode.nouns import InputError
+from livebode.sources.arrays import array_columns
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+
+UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"
+CHUNK_BYTES_MAX = 1 << 28
+PACKED_MAX = 100_000
+"""No compression makes a recording smaller by more than this; a dataset that claims so is rubbish."""
+
+
+class Hdf5Recording(Recording):
+    """An HDF5 file. Links into other files are not followed."""
+
+    format: ClassVar[str] = "hdf5"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        columns: list[Column] = []
+        skipped: list[Skipped] = []
+        scalars: dict[str, float] = {}
+        with import_h5py(path).File(path, "r") as file:
+            scalars.update(attribute_numbers(file))
+            for name, dataset in datasets(file):
+                add_dataset(name, dataset, columns, skipped, scalars)
+        self.columns, self.skipped, self.scalars = tuple(columns), tuple(skipped), scalars
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        with import_h5py(self.path).File(self.path, "r") as file:
+            yield from dataset_chunks([file[column.key.array] for column in columns], columns, rows)
+
+
+def import_h5py(path: Path) -> ModuleType:
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(f"{path} needs the HDF5 library; pip install livebode[hdf5]") from None
+    return h5py  # type: ignore[no-any-return]
+
+
+def datasets(file: Any) -> list[tuple[str, Any]]:
+    """Path and dataset of all that the file itself holds, each once."""
+    h5py = import_h5py(Path(file.filename))
+    found: list[tuple[str, Any]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            found.append((name, item))
+        if len(found) > COLUMNS_MAX:
+            raise InputError(f"the file has more than {COLUMNS_MAX} datasets; is it a recording?")
+
+    file.visititems(visit)
+    return found
+
+
+def add_dataset(
+    name: str, dataset: Any, columns: list[Column], skipped: list[Skipped], scalars: dict[str, float], tie_axis: int = 0
+) -> None:
+    """Add what `dataset` gives under `name`, which need not be its path in the file."""
+    if why := unreadable(dataset):
+        skipped.append(Skipped(name, why))
+        return
+    found, why_not = array_columns(name, dataset.shape, dataset.dtype, unit_of(dataset), tie_axis)
+    columns += [replace(column, key=replace(column.key, array=dataset.name)) for column in found]
+    skipped += [why_not] if why_not else []
+    for column in found:
+        if column.samples == 1:
+            scalars[column.name] = float(np.asarray(dataset[()]).ravel()[0])
+
+
+def dataset_chunks(sets: Sequence[Any], columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+    samples = columns[0].key.samples
+    for first in range(0, samples, rows):
+        last = min(first + rows, samples)
+        yield [np.asarray(one[column.key.at(first, last)]) for one, column in zip(sets, columns)]
+
+
+def unreadable(dataset: Any) -> str:
+    """Why a dataset is not to be read; empty where it may be."""
+    if dataset.shape is None:
+        return "it is empty"
+    if dataset.is_virtual or dataset.external:
+        return "its values are in other files"
+    size = math.prod(dataset.shape) * dataset.dtype.itemsize
+    stored = dataset.id.get_storage_size()
+    if size and dataset.dtype.kind in "fiub" and stored * PACKED_MAX < size:
+        return f"it declares {size} bytes but {stored} are in the file"
+    if dataset.chunks and math.prod(dataset.chunks) * dataset.dtype.itemsize > CHUNK_BYTES_MAX:
+        return f"its chunks {dataset.chunks} are larger than {CHUNK_BYTES_MAX} bytes"
+    return ""
+
+
+def unit_of(dataset: Any) -> str:
+    for key in UNIT_ATTRIBUTES:
+        if key in dataset.attrs:
+            value = dataset.attrs[key]
+            return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return ""
+
+
+def attribute_numbers(file: Any) -> dict[str, float]:
+    numbers = {}
+    for key, value in file.attrs.items():
+        array = np.asarray(value)
+        if array.size == 1 and array.dtype.kind in "fiu":
+            numbers[key] = float(array.ravel()[0])
+    return numbers
+
+
+READER = Hdf5Recording

@@ -1,0 +1,44 @@
+"""Find the line that a fast parser only says is wrong somewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from livebode.nouns import InputError
+from livebode.sources.dialect import EMPTY, Dialect, Kind, is_comment, is_moment, is_number
+
+
+def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> InputError | None:
+    """The error in the first line that is ragged, too long, or has text in one of `columns`; None where none is.
+
+    Lines count from 1 as in an editor.
+    """
+    number = 0
+    with path.open("r", encoding=dialect.encoding, errors="replace", newline=None) as file:
+        while line := file.readline(line_bytes_max + 1):
+            number += 1
+            if number < dialect.first_line or not line.strip() or is_comment(line):
+                continue
+            if len(line) > line_bytes_max:
+                return InputError(f"line {number} of {path} is longer than {line_bytes_max} bytes; is it a recording?")
+            if error := check_line(path, dialect, columns, number, line.rstrip("\n")):
+                return error
+    return None
+
+
+def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int, line: str) -> InputError | None:
+    cells = dialect.split(line)
+    if len(cells) != dialect.width:
+        return InputError(
+            f"line {number} of {path} has {len(cells)} cells, the others {dialect.width}; repair or delete this line"
+        )
+    for at in columns:
+        cell = cells[at].strip()
+        fits = is_moment(cell) if dialect.kinds[at] is Kind.MOMENT else is_number(cell, dialect.decimal)
+        if cell not in EMPTY and not fits:
+            name = dialect.headings[at]
+            return InputError(
+                f"line {number} of {path}, column {name!r}: {cell[:40]!r} is not a number; correct it or leave it empty"
+            )
+    return None

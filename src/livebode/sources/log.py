@@ -1,0 +1,277 @@
+"""Log: a recording file as a source of Blocks."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.sources.formats import open_recording
+from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, stacked
+from livebode.sources.timing import Clock, Timing, clock_from_time, find_time, rate_in_file
+
+BLOCK_SAMPLES_MAX = 1 << 24
+
+
+class Log:
+    """A recording: its channels, rate and timing, and its samples as Blocks. Made by `open_log`.
+
+    Nothing but the time column is read before `blocks` is iterated; every call of `blocks` reads from the start.
+    """
+
+    def __init__(self, recording: Recording, columns: Sequence[Column], chosen: Sequence[str], clock: Clock) -> None:
+        self._recording = recording
+        self._columns = tuple(columns)
+        self._chosen = tuple(chosen)
+        self._clock = clock
+        self.block_samples = 65536
+
+    @property
+    def path(self) -> Path:
+        return self._recording.path
+
+    @property
+    def format(self) -> str:
+        """Name of the format: csv, parquet, arrow, mat, hdf5, npz or sinumerik."""
+        return self._recording.format
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Everything that `blocks` can read, in the order of the file."""
+        return tuple(Channel(column.name, column.unit) for column in self._columns if not column.temporal)
+
+    @property
+    def aliases(self) -> Mapping[str, str]:
+        """Other names that `blocks` takes, each with the channel that it means."""
+        names = {column.name for column in self._columns}
+        count = Counter(alias for column in self._columns for alias in set(column.aliases))
+        return {
+            alias: column.name
+            for column in self._columns
+            for alias in column.aliases
+            if count[alias] == 1 and alias not in names
+        }
+
+    @property
+    def skipped(self) -> tuple[Skipped, ...]:
+        """What else is in the file, and why it is no channel."""
+        listed = {column.name for column in self._columns}
+        other = [
+            Skipped(column.name, f"it has {column.samples} samples, not {self.samples}")
+            for column in self._recording.columns
+            if column.name not in listed and column.name not in self.scalars
+        ]
+        return (*self._recording.skipped, *other)
+
+    @property
+    def scalars(self) -> Mapping[str, float]:
+        """Single numbers in the file by name, such as controller gains."""
+        return self._recording.scalars
+
+    @property
+    def rate_hz(self) -> float:
+        return self._clock.rate_hz
+
+    @property
+    def rate_origin(self) -> str:
+        """Where the rate is from: "given", "time column 't' in s", "'fs' in the file", "metadata"; and what agrees."""
+        return self._clock.rate_origin
+
+    @property
+    def timing(self) -> Timing | None:
+        """Jitter and gaps as the time column tells them; None without one."""
+        return self._clock.timing
+
+    @property
+    def samples(self) -> int | None:
+        """Samples in the file (missing ones not counted); None where only reading tells it."""
+        known = [column.samples for column in self._columns if column.samples is not None]
+        return known[0] if known else self._clock.samples
+
+    def blocks(self, channels: Sequence[str] | None = None, block_samples: int | None = None) -> Iterator[Block]:
+        """The samples of `channels` from the first to the last.
+
+        Parameters
+        ----------
+        channels
+            Names, paths or aliases; the Blocks name their channels as asked. Left out: those given to `open_log`, or
+            all but the time column.
+        block_samples
+            Largest length of a Block; they are shorter at gaps and where the file's own pieces end.
+
+        Yields
+        ------
+        Block
+            float64, shape (channels, ≤ block_samples). Empty cells are NaN; NaN and infinities stay what they are.
+
+        Raises
+        ------
+        InputError
+            At once for a missing channel; while iterating for damage further down in the file.
+        """
+        limit = checked_block_samples(self.block_samples if block_samples is None else block_samples)
+        names = list(self._chosen if channels is None else channels)
+        if isinstance(channels, str) or not names:
+            raise InputError(f"channels={channels!r} is not a list of at least one channel name")
+        if repeated := [name for name, count in Counter(names).items() if count > 1]:
+            raise InputError(f"channel {repeated[0]!r} is asked for more than once; name it once")
+        columns = [resolve(name, self._columns, self._recording.columns) for name in names]
+        labels = tuple(Channel(name, column.unit) for name, column in zip(names, columns))
+        return self._cut(self._read(columns, limit), labels, limit)
+
+    def _read(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        return guarded(self._recording.chunks(columns, rows), self._recording.path, self._recording.format)
+
+    def _cut(self, chunks: Iterator[Chunk], labels: tuple[Channel, ...], limit: int) -> Iterator[Block]:
+        clock = self._clock
+        cuts = np.union1d(clock.gap_rows, np.asarray(self._recording.breaks, dtype=np.int64))
+        missing = np.concatenate(([0], np.cumsum(clock.gap_missing)))
+        row = 0
+        for chunk in chunks:
+            length = len(chunk[0])
+            for first, last in pieces(row, row + length, cuts, limit):
+                yield Block(
+                    stacked([values[first - row : last - row] for values in chunk]),
+                    labels,
+                    clock.rate_hz,
+                    start=first + int(missing[np.searchsorted(clock.gap_rows, first, side="right")]),
+                    origin_s=clock.origin_s,
+                    gap=bool(holds(cuts, first)),
+                )
+            row += length
+        if row == 0:
+            raise InputError(f"{self.path} has no samples; is the recording whole?")
+
+
+def open_log(
+    path: str | os.PathLike[str],
+    *,
+    rate_hz: float | None = None,
+    time: str | None = None,
+    channels: Sequence[str] | None = None,
+    block_samples: int = 65536,
+) -> Log:
+    """Open a recording of any format that `docs/readers.md` lists.
+
+    Parameters
+    ----------
+    path
+        The file; its content, not its ending, decides about the format.
+    rate_hz
+        Samples per second, taken as exact. Left out, it comes from a time column or from the file's metadata.
+    time
+        Name of the time column, with its unit where the file does not say it: "clock [us]". Left out, it is found by
+        name; "none" ignores it.
+    channels
+        What to read; fixes which series belong together where the file has series of several lengths.
+    block_samples
+        Largest length of a Block.
+
+    Raises
+    ------
+    InputError
+        For anything that cannot be used, in one sentence with its remedy.
+    """
+    if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+    checked_block_samples(block_samples)
+    recording = open_recording(Path(path))
+    columns = together(recording, channels)
+    time_column, unit = find_time(columns, time)
+    clock = find_clock(recording, time_column, unit, rate_hz)
+    chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
+    log = Log(recording, columns, chosen, clock)
+    log.block_samples = block_samples
+    return log
+
+
+def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: float | None) -> Clock:
+    """Rate and gaps: from the time column, from the format or a number in the file, or as given."""
+    stated = rate_in_file(recording.scalars)
+    if recording.rate_hz is not None:
+        stated = recording.rate_hz, "metadata"
+    if column is not None:
+        chunks = guarded(recording.chunks([column], 1 << 18), recording.path, recording.format)
+        return clock_from_time(column, unit, chunks, rate_hz, stated)
+    if rate_hz is not None:
+        if recording.rate_hz is not None and abs(recording.rate_hz / rate_hz - 1) > 1e-3:
+            raise InputError(
+                f"{recording.path} states {recording.rate_hz:.8g} Hz, but the given rate is {rate_hz:.8g} Hz; "
+                "correct it, or leave it out"
+            )
+        return Clock(rate_hz, "given")
+    if stated is None:
+        raise InputError(f"{recording.path} has neither a time column nor a rate; give --rate, or name the time column")
+    return Clock(*stated)
+
+
+def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
+    """The columns of the length that counts: that of `channels`, or the one that holds most of the file's values."""
+    everything = recording.columns
+    if channels:
+        asked = [resolve(name, everything, everything) for name in channels]
+        if len({column.samples for column in asked}) > 1:
+            lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(channels, asked))
+            raise InputError(f"the channels have different numbers of samples ({lengths}); name channels of one length")
+        length = asked[0].samples
+    else:
+        values: Counter[int | None] = Counter()
+        for column in everything:
+            values[column.samples] += 1 if column.samples is None else column.samples
+        length = max(values, key=lambda samples: values[samples], default=0)
+    if length is not None and length < 2:
+        raise InputError(f"{recording.path} holds no channel of at least 2 samples{reasons(recording)}")
+    return [column for column in everything if column.samples == length]
+
+
+def reasons(recording: Recording) -> str:
+    """What was skipped, for the error that nothing is left."""
+    listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
+    return f" ({'; '.join(listed)})" if listed else "; is the recording whole?"
+
+
+def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column:
+    """The column that `name` means: exactly, else by alias, else as a path that leaves out a lone (1)."""
+    found = [column for column in columns if column.name == name and not column.temporal]
+    found = found or [column for column in columns if name in column.aliases and not column.temporal]
+    plain = name.replace("(1).", ".")
+    found = found or [column for column in columns if column.name.replace("(1).", ".") == plain and not column.temporal]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        paths = ", ".join(column.name for column in found[:5])
+        raise InputError(f"channel {name!r} means more than one: {paths}; name the one by its path")
+    for column in everything:
+        if column.name == name and not column.temporal:
+            raise InputError(
+                f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}; open it on its own"
+            )
+    raise InputError(missing_channel(name, [column.name for column in columns if not column.temporal]))
+
+
+def pieces(first: int, last: int, cuts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
+    """Rows `first` … `last` − 1 as ranges that no cut divides and none longer than `limit`.
+
+    >>> list(pieces(0, 10, np.array([4]), 5))
+    [(0, 4), (4, 9), (9, 10)]
+    """
+    inside = cuts[(cuts > first) & (cuts < last)].tolist()
+    for begin, end in zip([first, *inside], [*inside, last]):
+        for start in range(begin, end, limit):
+            yield start, min(start + limit, end)
+
+
+def holds(cuts: NDArray[np.int64], row: int) -> bool:
+    at = int(np.searchsorted(cuts, row))
+    return at < len(cuts) and int(cuts[at]) == row
+
+
+def checked_block_samples(block_samples: int) -> int:
+    if not (isinstance(block_samples, int) and 1 <= block_samples <= BLOCK_SAMPLES_MAX):
+        raise InputError(f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}")
+    return block_samples

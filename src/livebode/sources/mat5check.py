@@ -1,0 +1,234 @@
+"""List and check a MATLAB v5 file before SciPy reads it: whole elements, and no sizes that its bytes cannot hold.
+
+SciPy trusts the sizes that a file declares; a damaged one can make it ask for terabytes or read past the end. Each
+element is a tag (type, bytes) and its bytes; matrices nest. Compressed elements are unpacked piece by piece.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from livebode.nouns import InputError
+
+HEADER_BYTES = 128
+COMPRESSED, MATRIX = 15, 14
+CLASSES = {
+    1: "cell", 2: "struct", 3: "object", 4: "char", 5: "sparse", 6: "double", 7: "single", 8: "int8", 9: "uint8",
+    10: "int16", 11: "uint16", 12: "int32", 13: "uint32", 14: "int64", 15: "uint64", 16: "function", 17: "opaque",
+}  # fmt: skip
+CELL, STRUCT, OBJECT, FUNCTION, OPAQUE = 1, 2, 3, 16, 17
+COMPLEX = 0x0800
+DEPTH_MAX = 32
+ELEMENTS_MAX = 1_000_000
+UNPACKED_MAX = 1 << 34
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Head of a variable: MATLAB's name for its class, its dimensions, and whether it has an imaginary part."""
+
+    name: str
+    kind: str
+    shape: tuple[int, ...] = ()
+    is_complex: bool = False
+
+
+def list_variables(path: Path) -> list[Variable]:
+    """All variables of the file, in its order, after a walk through all that they hold.
+
+    Raises
+    ------
+    InputError
+        Where an element ends after its container, or declares more values than it has bytes.
+    """
+    size = path.stat().st_size
+    found: list[Variable] = []
+    with path.open("rb") as file:
+        header = file.read(HEADER_BYTES)
+        if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
+            raise InputError(f"the header of {path} is damaged; is it a MATLAB file, and whole?")
+        order = "<" if header[126:128] == b"IM" else ">"
+        at = HEADER_BYTES
+        while at < size:
+            variable, at = check_top(path, file, at, size, order)
+            found.append(variable)
+    return [variable for variable in found if variable.name]  # MATLAB keeps its own workspace without a name
+
+
+def check_top(path: Path, file: BinaryIO, at: int, size: int, order: str) -> tuple[Variable, int]:
+    """Check the element at byte `at` of the file; its head, and the byte after it."""
+    file.seek(at)
+    tag = file.read(8)
+    if len(tag) < 8:
+        raise InputError(f"{path} ends in the middle of a tag at byte {at}; is the file whole?")
+    kind, length = struct.unpack(order + "II", tag)
+    if at + 8 + length > size:
+        raise InputError(f"{path} ends at byte {size}, but the element at byte {at} has {length}; is the file whole?")
+    source: Plain | Unpacked = Plain(file)
+    inner = length
+    if kind == COMPRESSED:
+        source = Unpacked(file, length)
+        kind, inner = Walk(source, order).tag(UNPACKED_MAX)
+    if kind != MATRIX:
+        raise InputError(f"{path} has an element of type {kind} at byte {at}, which is no variable; is it damaged?")
+    variable = Walk(source, order).matrix(inner, 0)
+    source.rest()
+    return variable, at + 8 + length
+
+
+class Plain:
+    """Bytes of the file itself."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def read(self, count: int) -> bytes:
+        return self._file.read(count)
+
+    def skip(self, count: int) -> None:
+        self._file.seek(count, 1)
+
+    def rest(self) -> None:
+        """Nothing follows that a checksum guards."""
+
+
+class Unpacked:
+    """Bytes of a compressed element, unpacked in pieces of at most a mebibyte."""
+
+    PIECE = 1 << 20
+
+    def __init__(self, file: BinaryIO, length: int) -> None:
+        self._file, self._left = file, length
+        self._zlib = zlib.decompressobj()
+        self._ready = b""
+
+    def read(self, count: int) -> bytes:
+        while len(self._ready) < count and self._more():
+            pass
+        out, self._ready = self._ready[:count], self._ready[count:]
+        return out
+
+    def skip(self, count: int) -> None:
+        while count > 0:
+            got = len(self.read(min(count, self.PIECE)))
+            if got == 0:
+                raise InputError(f"a compressed variable ends {count} bytes early; is the file whole?")
+            count -= got
+
+    def rest(self) -> None:
+        """Unpack to the end, where zlib holds the checksum against the bytes."""
+        while self._more():
+            self._ready = b""
+        if not self._zlib.eof:
+            raise InputError("a compressed variable has no end; is the file whole?")
+
+    def _more(self) -> bool:
+        if self._zlib.eof:
+            return False
+        packed = self._zlib.unconsumed_tail
+        if not packed and self._left > 0:
+            packed = self._file.read(min(self._left, 1 << 16))
+            self._left -= len(packed)
+        piece = self._zlib.decompress(packed, self.PIECE) if packed else b""
+        self._ready += piece
+        return bool(piece) or bool(self._zlib.unconsumed_tail) or self._left > 0
+
+
+@dataclass
+class Walk:
+    """A walk through the matrices of one variable."""
+
+    source: Plain | Unpacked
+    order: str
+    elements: int = 0
+
+    def tag(self, room: int) -> tuple[int, int]:
+        """Type and length of the next element, which must fit in `room` bytes; its bytes come next."""
+        raw = self.source.read(8)
+        if len(raw) < 8 or room < 8:
+            raise InputError("a variable ends in the middle of a tag; is the file whole?")
+        kind, length = struct.unpack(self.order + "II", raw)
+        if length > room - 8:
+            raise InputError(f"a variable declares {length} bytes where {room - 8} are left; is the file whole?")
+        return kind, length
+
+    def element(self, room: int, keep: int) -> tuple[bytes, int, int]:
+        """Read one element: its first `keep` bytes, its length, and the room that is left after it.
+
+        Up to four bytes may stand inside the tag itself; a type above 65535 tells it.
+        """
+        raw = self.source.read(8)
+        if len(raw) < 8 or room < 8:
+            raise InputError("a variable ends in the middle of a tag; is the file whole?")
+        first, second = struct.unpack(self.order + "II", raw)
+        if first >> 16:
+            return raw[4 : 4 + min(4, first >> 16)], first >> 16, room - 8
+        padded = second + -second % 8
+        if second > room - 8:
+            raise InputError(f"a variable declares {second} bytes where {room - 8} are left; is the file whole?")
+        data = self.source.read(min(second, keep))
+        self.source.skip(min(padded, room - 8) - len(data))
+        return data, second, max(0, room - 8 - padded)
+
+    def matrix(self, room: int, depth: int) -> Variable:
+        """Check a matrix of `room` bytes, and those inside it; its head."""
+        self.elements += 1
+        if depth > DEPTH_MAX or self.elements > ELEMENTS_MAX:
+            raise InputError(f"the file nests deeper than {DEPTH_MAX} or has more than {ELEMENTS_MAX} elements")
+        if room == 0:
+            return Variable("", "double", (0, 0))
+        raw, _, room = self.element(room, 8)
+        if len(raw) < 8:
+            raise InputError("a variable has no flags; is the file damaged?")
+        flags = struct.unpack(self.order + "I", raw[:4])[0]
+        kind = flags & 0xFF
+        if kind not in CLASSES:
+            raise InputError(f"a variable is of class {kind}, which MATLAB does not have; is the file damaged?")
+        if kind in (OPAQUE, FUNCTION):
+            raw, _, room = self.element(room, 64)
+            self.source.skip(room)
+            return Variable(raw.decode("latin-1") if kind == OPAQUE else "", CLASSES[kind])
+        raw, _, room = self.element(room, 256)
+        shape = struct.unpack(f"{self.order}{len(raw) // 4}i", raw[: len(raw) // 4 * 4])
+        if len(shape) < 2 or any(length < 0 for length in shape):
+            raise InputError(f"a variable declares the dimensions {shape}; is the file damaged?")
+        name, _, room = self.element(room, 64)
+        if kind in (CELL, STRUCT, OBJECT):
+            self._nested(kind, math.prod(shape), room, depth)
+        else:
+            self._values(math.prod(shape) if CLASSES[kind] != "sparse" else 0, room)
+        return Variable(name.decode("latin-1"), CLASSES[kind], shape, bool(flags & COMPLEX))
+
+    def _values(self, count: int, room: int) -> None:
+        """Real and imaginary part of a matrix of `count` values, a byte each at least."""
+        if count > room:
+            raise InputError(f"a variable declares {count} values where {room} bytes are left; is the file whole?")
+        while room >= 8:
+            _, _, room = self.element(room, 0)
+        self.source.skip(room)
+
+    def _nested(self, kind: int, count: int, room: int, depth: int) -> None:
+        if kind == OBJECT:
+            _, _, room = self.element(room, 64)  # the class name
+        fields = 1
+        if kind != CELL:
+            raw, _, room = self.element(room, 4)
+            width = struct.unpack(self.order + "i", raw)[0] if len(raw) == 4 else 0
+            if width <= 0:
+                raise InputError(f"a struct declares field names of {width} bytes; is the file damaged?")
+            _, length, room = self.element(room, 0)
+            fields = length // width
+        if count * fields * 8 > room:
+            raise InputError(f"a struct or cell declares {count} × {fields} parts where {room} bytes are left")
+        for _ in range(count * fields):
+            inner, length = self.tag(room)
+            if inner != MATRIX:
+                raise InputError(f"a struct or cell holds an element of type {inner}; is the file damaged?")
+            self.matrix(length, depth + 1)
+            room -= 8 + length
+        self.source.skip(max(0, room))

@@ -1,0 +1,129 @@
+"""Recording: what every format gives. Column: one series of values in it. And the net that catches odd failures."""
+
+from __future__ import annotations
+
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+
+Chunk = list[NDArray[Any]]
+"""One array for each column asked for, all of one length, numbers of any type; int64 nanoseconds for temporal ones."""
+
+COLUMNS_MAX = 20_000
+"""More columns than this are taken for rubbish."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A series of numbers in a file.
+
+    Parameters
+    ----------
+    name
+        What the user writes to have it, a path where the format nests.
+    unit
+        Empty where the file does not say it.
+    samples
+        Number of values; None where only reading tells it.
+    aliases
+        Other names that mean this column.
+    temporal
+        True for dates and durations: good as time only, read as int64 nanoseconds.
+    key
+        Where the values are, for the format's own use.
+    """
+
+    name: str
+    unit: str = ""
+    samples: int | None = None
+    aliases: tuple[str, ...] = ()
+    temporal: bool = False
+    key: Any = field(default=None, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """Something in the file that is no channel, and why."""
+
+    name: str
+    reason: str
+
+
+class Recording(ABC):
+    """A file opened by its format: the columns in it and a way to stream them.
+
+    A subclass sets `columns` in `__init__` from the head of the file, and opens the file anew in each `chunks`.
+    """
+
+    format: ClassVar[str]
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.columns: tuple[Column, ...] = ()
+        self.skipped: tuple[Skipped, ...] = ()
+        self.scalars: Mapping[str, float] = {}
+        """Single numbers of the file by name, such as fs."""
+        self.rate_hz: float | None = None
+        """Rate where the format itself defines it."""
+        self.breaks: tuple[int, ...] = ()
+        """Rows at which a new record begins though no sample is counted as missing."""
+
+    @abstractmethod
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        """The values of `columns` (one common length) from the first to the last, about `rows` at a time."""
+
+
+@contextmanager
+def contained(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever a library raises on a damaged file into an InputError of one sentence.
+
+    >>> with contained(Path("a.mat"), "MATLAB"):
+    ...     raise KeyError("mdtype 77")
+    Traceback (most recent call last):
+        ...
+    livebode.nouns.errors.InputError: cannot read a.mat as MATLAB: mdtype 77; is the file whole and of this kind?
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the libraries warn before they fail; the failure is what counts
+            yield
+    except InputError:
+        raise
+    except PermissionError:
+        raise InputError(f"no permission to read {path}; ask for read access to it") from None
+    except MemoryError:
+        raise InputError(f"{path} declares more data than fits in memory; is the file damaged?") from None
+    except Exception as error:
+        lines = str(error.args[0] if isinstance(error, KeyError) and error.args else error).strip().splitlines()
+        reason = (lines[0] if lines else type(error).__name__)[:200].rstrip(" .")
+        raise InputError(f"cannot read {path} as {kind}: {reason}; is the file whole and of this kind?") from error
+
+
+def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:
+    """`chunks`, with whatever reading raises turned into InputError."""
+    while True:
+        chunk: Chunk | None = None
+        with contained(path, kind):
+            chunk = next(chunks, None)
+        if chunk is None:
+            return
+        yield chunk
+
+
+def stacked(chunk: Chunk) -> NDArray[np.float64]:
+    """The arrays of a chunk as rows of float64, shape (channels, samples); one float64 array is not copied."""
+    if len(chunk) == 1:
+        return np.asarray(chunk[0], dtype=np.float64)[np.newaxis]
+    data = np.empty((len(chunk), len(chunk[0])))
+    for row, values in zip(data, chunk, strict=True):
+        row[:] = values
+    return data

@@ -1,0 +1,162 @@
+"""Sinumerik 840D: the XML in which the control stores a measured frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import ClassVar
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+from livebode.sources.base85 import decode
+from livebode.sources.recording import Chunk, Column, Recording, contained
+from livebode.sources.rounding import exact_rate_hz
+from livebode.sources.safexml import parse
+
+
+@dataclass(frozen=True)
+class SinumerikSpectra:
+    """Spectra that the control averaged over the records, at bins 0, 1, … of a record.
+
+    Parameters
+    ----------
+    frequency_hz
+        The control's own axis, shape (bins,); it is off by the bins that it believes a record to have.
+    input_auto, output_auto
+        Shape (bins,), real in content.
+    cross
+        Between output and input, shape (bins,); output over input is conj(cross) / input_auto.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    input_auto: NDArray[np.complex128]
+    output_auto: NDArray[np.complex128]
+    cross: NDArray[np.complex128]
+
+
+class SinumerikRecording(Recording):
+    """The time records of a measurement, one after the other: channels "input" and "output", a break before each.
+
+    A record is taken in one direction of motion; nothing says how long the control waited between two.
+    """
+
+    format: ClassVar[str] = "sinumerik"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        root = parse(path)
+        nodes = measured_nodes(root)
+        lengths = {tuple(len(record) for record in records(node)) for node in nodes.values()}
+        if len(lengths) != 1:
+            raise InputError(f"the signals in {path} have records of different lengths {sorted(lengths)}; is it whole?")
+        self._values = {name: np.concatenate(list(records(node))) for name, node in nodes.items()}
+        starts = np.cumsum(lengths.pop())
+        self.breaks = tuple(int(start) for start in starts[:-1])
+        self.rate_hz = exact_rate_hz(update_time_s(root), 0.0)
+        self.columns = tuple(
+            Column(name, samples=int(starts[-1]), aliases=(f"node_{number(node, 'm_uNodeId'):.0f}",), key=name)
+            for name, node in nodes.items()
+        )
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        for first in range(0, columns[0].samples or 0, rows):
+            yield [self._values[column.key][first : first + rows] for column in columns]
+
+
+def sinumerik_spectra(path: str | PathLike[str]) -> SinumerikSpectra:
+    """The auto- and cross-spectra that the control computed and stored beside the time records.
+
+    Raises
+    ------
+    InputError
+        Where the file is no Sinumerik measurement or was stored without spectra.
+    """
+    path = Path(path)
+    with contained(path, "Sinumerik XML"):
+        nodes = measured_nodes(parse(path))
+        input_id = number(nodes["input"], "m_uNodeId")
+        cross = [
+            info
+            for info in nodes["output"].iter("SigNodeCrossSpectrumInfo")
+            if info.get("name") == "m_crossSpecInfoList_el" and number(info, "m_uSignodeId") == input_id
+        ]
+        if not cross:
+            raise InputError(f"{path} holds no cross-spectrum of output and input; let the control store spectra")
+        return SinumerikSpectra(
+            numeric_array(child(cross[0], "m_FrequencyVector", deep=True), 1),
+            spectrum(child(nodes["input"], "m_autospectrumInfo")),
+            spectrum(child(nodes["output"], "m_autospectrumInfo")),
+            spectrum(cross[0]),
+        )
+
+
+def measured_nodes(root: Element) -> dict[str, Element]:
+    """The signals "input" and "output" of the measurement, then any other as node_<number>."""
+    nodes = [node for node in root.iter("PlatformSignalNode") if next(node.iter("TimeSeries"), None) is not None]
+    if len(nodes) < 2:
+        raise InputError(
+            f"the XML ({root.tag}) holds time records of {len(nodes)} signals, not of an input and an output; "
+            "let the control store the time series"
+        )
+    roles = child(root, "m_listPrimaryFreqRespSigNodeData")
+    wanted = {
+        number(roles, "m_iInputSigNodeUniqueInstanceID", deep=True): "input",
+        number(roles, "m_iOutputSigNodeUniqueInstanceID", deep=True): "output",
+    }
+    named = {
+        wanted.get(number(node, "m_iUniqueInstanceId"), f"node_{number(node, 'm_uNodeId'):.0f}"): node for node in nodes
+    }
+    if not {"input", "output"} <= named.keys():
+        raise InputError(f"the XML names input and output {sorted(wanted)}, but holds only {sorted(named)}")
+    return {name: named[name] for name in sorted(named, key=lambda name: (name not in wanted.values(), name))}
+
+
+def records(node: Element) -> Iterator[NDArray[np.float64]]:
+    for series in node.iter("TimeSeries"):
+        yield numeric_array(child(series, "m_ValueVector"), 1)
+
+
+def spectrum(info: Element) -> NDArray[np.complex128]:
+    return numeric_array(child(info, "m_ValueVector", deep=True), 2).view(np.complex128)
+
+
+def numeric_array(element: Element, parts: int) -> NDArray[np.float64]:
+    """Values of a NumericArray, `parts` doubles for each of its declared elements."""
+    values = decode(child(element, "m_pNumberArray").text or "")
+    declared = number(element, "m_length")
+    if len(values) != parts * declared:
+        raise InputError(
+            f"an array declares {declared:.0f} values and holds {len(values) / parts:g}; is the file whole?"
+        )
+    return values
+
+
+def update_time_s(root: Element) -> float:
+    period_s = number(root, "m_dProcessUpdateTime")
+    if not 1e-9 < period_s < 1e3:
+        raise InputError(f"the sampling interval m_dProcessUpdateTime is {period_s} s; is the file damaged?")
+    return period_s
+
+
+def child(element: Element, name: str, *, deep: bool = False) -> Element:
+    """The part of `element` with this name; `deep` looks at all levels."""
+    for part in element.iter() if deep else element:
+        if part.get("name") == name:
+            return part
+    raise InputError(f"{element.get('name') or element.tag} has no {name}; is this a whole Sinumerik measurement?")
+
+
+def number(element: Element, name: str, *, deep: bool = False) -> float:
+    text = (child(element, name, deep=deep).text or "").strip()
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{name} is {text[:40]!r}, not a number; is the file damaged?") from None
+
+
+READER = SinumerikRecording

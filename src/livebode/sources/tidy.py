@@ -1,0 +1,50 @@
+"""A byte stream made plain for Arrow: UTF-16 becomes UTF-8, runs of blanks become one tab."""
+
+from __future__ import annotations
+
+import codecs
+import io
+import re
+from typing import BinaryIO
+
+PIECE = 1 << 20
+MARGINS = re.compile(r"(?m)^[ \t]+|[ \t]+(?=\r?$)")
+BLANKS = re.compile(r"[ \t]+")
+
+
+class Tidied(io.RawIOBase):
+    """The text of `raw` from where it stands, tidied line by line; `spaced` where blanks part the columns.
+
+    >>> Tidied(io.BytesIO(b"  1   2 \\n 3 4"), "utf-8", True).read(100)
+    b'1\\t2\\n3\\t4'
+    """
+
+    def __init__(self, raw: BinaryIO, encoding: str, spaced: bool) -> None:
+        self._raw, self._spaced = raw, spaced
+        self._decoder = codecs.getincrementaldecoder(encoding)("replace")
+        self._kept = ""
+        self._ready = b""
+        self._done = False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
+        while not self._ready and not self._done:
+            self._fill()
+        count = min(len(buffer), len(self._ready))
+        buffer[:count] = self._ready[:count]
+        self._ready = self._ready[count:]
+        return count
+
+    def _fill(self) -> None:
+        raw = self._raw.read(PIECE)
+        self._done = not raw
+        text = self._kept + self._decoder.decode(raw, final=self._done)
+        end = len(text) if self._done else text.rfind("\n") + 1
+        if end == 0 and len(text) > 4 * PIECE:  # no line is as long; let Arrow say so
+            end = len(text)
+        text, self._kept = text[:end], text[end:]
+        if self._spaced:
+            text = BLANKS.sub("\t", MARGINS.sub("", text))
+        self._ready = text.encode("utf-8")

@@ -1,0 +1,228 @@
+"""When the samples were taken: the time column, its unit, the exact rate, jitter and gaps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError, missing_channel
+from livebode.sources.recording import Chunk, Column
+from livebode.sources.rounding import exact_rate_hz
+from livebode.sources.steps import Gap, Steps
+from livebode.sources.units import SECONDS, split_unit, time_unit
+
+RATE_TOLERANCE = 1e-3
+"""Relative difference from which a time column contradicts a given rate."""
+JITTER_MAX = 0.1
+"""Largest standard deviation of the step in periods: 0.07 periods of a sample cost 0.1 % at a tenth of the rate,
+2.4 % at the Nyquist frequency, and leave noise 27 dB below a line at a tenth of the rate."""
+GAPS_SHARE_MAX = 0.05
+GAPS_LISTED = 1000
+RATE_NAMES = "fs", "f_s", "fs_hz", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz"
+PERIOD_NAMES = "ts", "t_s", "dt", "dt_s", "sample_time", "sampletime", "sampling_time", "sample_period", "period_s"
+TIME_NAMES = "t", "time", "zeit", "timestamp", "time_stamp", "zeitstempel", "seconds", "sekunden"
+DSPACE_TIME = re.compile(r"(?:^|[./])X(?:\(\d+\))?[./]Data$")
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What the time column says.
+
+    Parameters
+    ----------
+    column, unit
+        Its name and the unit that it was read in.
+    period_s_mean, period_s_std, period_s_min, period_s_max
+        The regular steps, that is without gaps, in seconds.
+    gaps, missing
+        Number of gaps, and of samples missing in all of them.
+    first_gaps
+        The first thousand gaps.
+    """
+
+    column: str
+    unit: str
+    period_s_mean: float
+    period_s_std: float
+    period_s_min: float
+    period_s_max: float
+    gaps: int
+    missing: int
+    first_gaps: tuple[Gap, ...]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Rate, origin and gaps of a recording, from its time column or without one."""
+
+    rate_hz: float
+    rate_origin: str
+    samples: int | None = None
+    origin_s: float = 0.0
+    timing: Timing | None = None
+    gap_rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    gap_missing: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+
+def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | None, str]:
+    """The time column among `columns` and the unit that the user gave for it.
+
+    `time` None looks for one by name, "none" wants none, anything else names one, "name [unit]" with its unit.
+
+    >>> find_time([Column("u"), Column("Zeit", "ms")], None)[0].name
+    'Zeit'
+    >>> find_time([Column("u"), Column("clock")], "clock [us]")[1]
+    'us'
+    """
+    if time is None:
+        ranked = sorted((rank, at) for at, column in enumerate(columns) if (rank := time_rank(column)) is not None)
+        return (columns[ranked[0][1]] if ranked else None), ""
+    if time.casefold() == "none":
+        return None, ""
+    bare, unit = split_unit(time)
+    for wanted, given in ((time, ""), (bare, unit)):
+        for column in columns:
+            if wanted == column.name or wanted in column.aliases:
+                return column, given
+    raise InputError(f"time column: {missing_channel(bare, [column.name for column in columns])}")
+
+
+def time_rank(column: Column) -> int | None:
+    """How much the name of a column sounds like time, 0 best; None where it does not."""
+    if column.temporal:
+        return len(TIME_NAMES) + 1
+    if DSPACE_TIME.search(column.name):
+        return len(TIME_NAMES)
+    unit = time_unit(column.name, column.unit)
+    if unit and unit.casefold() not in SECONDS:
+        return None
+    last = re.split(r"[./]", column.name)[-1].casefold()
+    head, _, tail = last.rpartition("_")
+    name = head if tail in SECONDS and head else last
+    return TIME_NAMES.index(name) if name in TIME_NAMES else None
+
+
+def rate_in_file(scalars: Mapping[str, float]) -> tuple[float, str] | None:
+    """Rate in Hz that a single number of the file states, and the sentence where from.
+
+    >>> rate_in_file({"kp": 3.0, "Fs": 2500.0})
+    (2500.0, "'Fs' in the file")
+    """
+    for name, value in sorted(scalars.items(), key=lambda item: len(re.split(r"[./]", item[0]))):
+        bare = re.split(r"[./]", split_unit(name)[0])[-1].casefold()
+        if not (np.isfinite(value) and value > 0):
+            continue
+        if bare in RATE_NAMES:
+            return value, f"{name!r} in the file"
+        if bare in PERIOD_NAMES:
+            return exact_rate_hz(value, 0.0), f"{name!r} in the file"
+    return None
+
+
+def clock_from_time(
+    column: Column, unit: str, chunks: Iterator[Chunk], rate_hz: float | None, stated: tuple[float, str] | None
+) -> Clock:
+    """The clock that a time column gives, in one pass over it.
+
+    Parameters
+    ----------
+    column, unit
+        The column, and the unit that the user gave for it (else empty).
+    chunks
+        The column's values.
+    rate_hz
+        Rate that the user gave; it is taken as exact, and refused where the column contradicts it.
+    stated
+        Rate that the file states elsewhere; it helps only where the unit of time cannot be told.
+    """
+    steps = Steps(column.name)
+    for (time,) in chunks:
+        steps.add(time)
+    if not steps.regular:
+        if rate_hz is None:
+            raise InputError(f"time column {column.name!r} has {steps.rows} samples, too few to tell the rate; give it")
+        return Clock(rate_hz, "given", steps.rows)
+    told = (rate_hz, "the given rate") if rate_hz is not None else stated
+    unit, scale, guessed = resolve_unit(column, unit, steps.mean, told)
+    refuse_jitter(column.name, steps)
+    measured_hz = exact_rate_hz(steps.mean * scale, uncertainty(steps))
+    if not 1e-9 < measured_hz < 1e12:
+        raise InputError(f"time column {column.name!r} gives a rate of {measured_hz:.6g} Hz; is it time?")
+    if rate_hz is not None and abs(measured_hz / rate_hz - 1.0) > RATE_TOLERANCE:
+        raise InputError(
+            f"time column {column.name!r} says {measured_hz:.8g} Hz, but the given rate is {rate_hz:.8g} Hz; "
+            "correct the rate, or ignore the column (time none)"
+        )
+    origin = f"time column {column.name!r} in {unit}{guessed}"
+    return Clock(
+        rate_hz if rate_hz is not None else measured_hz,
+        f"given; {origin} agrees" if rate_hz is not None else origin,
+        steps.rows,
+        float(steps.first) * scale,
+        summary(column.name, unit, scale, steps),
+        np.array(steps.gap_rows, dtype=np.int64),
+        np.array(steps.gap_missing, dtype=np.int64),
+    )
+
+
+def resolve_unit(column: Column, given: str, mean: float, told: tuple[float, str] | None) -> tuple[str, float, str]:
+    """Unit of a time column, its length in seconds, and how it was guessed (empty where it was said).
+
+    A column without unit is in seconds, unless a rate that is told from elsewhere differs from that by a power of
+    1000. Seconds that give 1 Hz or less are not believed without such a rate.
+    """
+    unit = given or time_unit(column.name, column.unit)
+    if unit:
+        if unit.casefold() not in SECONDS:
+            raise InputError(
+                f"time column {column.name!r} is in {unit!r}, which is no unit of time; use s, ms, us or ns"
+            )
+        return unit, SECONDS[unit.casefold()], ""
+    if told is None:
+        if mean < 1.0:
+            return "s", 1.0, ""
+        raise InputError(
+            f"time column {column.name!r} has no unit and steps of {mean:.6g}, in seconds {1 / mean:.4g} Hz; "
+            f"give the rate, or its unit (time '{column.name} [us]')"
+        )
+    rate_hz, where = told
+    for unit in ("s", "ms", "us", "ns"):
+        if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= RATE_TOLERANCE:
+            return unit, SECONDS[unit], "" if unit == "s" else f" (unit told by {where})"
+    raise InputError(
+        f"time column {column.name!r} has no unit and steps of {mean:.8g}, in seconds {1 / mean:.8g} Hz, "
+        f"but {where} is {rate_hz:.8g} Hz; correct the rate, or ignore the column (time none)"
+    )
+
+
+def refuse_jitter(name: str, steps: Steps) -> None:
+    gaps = len(steps.gap_rows)
+    if gaps > 3 and gaps > GAPS_SHARE_MAX * steps.regular:
+        raise InputError(
+            f"time column {name!r} has {gaps} gaps in {steps.rows} samples; resample the recording, or, where time has "
+            "too few digits, give the rate and ignore the column (time none)"
+        )
+    if steps.std > JITTER_MAX * steps.mean and not steps.printed:
+        raise InputError(
+            f"time column {name!r} jitters by {steps.std / steps.mean:.1%} of its period (standard deviation; at most "
+            f"{JITTER_MAX:.0%}), which biases every spectrum; resample the recording, or, where the samples are "
+            "regular and only their stamps are late, give the rate and ignore the column (time none)"
+        )
+
+
+def uncertainty(steps: Steps) -> float:
+    """Relative uncertainty of the mean period: the stamps' own error over the length, once for each stretch."""
+    stamps = max(3.0 * steps.std, steps.spread if steps.printed else 0.0, steps.largest * 2.0**-51)
+    return stamps * (len(steps.gap_rows) + 1) / (steps.regular * steps.mean)
+
+
+def summary(name: str, unit: str, scale: float, steps: Steps) -> Timing:
+    missing = np.array(steps.gap_missing, dtype=np.int64)
+    numbers = np.array(steps.gap_rows, dtype=np.int64) + np.cumsum(missing)
+    listed = tuple(Gap(int(n), int(m)) for n, m in zip(numbers[:GAPS_LISTED], missing[:GAPS_LISTED]))
+    low, high, mean = steps.low * scale, steps.high * scale, steps.mean * scale
+    return Timing(name, unit, mean, steps.std * scale, low, high, len(missing), int(missing.sum()), listed)
