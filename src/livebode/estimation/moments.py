@@ -43,6 +43,10 @@ class Moments:
         """These rows, as views."""
         return Moments(self.planes[:, rows], self.rows[:, rows])
 
+    def put(self, rows: slice, other: Moments) -> None:
+        """Write `other` over these rows."""
+        self.planes[:, rows], self.rows[:, rows] = other.planes, other.rows
+
     @property
     def mean(self) -> Complex:
         """Means of numerator, denominator and reference, shape (3, rows, lines)."""
@@ -66,7 +70,7 @@ class Moments:
     @property
     def first(self) -> NDArray[np.int64]:
         """Number of the oldest sample that went in, shape (rows,)."""
-        return self.rows[5].astype(np.int64)
+        return np.asarray(self.rows[5], dtype=np.int64)
 
     @property
     def unbiased(self) -> Floats:
@@ -114,9 +118,13 @@ class PeriodMoments:
         Lines in one row.
     forgetting
         λ per period, 0 < λ ≤ 1; 1 remembers every period equally.
+    own
+        Whether the moments that go with a window include it. A window that is judged by the scatter of the others
+        must not: as an outlier it would widen its own bound.
     """
 
-    def __init__(self, places: int, lines: int, forgetting: float) -> None:
+    def __init__(self, places: int, lines: int, forgetting: float, *, own: bool) -> None:
+        self._own = own
         self._forgetting = forgetting
         self._decay = forgetting ** np.array([[1.0], [2.0], [3.0]])
         self.now = Moments.zeros(places, lines)
@@ -128,7 +136,7 @@ class PeriodMoments:
         self.now.planes[...], self.now.rows[...] = state["planes"], state["rows"]
 
     def update(self, place: int, spectra: Complex, power: Floats, moment: Floats, usable: NDArray[np.bool_]) -> Moments:
-        """Take in windows at consecutive places from `place` on and return the Moments after each.
+        """Take in windows at consecutive places from `place` on and return the Moments that go with each.
 
         Parameters
         ----------
@@ -143,17 +151,20 @@ class PeriodMoments:
         rows, lines = spectra.shape[1:]
         new = np.empty((_MEANS, rows, lines))
         new[0:6:2], new[1:6:2], new[6:] = spectra.real, spectra.imag, power
-        after = Moments.zeros(rows, lines)
+        kept = Moments.zeros(rows, lines)
         done = 0
         while done < rows:
             n = min(rows - done, places - place)
-            now = self.now.at(slice(place, place + n))
+            now, new_rows = self.now.at(slice(place, place + n)), slice(done, done + n)
+            if not self._own:
+                kept.put(new_rows, now)
             for start, stop in _stretches(usable[done : done + n]):
                 at = slice(done + start, done + stop)
                 self._take(now.at(slice(start, stop)), new[:, at], moment[:, at])
-            after.planes[:, done : done + n], after.rows[:, done : done + n] = now.planes, now.rows
+            if self._own:
+                kept.put(new_rows, now)
             done, place = done + n, 0
-        return after
+        return kept
 
     def _take(self, now: Moments, new: Floats, moment: Floats) -> None:
         weights, means, scatter = now.rows[:3], now.planes[:_MEANS], now.planes[_MEANS:]

@@ -72,7 +72,7 @@ class Tracker:
             SpikeGate(self._named(settings.spikes), lines.window) if settings.spikes else None,
         )
         self._places = lines.window // settings.step
-        self._moments = PeriodMoments(self._places, len(lines), settings.forgetting)
+        self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)
         self._centre = Centre(lines.window)
         self._watch = Watch(lines.window)
         self._parts: dict[str, LineSpectra | PeriodMoments | Centre | Watch] = {

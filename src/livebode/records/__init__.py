@@ -1,5 +1,6 @@
 """What a run leaves on disk."""
 
+from livebode.records.plain_json import to_json
 from livebode.records.run_directory import RunDirectory
 
-__all__ = ["RunDirectory"]
+__all__ = ["RunDirectory", "to_json"]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
-import math
 import os
 import shutil
 import tempfile
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.nouns import Event, InputError, Responses
+from livebode.records.plain_json import to_json
 from livebode.records.response_table import ResponseTable
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
@@ -75,12 +74,12 @@ class RunDirectory:
     def write_event(self, event: Event) -> None:
         """Append an event."""
         with _disk_errors(self.path):
-            self._events.write(_json(asdict(event)) + "\n")
+            self._events.write(to_json(asdict(event)) + "\n")
 
     def write_summary(self, summary: dict[str, Any]) -> None:
         """Write run.json."""
         with _disk_errors(self.path):
-            (self.partial / "run.json").write_text(_json(summary, indent=2) + "\n", encoding="utf-8")
+            (self.partial / "run.json").write_text(to_json(summary, indent=2) + "\n", encoding="utf-8")
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():
@@ -106,21 +105,6 @@ class RunDirectory:
         finally:
             if old is not None:
                 shutil.rmtree(old, ignore_errors=True)
-
-
-def _json(value: Any, indent: int | None = None) -> str:
-    return json.dumps(_plain(value), ensure_ascii=False, indent=indent, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    """The value with what JSON cannot say (NaN, infinity) as null."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _disk_sentence(path: Path, error: OSError) -> InputError:

@@ -1,0 +1,196 @@
+"""Axis: the configuration of one machine as plain data, read from TOML and validated whole before anything starts."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
+
+Ticks = Annotated[int, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class SourceSection(_Section):
+    """[source]: the recording. Relative paths are from the file that names them."""
+
+    log: Annotated[Path, Field(strict=False)]
+    rate_hz: Positive | None = None
+    time: str | None = None
+
+
+class SignalsSection(_Section):
+    """[signals]: channel names."""
+
+    output: str
+    input: str | None = None
+    excitation: str | None = None
+    schedule: str | None = None
+
+
+class LinesSection(_Section):
+    """[lines]: frequencies as in `Lines.parse`, or "auto"; the window in samples, or "auto"."""
+
+    frequencies: str = "auto"
+    window: int | Literal["auto"] = "auto"
+
+
+class TrackingSection(_Section):
+    """[tracking]: the options of `livebode.estimation.Settings`."""
+
+    estimator: Literal["direct", "joint", "indirect"] = "joint"
+    quantity: Quantity = "plant"
+    hop: Annotated[int, Field(ge=1)] | None = None
+    average: bool = False
+    forgetting: Annotated[float, Field(gt=0, le=1)] = 0.8
+    noise: Literal["periods", "quiet"] = "periods"
+    differenced: list[str] = []
+    hann: bool = False
+    spikes: list[str] = []
+
+
+class _ControllerSection(_Section):
+    rate_hz: Positive
+    held_ticks: Annotated[int, Field(ge=1)] = 1
+    hold: Literal["zero-order", "none"] = "zero-order"
+    delay_ticks: Ticks = 0
+
+
+class PIDSection(_ControllerSection):
+    """[loop.velocity] and [loop.position]: see `livebode.nouns.PID`."""
+
+    gain: float
+    integral_time_s: Annotated[float, Field(gt=0)] = inf
+    derivative_time_s: Annotated[float, Field(ge=0)] = 0.0
+    derivative_filter_s: Annotated[float, Field(ge=0)] = 0.0
+    integrator: Literal["backward", "forward", "trapezoidal", "continuous"] = "backward"
+
+
+class PositionPDSection(_ControllerSection):
+    """[loop.position_pd]: see `livebode.nouns.PositionPD`."""
+
+    position_gain: float
+    velocity_gain: float
+    smoothed: bool = False
+
+
+class LoopSection(_Section):
+    """[loop]: what feeds back, where the excitation enters, and when signals were logged."""
+
+    excitation_at: Literal["plant input", "velocity reference", "output"] = "plant input"
+    entry_gain: float = 1.0
+    input_logged: Literal["before", "after"] = "after"
+    excitation_logged: Literal["before", "after"] = "after"
+    output_logged: Literal["before", "after"] = "before"
+    velocity: PIDSection | None = None
+    position: PIDSection | None = None
+    position_pd: PositionPDSection | None = None
+
+    def build(self) -> Loop:
+        """The Loop that this describes; InputError where the parts do not make one."""
+        return Loop(
+            feedback=self._feedback(),
+            entry=self._entry(),
+            input_logged=self.input_logged,
+            excitation_logged=self.excitation_logged,
+            output_logged=self.output_logged,
+        )
+
+    def _feedback(self) -> Model | None:
+        if self.position_pd is not None:
+            if self.velocity or self.position:
+                raise InputError(
+                    "loop.position_pd stands for the whole controller; leave out loop.velocity and .position"
+                )
+            return PositionPD(**self.position_pd.model_dump())
+        if self.velocity is None:
+            if self.position is not None:
+                raise InputError("loop.position needs loop.velocity inside it; describe the velocity controller too")
+            return None
+        velocity = PID(**self.velocity.model_dump())
+        return velocity if self.position is None else Cascade(velocity, PID(**self.position.model_dump()))
+
+    def _entry(self) -> Model | None:
+        if self.excitation_at == "plant input":
+            return None if self.entry_gain == 1.0 else Gain(self.entry_gain)
+        if self.excitation_at == "velocity reference":
+            if self.velocity is None:
+                raise InputError("excitation_at = 'velocity reference' needs loop.velocity; describe that controller")
+            return self.entry_gain * PID(**self.velocity.model_dump())
+        feedback = self._feedback()
+        if feedback is None:
+            raise InputError("excitation_at = 'output' needs the loop's controllers; describe loop.velocity")
+        return Gain(-self.entry_gain) * feedback
+
+
+class Axis(_Section):
+    """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
+
+    source: SourceSection
+    signals: SignalsSection
+    lines: LinesSection = LinesSection()
+    tracking: TrackingSection = TrackingSection()
+    loop: LoopSection = LoopSection()
+
+    @classmethod
+    def read(cls, path: Path) -> Axis:
+        """The Axis in a TOML file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, is not TOML, or has an unknown key or a value out of range; the message names
+            the key, the value and what is allowed.
+        """
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{str(path)!r} cannot be read: {error}") from None
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{str(path)!r} is not TOML: {error}") from None
+        axis = cls.of(data, str(path))
+        log = path.parent / axis.source.log
+        return axis.model_copy(update={"source": axis.source.model_copy(update={"log": log})})
+
+    @classmethod
+    def of(cls, data: dict[str, Any], origin: str) -> Axis:
+        """The Axis in plain data; `origin` names it in messages."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(f"{origin}: {_sentence(error)}") from None
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first thing that is wrong, with its place and value."""
+    first = error.errors()[0]
+    # Behind a choice of types pydantic puts the name of the type that it tried.
+    place = ".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part))
+    if first["type"] == "extra_forbidden":
+        return f"there is no setting {place!r}; {_nearest(first['loc'])}"
+    if first["type"] == "missing":
+        return f"{place!r} is missing; add it"
+    return f"{place} = {first['input']!r} is not usable: {first['msg'].lower()}"
+
+
+def _nearest(loc: tuple[int | str, ...]) -> str:
+    section: Any = Axis
+    for part in loc[:-1]:
+        annotation = section.model_fields[part].annotation
+        section = next(
+            c
+            for c in (annotation, *getattr(annotation, "__args__", ()))
+            if isinstance(c, type) and issubclass(c, BaseModel)
+        )
+    known = list(section.model_fields)
+    near = difflib.get_close_matches(str(loc[-1]), known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(known)}"

@@ -1,0 +1,108 @@
+"""What is in a recording, and what excitation one of its channels carries."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.excitation import Excitation, recognise
+from livebode.nouns import Block
+from livebode.session.plan import beginning
+from livebode.sources import Log, open_log
+
+
+@dataclass
+class ChannelSummary:
+    """One channel over the whole recording: extent of its finite samples, and how many are not finite."""
+
+    name: str
+    unit: str
+    minimum: float = float("inf")
+    maximum: float = float("-inf")
+    not_finite: int = 0
+
+    def take(self, block: Block) -> None:
+        samples = block[self.name]
+        finite = samples[np.isfinite(samples)]
+        self.not_finite += samples.size - finite.size
+        if finite.size:
+            self.minimum = min(self.minimum, float(finite.min()))
+            self.maximum = max(self.maximum, float(finite.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What `livebode inspect` says."""
+
+    log: Log
+    samples: int
+    channels: list[ChannelSummary]
+    gaps: int
+    missing: int
+    excitation: Excitation | None
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, for JSON."""
+        log, found = self.log, self.excitation
+        plain: dict[str, Any] = {
+            "log": str(log.path),
+            "format": log.format,
+            "rate_hz": log.rate_hz,
+            "rate_from": log.rate_origin,
+            "samples": self.samples,
+            "duration_s": self.samples / log.rate_hz,
+            "gaps": self.gaps,
+            "missing_samples": self.missing,
+            "timing": asdict(log.timing) if log.timing else None,
+            "channels": [asdict(channel) for channel in self.channels],
+            "skipped": [asdict(skipped) for skipped in log.skipped],
+        }
+        if found is not None:
+            plain["excitation"] = {
+                "period": found.period,
+                "periods": found.periods,
+                "start": found.start,
+                "crest_factor": found.crest_factor,
+                "rms": found.rms,
+                "peak": found.peak,
+                "frequency_hz": found.lines.frequency_hz.tolist(),
+                "amplitude": found.amplitude.tolist(),
+                "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
+                "transient_periods": list(found.transient),
+                "outlying_periods": list(found.outlying),
+            }
+        return plain
+
+
+def inspect(
+    path: Path,
+    *,
+    rate_hz: float | None = None,
+    time: str | None = None,
+    excitation: str | None = None,
+    output: str | None = None,
+) -> Inspection:
+    """Read a recording once and say what it holds; InputError where it cannot be read or nothing repeats in it."""
+    log = open_log(path, rate_hz=rate_hz, time=time)
+    wanted = [name for name in (excitation, output) if name is not None]
+    known = {channel.name for channel in log.channels}
+    # Named by a path or an alias, a channel is listed by that name.
+    extra = [name for name in dict.fromkeys(wanted) if name not in known]
+    names = [channel.name for channel in log.channels] + extra
+    summaries: dict[str, ChannelSummary] = {}
+    samples, gaps, missing, stop = 0, 0, 0, None
+    for block in log.blocks(names):
+        for channel in block.channels:
+            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit)).take(block)
+        samples += len(block)
+        if stop is not None and (block.gap or block.start != stop):
+            gaps, missing = gaps + 1, missing + block.start - stop
+        stop = block.stop
+    found = None
+    if excitation is not None:
+        w = beginning(log, excitation)
+        found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
+    return Inspection(log, samples, list(summaries.values()), gaps, missing, found)

@@ -1,0 +1,71 @@
+"""From an Axis and its recording to the settings of a tracker: what is "auto" is found here."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.estimation import Settings
+from livebode.excitation import recognise
+from livebode.nouns import InputError, Lines
+from livebode.session.axis import Axis
+from livebode.sources import Log
+
+_LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
+
+
+def make_settings(axis: Axis, log: Log) -> Settings:
+    """The tracker's settings for this recording; InputError where they do not fit it or each other."""
+    signals, tracking = axis.signals, axis.tracking
+    return Settings(
+        lines=_lines(axis, log),
+        output=signals.output,
+        input=signals.input,
+        excitation=signals.excitation,
+        schedule=signals.schedule,
+        estimator=tracking.estimator,
+        loop=axis.loop.build(),
+        quantity=tracking.quantity,
+        hop=tracking.hop,
+        average=tracking.average,
+        forgetting=tracking.forgetting,
+        noise=tracking.noise,
+        differenced=tuple(tracking.differenced),
+        hann=tracking.hann,
+        spikes=tuple(tracking.spikes),
+    )
+
+
+def _lines(axis: Axis, log: Log) -> Lines:
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if frequencies != "auto" and window != "auto":
+        return Lines.parse(frequencies, log.rate_hz, window)
+    reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
+    if reference is None:
+        raise InputError("lines or window are 'auto', but no excitation is named to find them from; name its channel")
+    found = recognise(beginning(log, reference), log.rate_hz)
+    if window == "auto":
+        window = found.period
+    if frequencies != "auto":
+        return Lines.parse(frequencies, log.rate_hz, window)
+    if window % found.period:
+        raise InputError(
+            f"the excitation repeats every {found.period} samples, which does not divide the {window=}; "
+            f"take a multiple of {found.period}, or --window auto"
+        )
+    times = window // found.period
+    return Lines(
+        tuple(k * times for k in found.lines.bins), window, log.rate_hz, tuple(k * times for k in found.lines.quiet)
+    )
+
+
+def beginning(log: Log, channel: str) -> np.ndarray:
+    """The first samples of a channel, at most half an hour at 2 kHz, with NaN where samples are missing."""
+    parts: list[np.ndarray] = []
+    size = 0
+    for block in log.blocks([channel]):
+        missing = block.start - size
+        parts += [np.full(missing, np.nan), block[channel]]
+        size = block.stop
+        if size >= _LOOKED_AT:
+            break
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -1,0 +1,134 @@
+"""One run: a recording through the tracker into its directory."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.estimation import Tracker
+from livebode.kernel import instruction_set
+from livebode.nouns import Block, InputError, Responses
+from livebode.records import RunDirectory
+from livebode.session.axis import Axis
+from livebode.session.checks import ChannelCheck, check_excitation, check_length
+from livebode.session.overview import Overview
+from livebode.session.plan import make_settings
+from livebode.sources import Log, open_log
+
+Progress = Callable[[int, int | None], None]
+Draw = Callable[[Responses, Path], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run came to: its directory, its summary as in run.json, and a thinned copy of its responses."""
+
+    directory: Path
+    summary: dict[str, Any]
+    responses: Responses
+
+
+def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
+    """Track a recording and leave a run directory.
+
+    Parameters
+    ----------
+    axis
+        Recording, signals, lines and options.
+    directory
+        Where the run is to stand; appears only when whole.
+    force
+        Replace an earlier run there.
+    progress
+        Called after each block with samples done and in all (None where not known).
+    draw
+        Called with the thinned responses and the directory before it is put in place, to add pictures.
+
+    Raises
+    ------
+    InputError
+        For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
+    """
+    started = time.perf_counter()
+    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    settings = make_settings(axis, log)
+    check_length(log.samples, settings)
+    tracker, overview = Tracker(settings), Overview()
+    with RunDirectory(directory, force=force) as out:
+        counts, tracked_s = _track(log, tracker, overview, out, progress)
+        responses = overview.responses()
+        summary = _summary(axis, log, tracker, responses) | {"counts": counts}
+        summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
+        out.write_summary(summary)
+        draw(responses, out.partial)
+    return Outcome(directory, summary, responses)
+
+
+def _track(
+    log: Log, tracker: Tracker, overview: Overview, out: RunDirectory, progress: Progress
+) -> tuple[dict[str, int], float]:
+    """Counts of samples and responses, and seconds spent in the tracker."""
+    settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(2, dtype=int)
+    channels = [name for role in settings.roles if (name := settings.channel(role))]
+    check = ChannelCheck(tuple(channels))
+    wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
+    block: Block | None = None
+    for block in log.blocks(wanted):
+        check.take(block)
+        before = time.perf_counter()
+        responses = tracker.process(block)
+        tracked_s += time.perf_counter() - before
+        totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1))
+        overview.add(responses)
+        out.write(responses)
+        for event in tracker.drain_events():
+            out.write_event(event)
+        progress(tracker.counts["samples"], log.samples)
+    if block is None:
+        raise InputError(f"{str(log.path)!r} holds no samples")
+    check.finish()
+    check_length(block.stop, settings)
+    check_excitation(tracker)
+    responses_count, invalid = (int(n) for n in totals)
+    return tracker.counts | {"responses": responses_count, "invalid_responses": invalid}, tracked_s
+
+
+def _summary(axis: Axis, log: Log, tracker: Tracker, responses: Responses) -> dict[str, Any]:
+    settings, lines = tracker.settings, tracker.settings.lines
+    return {
+        "configuration": axis.model_dump(mode="json"),
+        "found": {
+            "format": log.format,
+            "rate_hz": log.rate_hz,
+            "rate_from": log.rate_origin,
+            "window": lines.window,
+            "frequency_hz": lines.frequency_hz.tolist(),
+            "hop": settings.step,
+            "unit": responses.unit,
+        },
+        "versions": {
+            "livebode": version("livebode"),
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+            "instruction_set": instruction_set(),
+        },
+    }
+
+
+def _speed(tracker: Tracker, tracked_s: float, whole_s: float) -> dict[str, float]:
+    samples = tracker.counts["samples"]
+    recorded_s = samples / tracker.settings.lines.rate_hz
+    return {
+        "recorded_s": recorded_s,
+        "run_s": whole_s,
+        "tracking_s": tracked_s,
+        "times_real_time": recorded_s / whole_s,
+        "samples_per_s": samples / tracked_s,
+    }

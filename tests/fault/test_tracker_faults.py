@@ -1,0 +1,160 @@
+"""Starts, gaps, samples that are not finite, spikes and wrong input: what is not whole is never shown as valid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from livebode.estimation import Settings, Tracker
+from livebode.excitation import multisine
+from livebode.nouns import Block, InputError, Lines, Loop
+
+WINDOW, RATE_HZ = 100, 1000.0
+LINES = Lines.parse("50,100,200", RATE_HZ, WINDOW)
+NAMES = ("w", "u", "y")
+
+
+def record(samples: int = 1000, start: int = 0) -> Block:
+    w = np.resize(multisine(LINES), samples)
+    return Block(np.array([w, w, 2 * w]), NAMES, RATE_HZ, start=start)
+
+
+def tracker(**options: object) -> Tracker:
+    return Tracker(Settings(**({"lines": LINES, "output": "y", "input": "u", "excitation": "w", "hop": 1} | options)))
+
+
+def changed(block: Block, channel: str, at: int, value: float) -> Block:
+    data = block.data.copy()
+    data[block.index(channel), at] = value
+    return Block(data, block.channels, block.rate_hz, block.start)
+
+
+@pytest.mark.parametrize("start", [0, 37])
+def test_nothing_is_valid_before_a_whole_window(start: int) -> None:
+    responses = tracker().process(record(300, start))
+    assert np.array_equal(responses.valid.all(axis=1), np.arange(300) >= WINDOW - 1)
+    assert np.isnan(responses.value[: WINDOW - 1]).all()
+    assert np.allclose(responses.value[WINDOW - 1 :], 2)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("channel", NAMES)
+def test_a_sample_that_is_not_finite_is_gone_after_one_window(value: float, channel: str) -> None:
+    found = tracker()
+    responses = found.process(changed(record(), channel, 333, value))
+    n = np.arange(1000)
+    assert np.array_equal(responses.valid.all(axis=1), (n >= 99) & ((n < 333) | (n >= 333 + WINDOW)))
+    assert np.allclose(responses.value[responses.valid], 2)
+    assert [(e.kind, e.sample, e.time_s) for e in found.drain_events()] == [("non-finite", 333, 0.333)]
+    assert found.counts["non-finite"] == 1
+
+
+@pytest.mark.parametrize("missing", [1, 50, 12345])
+def test_a_gap_is_gone_after_one_window(missing: int) -> None:
+    found, block = tracker(), record()
+    found.process(block.cut(0, 450))
+    rest = block.cut(450, 1000)
+    later = Block(rest.data, rest.channels, rest.rate_hz, start=450 + missing)
+    responses = found.process(later)
+    assert np.array_equal(responses.valid.all(axis=1), np.arange(550) >= WINDOW - 1)
+    assert np.allclose(responses.value[responses.valid], 2)
+    event = found.drain_events()[0]
+    assert (event.kind, event.sample, event.details) == ("gap", 450 + missing, {"missing_samples": missing})
+
+
+def test_a_flagged_gap_without_missing_numbers_counts_too() -> None:
+    found, block = tracker(), record()
+    found.process(block.cut(0, 400))
+    rest = block.cut(400, 1000)
+    responses = found.process(Block(rest.data, rest.channels, RATE_HZ, start=400, gap=True))
+    assert not responses.valid[: WINDOW - 1].any()
+    assert found.counts["gaps"] == 1
+
+
+@pytest.mark.parametrize("size", [30.0, 1e6, 1e30])
+def test_a_spike_is_left_out_of_the_average(size: float) -> None:
+    rng = np.random.default_rng(5)
+    block = record(2000)
+    noisy = Block(block.data + 0.01 * rng.standard_normal(block.data.shape), NAMES, RATE_HZ)
+    spiked = changed(noisy, "u", 1234, size)
+    naive = tracker(average=True, forgetting=1.0, hop=WINDOW).process(spiked)[-1]
+    found = tracker(average=True, forgetting=1.0, hop=WINDOW, spikes=("u",))
+    kept = found.process(spiked)[-1]
+    assert np.max(np.abs(kept.value - 2)) < 0.01 < np.max(np.abs(naive.value - 2))
+    assert kept.valid.all()
+    assert found.counts["spike"] == 1
+
+
+def test_a_spike_makes_windows_invalid_where_nothing_is_averaged() -> None:
+    rng = np.random.default_rng(5)
+    block = record()
+    noisy = Block(block.data + 0.01 * rng.standard_normal(block.data.shape), NAMES, RATE_HZ)
+    responses = tracker(spikes=("y",)).process(changed(noisy, "y", 600, 50.0))
+    n = np.arange(1000)
+    assert np.array_equal(responses.valid.all(axis=1), (n >= 99) & ((n < 600) | (n >= 700)))
+
+
+def test_clean_noise_has_no_spikes() -> None:
+    # 2,000 windows of Gaussian noise; a false one is expected once in 1e6 windows and more.
+    rng = np.random.default_rng(8)
+    block = record(200_000)
+    found = tracker(spikes=("u", "y"), hop=WINDOW)
+    found.process(Block(block.data + 0.1 * rng.standard_normal(block.data.shape), NAMES, RATE_HZ))
+    assert found.counts["spike"] == 0
+
+
+def test_a_window_without_excitation_is_not_valid() -> None:
+    block = record()
+    data = block.data.copy()
+    data[0, 400:] = 0.0
+    responses = tracker().process(Block(data, NAMES, RATE_HZ))
+    assert responses.valid[399].all()
+    assert not responses.valid[500:].any()
+
+
+def test_a_line_without_excitation_is_not_valid() -> None:
+    lines = Lines.parse("50,100,200,300", RATE_HZ, WINDOW)
+    responses = tracker(lines=lines).process(record())
+    assert responses.valid[-1].tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"estimator": "jiont"}, "estimator='jiont' is not known; choose 'direct' or 'joint' or 'indirect'"),
+        ({"excitation": None}, "the joint estimator of the plant needs the excitation signal"),
+        ({"hop": 0}, "hop=0 is not between 1 and the window of 100 samples"),
+        ({"hop": 101}, "hop=101 is not between 1 and the window"),
+        ({"forgetting": 0.0}, "forgetting=0.0 is not in 0 < λ ≤ 1"),
+        ({"forgetting": 1.5}, "forgetting=1.5"),
+        ({"estimator": "indirect"}, "the indirect estimator needs the controllers"),
+        ({"quantity": "open loop", "estimator": "direct"}, "needs the loop's feedback"),
+        ({"differenced": ("yy",)}, "differenced: there is no channel 'yy'; did you mean 'y'?"),
+        ({"spikes": ("x",)}, "spikes: there is no channel 'x'"),
+        ({"noise": "quiet", "lines": Lines((5,), 100, 1000.0)}, "the lines leave 0 bins quiet"),
+        ({"hann": True, "lines": Lines((5, 6), 100, 1000.0)}, "must be 2 bins (20 Hz) apart"),
+        ({"hann": True, "noise": "quiet"}, "take the noise from periods"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(options: dict, says: str) -> None:
+    with pytest.raises(InputError) as refused:
+        tracker(**options)
+    assert says in str(refused.value)
+
+
+def test_blocks_that_do_not_fit_are_refused() -> None:
+    found, block = tracker(), record()
+    found.process(block.cut(0, 100))
+    with pytest.raises(InputError, match="samples 50 to 99 came twice"):
+        found.process(block.cut(50, 200))
+    with pytest.raises(InputError, match="2000 samples per second, but the lines are for 1000"):
+        tracker().process(Block(block.data, NAMES, 2000.0))
+    with pytest.raises(InputError, match="there is no channel 'u'"):
+        tracker().process(Block(block.data, ("w", "U2", "y"), RATE_HZ))
+    with pytest.raises(InputError, match="is empty"):
+        tracker().process(block.cut(0, 0))
+
+
+def test_an_unknown_logging_moment_is_refused() -> None:
+    with pytest.raises(InputError, match="input_logged='later' is not known"):
+        Loop(input_logged="later")

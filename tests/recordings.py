@@ -1,0 +1,167 @@
+"""The same signals written to every format by the libraries that define them, for the tests of the readers."""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import scipy.io
+from numpy.typing import NDArray
+
+RATE_HZ = 4000.0
+Signals = Mapping[str, NDArray[np.float64]]
+SINUMERIK_ALPHABET = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
+PYTHON_ALPHABET = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;<=>?@^_`{|}~"
+
+
+def table(signals: Signals) -> pa.Table:
+    return pa.table({name: pa.array(values) for name, values in signals.items()})
+
+
+def write_csv(path: Path, signals: Signals) -> None:
+    rows = [",".join(signals), *(",".join(map(repr, map(float, row))) for row in zip(*signals.values()))]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def write_parquet(path: Path, signals: Signals) -> None:
+    pq.write_table(table(signals), path, row_group_size=333)
+
+
+def write_arrow(path: Path, signals: Signals) -> None:
+    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_file(file, table(signals).schema) as writer:
+        writer.write_table(table(signals), max_chunksize=333)
+
+
+def write_mat(path: Path, signals: Signals) -> None:
+    scipy.io.savemat(path, {name: values[:, np.newaxis] for name, values in signals.items()}, do_compression=True)
+
+
+def write_mat73(path: Path, signals: Signals) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in signals.items():
+            data = file.create_dataset(name, data=values[np.newaxis])
+            data.attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def write_hdf5(path: Path, signals: Signals) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in signals.items():
+            file.create_dataset(name, data=values, chunks=(333,) if len(values) > 333 else None)
+
+
+def write_npz(path: Path, signals: Signals) -> None:
+    np.savez_compressed(path, **dict(signals))
+
+
+def base85(values: NDArray[np.float64]) -> str:
+    """Python's base-85 of the same groups of four bytes, in the alphabet of the control."""
+    text = base64.b85encode(values.astype(">f8").tobytes())
+    return text.translate(bytes.maketrans(PYTHON_ALPHABET, SINUMERIK_ALPHABET)).decode("ascii")
+
+
+def write_sinumerik(path: Path, signals: Signals) -> None:
+    """Two records of half the length each; the signals must be called input and output."""
+
+    def array(values: NDArray[np.float64]) -> str:
+        return (
+            f'<TimeSeries><NumericArray name="m_ValueVector"><unsigned_int name="m_length">{len(values)}</unsigned_int>'
+            f'<raw name="m_pNumberArray"><![CDATA[\n{base85(values)}\n]]></raw></NumericArray></TimeSeries>'
+        )
+
+    nodes = [
+        f'<PlatformSignalNode><unsigned_int name="m_uNodeId">{61 + at}</unsigned_int><integer '
+        f'name="m_iUniqueInstanceId">{at}</integer>{"".join(map(array, np.array_split(signals[name], 2)))}'
+        "</PlatformSignalNode>"
+        for at, name in enumerate(("output", "input"))
+    ]
+    path.write_text(
+        '<?xml version="1.0" encoding="ISO-8859-1"?><ResponseTestCustom>'
+        f'<float name="m_dProcessUpdateTime">{1 / RATE_HZ!r}</float>{"".join(nodes)}'
+        '<LinkedList name="m_listPrimaryFreqRespSigNodeData"><PrimaryFreqRespSigNodeData>'
+        '<integer name="m_iInputSigNodeUniqueInstanceID">1</integer>'
+        '<integer name="m_iOutputSigNodeUniqueInstanceID">0</integer>'
+        "</PrimaryFreqRespSigNodeData></LinkedList></ResponseTestCustom>",
+        encoding="latin-1",
+    )
+
+
+WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
+    "delimited": (".csv", write_csv),
+    "parquet": (".parquet", write_parquet),
+    "arrow": (".arrow", write_arrow),
+    "matlab": (".mat", write_mat),
+    "matlab73": (".mat", write_mat73),
+    "hdf5": (".h5", write_hdf5),
+    "npz": (".npz", write_npz),
+    "sinumerik": (".xml", write_sinumerik),
+}
+"""Ending and writer for each module of `livebode.sources` that reads a format."""
+
+
+def signals(samples: int = 1000, seed: int = 0) -> dict[str, NDArray[np.float64]]:
+    """Two signals with every order of magnitude that a double has room for in a recording."""
+    rng = np.random.default_rng(seed)
+    scale = 10.0 ** rng.integers(-12, 12, samples)
+    return {"input": rng.standard_normal(samples) * scale, "output": rng.standard_normal(samples) / 3}
+
+
+def with_time(given: Signals, rate_hz: float = RATE_HZ) -> dict[str, NDArray[np.float64]]:
+    samples = len(next(iter(given.values())))
+    return {"t": np.arange(samples) / rate_hz, **given}
+
+
+def write(module: str, folder: Path, given: Signals, stem: str = "log") -> Path:
+    suffix, writer = WRITERS[module]
+    path = folder / f"{stem}{suffix}"
+    writer(path, given)
+    return path
+
+
+def dspace(samples: int) -> dict[str, NDArray[np.void]]:
+    """A recording as dSPACE ControlDesk lays it out: rec.X.Data is time, rec.Y(k) has Name, Unit and Data."""
+    time = np.arange(samples) / RATE_HZ
+    y = np.zeros((1, 2), dtype=[("Name", object), ("Unit", object), ("Data", object)])
+    y[0, 0] = ("Model Root/Speed/omega", "rad/s", time[np.newaxis] * 2)
+    y[0, 1] = ("Model Root/Current/iq", "A", time[np.newaxis] * 3)
+    rec = np.zeros((1, 1), dtype=[("X", object), ("Y", object), ("RTProgram", object)])
+    x = np.zeros((1, 1), dtype=[("Name", object), ("Data", object)])
+    x[0, 0] = ("HostService", time[np.newaxis])
+    rec[0, 0] = (x, y, "axis.sdf")
+    return {"rec": rec}
+
+
+def write_dspace73(path: Path, samples: int) -> None:
+    """The same as `dspace` in a v7.3 file: groups, and references for the elements of Y."""
+    time = np.arange(samples) / RATE_HZ
+
+    def text(parent: h5py.Group, name: str, value: str) -> h5py.Dataset:
+        data = parent.create_dataset(name, data=np.frombuffer(value.encode("utf-16-le"), np.uint16)[:, np.newaxis])
+        data.attrs["MATLAB_class"] = np.bytes_("char")
+        return data
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        refs, rec = file.create_group("#refs#"), file.create_group("rec")
+        x = rec.create_group("X")
+        text(x, "Name", "HostService")
+        x.create_dataset("Data", data=time[:, np.newaxis])
+        y = rec.create_group("Y")
+        for field, values in {
+            "Name": [
+                text(refs, f"n{k}", name) for k, name in enumerate(("Model Root/Speed/omega", "Model Root/Current/iq"))
+            ],
+            "Unit": [text(refs, f"u{k}", unit) for k, unit in enumerate(("rad/s", "A"))],
+            "Data": [refs.create_dataset(f"d{k}", data=(time * (k + 2))[:, np.newaxis]) for k in range(2)],
+        }.items():
+            data = y.create_dataset(field, (2, 1), dtype=h5py.ref_dtype)
+            for at, target in enumerate(values):
+                data[at, 0] = target.ref
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + struct.pack("<H", 0x0200) + b"IM")
