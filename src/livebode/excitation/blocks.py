@@ -1,0 +1,44 @@
+"""A recording cut into its periods."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def cut(x: Floats, period: int) -> Floats:
+    """Whole periods without their drift, shape (periods, period), unit of `x`.
+
+    The drift is the broken line through the levels of the periods, so an offset and a constant slope vanish, whatever
+    their size, and what is periodic stays as it is. A period's level is the median of its difference to the median
+    period: a spike moves neither. Biased where the drift bends within a period: what remains of the bend is seen as
+    noise, mostly in the lowest bins.
+    """
+    count = x.size // period
+    blocks = x[: count * period].reshape(count, period)
+    typical = np.median(blocks, axis=0)
+    level = np.median(blocks - typical, axis=1)
+    slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
+    if count > 1:
+        slope[-1] = slope[-2]
+    before = np.concatenate((slope[:1], slope[:-1]))
+    at = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
+    drift = level[:, np.newaxis] + np.where(at < 0, before[:, np.newaxis], slope[:, np.newaxis]) * at
+    return np.asarray(blocks - drift - typical.mean())
+
+
+def spectra(blocks: Floats) -> Complex:
+    """Spectra of the periods, shape (periods, bins 0 … below N/2), scaled so that |X_k| is a line's amplitude."""
+    period = blocks.shape[1]
+    return np.asarray(scipy.fft.rfft(blocks, axis=1)[:, : (period + 1) // 2] * (2 / period))
+
+
+def grouped(periods: Complex, most: int = 16) -> Complex:
+    """Means of neighbouring periods, shape (≤ most, bins): noise that outlives a period no longer links them."""
+    count = min(len(periods), most)
+    edges = np.linspace(0, len(periods), count + 1).astype(int)
+    return np.asarray(np.add.reduceat(periods, edges[:-1], axis=0) / np.diff(edges)[:, np.newaxis])

@@ -1,0 +1,78 @@
+"""One exact period of a multisine."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+
+
+def schroeder_phases(count: int) -> Floats:
+    """Phases φ_i = π·i·(i − 1)/count of lines i = 1 … count, radians, shape (count,).
+
+    Nevaranta 2016, eq. (7), φ_k = (k − 1)πk/k_max, taken over the number of the line and not over its bin: over bins
+    20:20:140 Hz would get the phases of a signal with 14 lines, of which it has every second, and the crest factor
+    would depend on the window. Schroeder (IEEE Trans. Inf. Theory 16, 1970) writes −πi(i − 1)/count: the other sign
+    plays the same period backwards with its sign turned, so the crest factor is the same (1.7 for many flat lines).
+
+    >>> schroeder_phases(3) / np.pi
+    array([0.        , 0.66666667, 2.        ])
+    """
+    i = np.arange(1, count + 1)
+    return np.pi * i * (i - 1) / count
+
+
+def multisine(
+    lines: Lines, amplitude: ArrayLike = 1.0, phases: ArrayLike | Literal["schroeder"] = "schroeder"
+) -> Floats:
+    """One period of Σ A_k·sin(2πkn/N + φ_k), n = 0 … N − 1, shape (lines.window,), unit of `amplitude`.
+
+    Nevaranta 2016, eq. (6). The angle is reduced as an integer, kn mod N, before it becomes a float, so that
+    sample n + N of an endless excitation has the bits of sample n, and no line drifts off its bin.
+
+    Parameters
+    ----------
+    lines
+        Excited lines; the period is their window.
+    amplitude
+        One for all lines, or one for each.
+    phases
+        ``"schroeder"`` for a low crest factor, or radians for each line.
+
+    Raises
+    ------
+    InputError
+        If amplitudes or phases are not finite or are not as many as lines.
+
+    Examples
+    --------
+    >>> lines = Lines.parse("20:140:20", rate_hz=4000, window=200)
+    >>> period = multisine(lines, amplitude=0.5)
+    >>> len(period), round(float(np.std(period)) ** 2, 6)
+    (200, 0.875)
+    """
+    if isinstance(phases, str) and phases != "schroeder":
+        raise InputError(f"{phases=} is not known; choose 'schroeder' or give radians for each line")
+    angles = schroeder_phases(len(lines)) if isinstance(phases, str) else phases
+    each_amplitude, each_angle = (
+        _each(v, len(lines), name) for v, name in ((amplitude, "amplitude"), (angles, "phases"))
+    )
+    n = np.arange(lines.window, dtype=np.int64)
+    period = np.zeros(lines.window)
+    for k, size, phase in zip(lines.bins, each_amplitude, each_angle):
+        period += size * np.sin((2 * np.pi / lines.window) * ((k * n) % lines.window) + phase)
+    return period
+
+
+def _each(value: ArrayLike, count: int, name: str) -> Floats:
+    given = np.asarray(value, dtype=np.float64)
+    if given.shape not in ((), (count,)):
+        raise InputError(f"{name} has shape {given.shape} for {count} lines; give one number, or one for each line")
+    if not np.all(np.isfinite(given)):
+        raise InputError(f"{name}={given[~np.isfinite(given)].flat[0]} is not finite; give finite numbers")
+    return np.broadcast_to(given, (count,))

@@ -1,0 +1,167 @@
+"""The period of a recording, or the reason why it has none."""
+
+from __future__ import annotations
+
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.evidence import log_chance
+from livebode.excitation.extent import extent
+from livebode.excitation.prepare import clipped, whitened
+from livebode.excitation.repetition import LAG_MIN, best_lag, difference
+from livebode.excitation.significance import FALSE_ALARM, find_lines
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+# Neighbouring lags that are tried at most, either side. The autocorrelation of a slow signal is flat over more samples
+# only where noise leaves the period uncertain anyway.
+_NEIGHBOURS_MAX = 16
+# What changes from period to period at the lines, beyond the noise: more than a tenth of their power is no period.
+_LEFT_OVER_MAX = 0.1
+# Of the recording, or of what stands out of its background, at least a third must repeat (an SNR of −3 dB); else it is
+# the accident of one tone that fits some lag.
+_DIFFERENT_MAX = 2 / 3
+_SIGMAS = 4.0  # one in 3e4 by chance, and the lags near the best are few
+_PART = 2**19  # samples; two minutes at 4 kHz
+
+
+def find_period(x: Floats) -> tuple[int, int, int]:
+    """Period in samples, first sample of the periodic part and the sample after its last.
+
+    1. Look at the recording as it is, and whitened, so that neither a trajectory nor few periods spoil it. 2. The
+    shortest lag at which each differs least from itself. 3. Among its neighbours, the one whose periods add up to
+    the most power. 4. The view with the stronger evidence decides; refuse it if a recording without a period would
+    do as well with a probability above 1e-3 for all lags and both views together. 5. Divide by what all excited bins
+    have in common; multiply by 2 or 3 where that finds lines in between. 6. Refuse it if more changes at the lines than
+    noise explains, or if the recording repeats better after more than its half.
+
+    Raises
+    ------
+    InputError
+        If nothing repeats, or what repeats is there less than twice.
+    """
+    if x.size < 2 * LAG_MIN:
+        raise InputError(f"{x.size} samples are too few to hold two periods; record at least two")
+    calm = clipped(x)
+    calm -= calm.mean()
+    period = _fundamental_of(calm)
+    start, stop = extent(calm, period)
+    return period, start, stop
+
+
+def _fundamental_of(calm: Floats) -> int:
+    # Most periods are short against a long recording, and a part in its middle tells them as well in less time.
+    if calm.size > _PART:
+        middle = calm[calm.size // 2 - _PART // 2 :][:_PART]
+        try:
+            return _sharpened(calm, _fundamental_of(middle), 1)
+        except InputError:
+            pass
+    flat, peaks = whitened(calm)
+    d = difference(calm)
+    standing_out = difference(peaks)
+    views = [_judged(calm, d), _judged(flat, standing_out)]
+    evidence, period, view = min(views, key=lambda v: v[0])
+    fundamental = 0
+    if evidence + np.log(calm.size) <= np.log(FALSE_ALARM):  # two views of half as many lags
+        start, stop = extent(view, period)
+        fundamental = _fundamental(view[start:stop], period)
+    if short := _too_short(flat, d, fundamental):
+        raise InputError(short)
+    repeats = min(d[fundamental], standing_out[fundamental]) <= _DIFFERENT_MAX
+    if fundamental and repeats and _steady_at_lines(view[start:stop], fundamental):
+        return fundamental
+    half = calm.size // 2
+    raise InputError(
+        f"the excitation does not repeat within {half} samples, half of the recording (the best lag, {period} "
+        f"samples, leaves {min(100, 100 * max(d[period], 0)):.0f} % of its power different); record at least two whole "
+        "periods of a multisine, PRBS, square wave or repeated chirp, or use an estimator for noise and single chirps"
+    )
+
+
+def _judged(view: Floats, d: Floats) -> tuple[float, int, Floats]:
+    lag, width = best_lag(d, view.size // 2)
+    # What each sample differs from the one a lag before it is the slope of a drift, free of all that is periodic.
+    slope = float(np.mean(view[lag:] - view[:-lag])) / lag
+    level = view - slope * (np.arange(view.size) - view.size / 2)
+    period = _sharpened(level, lag, width)
+    return log_chance(level, period), period, level
+
+
+def _sharpened(flat: Floats, lag: int, width: int) -> int:
+    """Of the neighbours of a lag, the one whose periods add up to the most power at the excited bins."""
+    reach = min(max(width, 2), _NEIGHBOURS_MAX)
+    lines = _lines(flat, lag) or None
+    tried = [p for p in range(lag - reach, lag + reach + 1) if LAG_MIN <= p <= flat.size // 2]
+
+    def power(period: int) -> float:
+        count = flat.size // period
+        mean = np.fft.rfft(flat[: count * period].reshape(count, period).mean(axis=0))[1 : (period + 1) // 2]
+        if lines:
+            mean = mean[[k - 1 for k in lines if k <= mean.size]]
+        # Power per sample times the samples used: what the fold explains of the recording.
+        return float(np.sum(np.abs(mean) ** 2)) / period * count
+
+    return max(tried, key=lambda p: (power(p), -abs(p - lag)))
+
+
+def _lines(flat: Floats, period: int) -> list[int]:
+    if flat.size < 2 * period:
+        return []
+    return [int(k) for k in np.flatnonzero(find_lines(spectra(cut(flat, period))).excited)]
+
+
+def _fundamental(flat: Floats, period: int) -> int:
+    lines = _lines(flat, period)
+    common = gcd(period, *lines) if lines else 1
+    period //= common
+    for factor in (2, 3):
+        while (
+            flat.size >= 2 * factor * period and gcd(factor, *(lines := _lines(flat, factor * period))) == 1 and lines
+        ):
+            period *= factor
+    return period
+
+
+def _steady_at_lines(view: Floats, period: int) -> bool:
+    """Whether noise explains what changes at the lines from one period to the next.
+
+    Tones without a common period nearly agree at some lag, and noise cannot explain what is left at them. The change
+    is the median over pairs of neighbouring periods, which a transient or a pause does not move; the noise is that of
+    the bin in the middle, with what chance may add to a sum over so many lines and pairs.
+    """
+    periods = spectra(cut(view, period))
+    lines = find_lines(periods).excited
+    if not lines.any():
+        return True
+    change = np.median(np.abs(np.diff(periods, axis=0)) ** 2, axis=0) / 2
+    count, noise = int(lines.sum()), float(np.median(change[1:]))
+    chance = _SIGMAS * noise * np.sqrt(2 * count * (1 + 1 / (len(periods) - 1)))
+    power = float(np.sum(np.abs(np.mean(periods[:, lines], axis=0)) ** 2))
+    return bool(change[lines].sum() - count * noise <= _LEFT_OVER_MAX * power + chance)
+
+
+def _too_short(flat: Floats, d: Floats, period: int) -> str:
+    """The sentence for a recording that repeats after more than its half, better than with the period; or empty."""
+    half, longest = flat.size // 2, flat.size - max(flat.size // 10, LAG_MIN)  # a tenth must come back, or it is chance
+    if longest <= half + 1:
+        return ""
+    lag = half + 1 + int(np.argmin(d[half + 1 : longest]))
+    rest = flat.size - lag
+    # As far below the best shorter lag as noise in the shorter overlap cannot take it: F with (rest, rest) degrees.
+    if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(rest)) > (d[period] if period else 1.0) or d[lag] > 0.5:
+        return ""
+    # A multiple of the period, each counted half a sample wrong, is no news.
+    if period and abs(lag - period * round(lag / period)) <= min(1 + lag // (2 * period), period // 4):
+        return ""
+    pair = np.concatenate((flat[:rest], flat[lag:]))
+    if log_chance(pair, rest) + np.log(flat.size) > np.log(FALSE_ALARM):
+        return ""
+    return (
+        f"the excitation seems to repeat after {lag} samples, but the recording holds only "
+        f"{flat.size / lag:.2f} periods ({flat.size} samples); record at least two"
+    )

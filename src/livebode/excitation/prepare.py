@@ -1,0 +1,106 @@
+"""What is done to a recording before its period is looked for."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import scipy.fft
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+# A spike is clipped where it passes four times what 99.5 % of the samples stay below. Periodic excitations have crest
+# factors up to about 5, so their own peaks stay whole, and 0.5 % is more samples than a few spikes make.
+_CLIP_QUANTILE, _CLIP_FACTOR = 0.995, 4.0
+# Bands of a sixth of an octave follow the slope of a trajectory's spectrum; below four bins a median says nothing.
+_BAND_RATIO, _BAND_BINS = 2 ** (1 / 6), 4
+# What lies 60 dB below the mean power of the spectrum is rounding; raising it to the level of the lines would let
+# rounding decide. In power.
+_WHITEN_FLOOR = 1e-6
+# Noise passes ten times its median power in one bin of a thousand (exponential distribution: 2^-10).
+_STANDS_OUT = 10.0
+
+
+def checked(samples: ArrayLike, name: str) -> Floats:
+    """The recording as float64, shape (samples,), NaN where it is not finite.
+
+    Raises
+    ------
+    InputError
+        If it is not one-dimensional, empty, without a finite sample, or constant.
+    """
+    try:
+        x = np.array(samples, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"the {name} cannot be read as numbers; give one number for each sample") from None
+    if x.ndim != 1:
+        raise InputError(f"the {name} has shape {x.shape}; give one channel, shape (samples,)")
+    if not x.size:
+        raise InputError(f"the {name} is empty; record at least two periods")
+    x[~np.isfinite(x)] = np.nan
+    known = x[np.isfinite(x)]
+    if not known.size:
+        raise InputError(f"the {name} has no finite sample among {x.size}; choose another channel")
+    if np.ptp(known) == 0:
+        raise InputError(f"the {name} is constant at {known[0]:g}; choose the channel that carries the excitation")
+    return x
+
+
+def filled(x: Floats) -> Floats:
+    """NaN replaced by a straight line between the finite neighbours, shape (samples,)."""
+    known = np.isfinite(x)
+    if known.all():
+        return x
+    return np.asarray(np.interp(np.arange(x.size), np.flatnonzero(known), x[known]))
+
+
+def clipped(x: Floats) -> Floats:
+    """The signal about its median, with spikes cut off, shape (samples,)."""
+    centred = x - np.median(x)
+    limit = _CLIP_FACTOR * float(np.quantile(np.abs(centred), _CLIP_QUANTILE))
+    return np.clip(centred, -limit, limit) if limit > 0 else centred
+
+
+def whitened(x: Floats) -> tuple[Floats, Floats]:
+    """The signal filtered so that its background has a flat spectrum, and only what stands out of it.
+
+    Both have shape (samples,). A trajectory and its drift are far larger than the excitation at low frequencies and
+    would rule every comparison of one period with the next. The background is the median of the periodogram (Hann
+    window) in bands of a sixth of an octave, so lines narrower than their band keep standing out of it: with four
+    periods or more, that is. The filter is the same at all times: what is periodic stays periodic. The ends of the
+    recording are joined by taking off the line between them, since the filter works on a circle.
+    """
+    level = _joined(x)
+    size = scipy.fft.next_fast_len(x.size, real=True)
+    power = np.abs(scipy.fft.rfft(level * np.hanning(x.size), size)) ** 2
+    background = _band_medians(power)
+    background += _WHITEN_FLOOR * float(power[1:].mean())
+    spectrum = scipy.fft.rfft(level, size)
+    spectrum[0] = 0
+    spectrum[1:] /= np.sqrt(background[1:])
+    flat = scipy.fft.irfft(spectrum, size)[: x.size]
+    spectrum[power < _STANDS_OUT * background] = 0
+    return flat, scipy.fft.irfft(spectrum, size)[: x.size]
+
+
+def _joined(x: Floats) -> Floats:
+    # The mean of some samples at each end, so that one noisy sample does not tilt the whole recording.
+    some = max(1, x.size // 100)
+    slope = (x[-some:].mean() - x[:some].mean()) / (x.size - some)
+    level = x - slope * np.arange(x.size)
+    return np.asarray(level - level.mean())
+
+
+def _band_medians(power: Floats) -> Floats:
+    edges = [1]
+    while edges[-1] < power.size:
+        edges.append(max(edges[-1] + _BAND_BINS, int(edges[-1] * _BAND_RATIO)))
+    edges[-1] = power.size
+    edges = sorted(set(edges))
+    median = [float(np.median(power[a:b])) for a, b in pairwise(edges)]
+    centre = [(a + b - 1) / 2 for a, b in pairwise(edges)]
+    smallest = np.finfo(np.float64).tiny
+    return np.exp(np.interp(np.arange(power.size), centre, np.log(np.maximum(median, smallest))))

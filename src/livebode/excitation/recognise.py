@@ -1,0 +1,186 @@
+"""What excitation a recording holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.crest import peak_and_rms
+from livebode.excitation.period import find_period
+from livebode.excitation.prepare import checked, clipped, filled
+from livebode.excitation.significance import FLOOR_DB, GAP_DB, Found, find_lines
+from livebode.excitation.snr import snr_db
+from livebode.excitation.transient import leading, unlike
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """A periodic excitation as a recording shows it.
+
+    Attributes
+    ----------
+    lines
+        Excited bins of one period; `quiet` are the bins between the first and the last that carry neither the
+        excitation nor its distortion.
+    amplitude
+        Of each line, shape (lines,), unit of the excitation: |X| of a sine of this amplitude.
+    distortion
+        Bins with significant power that is not the excitation's: harmonics, mains.
+    rms, peak
+        Of the AC part of the mean steady period, unit of the excitation.
+    periods
+        Whole periods from `start` on.
+    start, stop
+        First sample of the periodic part and the sample after its last.
+    transient
+        Numbers of the leading periods that differ from the steady state beyond its noise, at the excitation or
+        at the output. Period 0 begins at `start`.
+    outlying
+        Numbers of the other periods that differ: spikes, pauses.
+    snr_db
+        Per line at the output, power of the line against the noise of one period, shape (lines,); None without one.
+    """
+
+    lines: Lines
+    amplitude: Floats
+    distortion: tuple[int, ...]
+    rms: float
+    peak: float
+    periods: int
+    start: int
+    stop: int
+    transient: tuple[int, ...]
+    outlying: tuple[int, ...]
+    snr_db: Floats | None = None
+
+    @property
+    def period(self) -> int:
+        """Samples after which the excitation repeats, the shortest; also the window to choose."""
+        return self.lines.window
+
+    @property
+    def crest_factor(self) -> float:
+        """peak/rms."""
+        return self.peak / self.rms
+
+    @property
+    def steady(self) -> tuple[int, ...]:
+        """Numbers of the periods that are neither transient nor outlying."""
+        left_out = set(self.transient + self.outlying)
+        return tuple(m for m in range(self.periods) if m not in left_out)
+
+
+def recognise(
+    excitation: ArrayLike,
+    rate_hz: float,
+    output: ArrayLike | None = None,
+    *,
+    floor_db: float = FLOOR_DB,
+    gap_db: float = GAP_DB,
+) -> Excitation:
+    """The period of an excitation, its lines, crest factor, transient periods, and the SNR at an output.
+
+    Parameters
+    ----------
+    excitation
+        Reference or measured signal, shape (samples,). Samples that are not finite are bridged; their periods
+        are outlying.
+    rate_hz
+        Samples per second.
+    output
+        Signal to measure the SNR and the transient at, shape (samples,), the same samples.
+    floor_db, gap_db
+        How far below the strongest line a bin is quiet, and how high a step in the amplitudes parts the lines from
+        their distortion; see `find_lines`.
+
+    Raises
+    ------
+    InputError
+        If a channel is empty, constant, not finite or of the wrong length, nothing repeats, less than two periods were
+        recorded, or no line stands out of the noise.
+
+    Examples
+    --------
+    >>> from livebode.excitation import multisine
+    >>> period = multisine(Lines.parse("20:140:20", rate_hz=4000, window=400))
+    >>> found = recognise(np.tile(period, 5) + 3.0, rate_hz=4000)
+    >>> found.period, found.lines.bins, found.periods
+    (200, (1, 2, 3, 4, 5, 6, 7), 10)
+    >>> round(found.crest_factor, 2)
+    1.81
+    """
+    given, answer = _checked_together(excitation, rate_hz, output)
+    x = filled(given)
+    period, start, stop = find_period(x)
+    view = slice(start, stop)
+    # Spikes are clipped where lines are first looked for, not where the periods with spikes are.
+    roughly = find_lines(spectra(cut(clipped(x[view]), period)), floor_db, gap_db).excited
+    roughly[1:] |= not roughly.any()
+    blocks, strange = _periods(given[view], period, roughly)
+    replies = None
+    if answer is not None:
+        replies, also = _periods(answer[view], period, roughly)
+        strange = strange | also
+    steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
+    found = find_lines(spectra(blocks[steady]), floor_db, gap_db)
+    if not found.excited.any():
+        raise InputError(
+            f"no line of the period of {period} samples stands out of the noise of {len(blocks)} periods; record more "
+            "periods or raise the amplitude"
+        )
+    peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
+    ahead = leading(strange)
+    return Excitation(
+        lines=_lines(found, period, rate_hz),
+        amplitude=found.amplitude[found.excited],
+        distortion=_numbers(found.distortion),
+        rms=rms,
+        peak=peak,
+        periods=len(blocks),
+        start=start,
+        stop=stop,
+        transient=tuple(range(ahead)),
+        outlying=tuple(m for m in _numbers(strange) if m >= ahead),
+        snr_db=None if replies is None else snr_db(spectra(replies[steady])[:, found.excited]),
+    )
+
+
+def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike | None) -> tuple[Floats, Floats | None]:
+    given = checked(excitation, "excitation")
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+    if output is None:
+        return given, None
+    answer = checked(output, "output")
+    if answer.size != given.size:
+        raise InputError(f"the output has {answer.size} samples and the excitation {given.size}; give the same stretch")
+    return given, answer
+
+
+def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]:
+    """The periods without drift, and which of them are unlike the others or miss samples."""
+    blocks = cut(filled(samples), period)
+    missing = np.isnan(samples[: blocks.size].reshape(blocks.shape)).any(axis=1)
+    strange: Flags = np.array(missing)
+    # What was bridged is not compared, so that it cannot pass for the usual.
+    whole = blocks[~missing]
+    strange[~missing] = unlike(whole, spectra(whole), lines)
+    return blocks, strange
+
+
+def _lines(found: Found, period: int, rate_hz: float) -> Lines:
+    bins = _numbers(found.excited)
+    taken = found.excited | found.distortion
+    quiet = tuple(k for k in range(bins[0], bins[-1]) if not taken[k])
+    return Lines(bins, period, rate_hz, quiet)
+
+
+def _numbers(flags: Flags) -> tuple[int, ...]:
+    return tuple(int(k) for k in np.flatnonzero(flags))

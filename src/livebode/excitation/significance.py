@@ -1,0 +1,123 @@
+"""Which bins of the period carry the excitation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.excitation.blocks import grouped
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+FALSE_ALARM = 1e-3  # probability that any bin of a recording is called a line by chance, all bins together
+FLOOR_DB = 60.0  # below the strongest line: a converter's rounding and the harmonics of a good drive
+# A step this high in the sorted amplitudes parts lines from distortion. Square waves, PRBS and chirps have no
+# such step (the largest, from the first to the third harmonic of a square wave, is 9.5 dB).
+GAP_DB = 12.0
+# Distortion is the smaller part: with more than a tenth of the power no frequency response would describe the drive.
+_DISTORTION_SHARE = 0.1
+# No converter reaches 138 dB, the resolution of float32: what repeats better is a reference, which has no distortion.
+_REFERENCE_NOISE = float(np.finfo(np.float32).eps) ** 2
+# Complex degrees of freedom that the noise of a bin is estimated from. With 20 the F-test asks for at most three times
+# the power that known noise would ask for (1e-3 in 1,000 bins), with 1 it would ask for 70,000 times.
+_NOISE_DOF = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Bins by what they carry; the shape of each is (bins,), bin 0 first.
+
+    Attributes
+    ----------
+    amplitude
+        Of the mean over the periods, unit of the signal.
+    excited
+        Bins of the excitation.
+    distortion
+        Bins with significant power that is not the excitation's: harmonics, mains.
+    """
+
+    amplitude: Floats
+    excited: Flags
+    distortion: Flags
+
+
+def significant(periods: Complex, false_alarm: float = FALSE_ALARM) -> Flags:
+    """Bins whose mean stands out of the scatter between periods, shape (bins,).
+
+    F-test of G|mean|² against the scatter of G groups of neighbouring periods: F ~ F(2, 2d) without a line, so its
+    probability is (1 + F/d)^−d. Few periods leave d = G − 1 too small to tell anything, so the scatter is averaged over
+    neighbouring bins until d reaches 20; where the bin's own scatter is larger (interference on one line), that counts.
+    `false_alarm` is for all bins together (Bonferroni). Never bin 0.
+    """
+    groups = grouped(periods)
+    count, bins = groups.shape
+    if count < 2:
+        return np.zeros(bins, dtype=np.bool_)
+    mean = groups.mean(axis=0)
+    own = np.sum(np.abs(groups - mean) ** 2, axis=0) / (count - 1)
+    reach = -(-(-(-_NOISE_DOF // (count - 1)) - 1) // 2)
+    noise, width = _averaged(own, reach)
+    dof = (count - 1) * width
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(mean != 0, count * np.abs(mean) ** 2 / np.maximum(noise, own), 0.0)
+    flags = dof * np.log1p(ratio / dof) > np.log(max(bins - 1, 1) / false_alarm)
+    flags[0] = False
+    return np.asarray(flags)
+
+
+def _averaged(power: Floats, reach: int) -> tuple[Floats, NDArray[np.int64]]:
+    # Mean over bins k − reach … k + reach without bin 0, which holds the drift, and how many bins that were.
+    sums = np.concatenate(([0.0], np.cumsum(power)))
+    k = np.arange(power.size)
+    first, last = np.clip(k - reach, 1, None), np.clip(k + reach + 1, 2, power.size)
+    last = np.maximum(last, first + 1)
+    last = np.minimum(last, power.size)
+    width = np.maximum(last - first, 1)
+    return (sums[last] - sums[np.minimum(first, last)]) / width, width
+
+
+def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP_DB) -> Found:
+    """The bins of the excitation among those with significant power.
+
+    Parameters
+    ----------
+    periods
+        Spectra of the steady periods, shape (periods, bins).
+    floor_db
+        Bins this far below the strongest are rounding, and count as quiet.
+    gap_db
+        In a measured signal (not in a reference, which repeats without noise), the lines below a step of this height in
+        the sorted amplitudes are distortion if they hold less than a tenth of the power. ``inf`` switches it off.
+
+    Notes
+    -----
+    A multisine with lines of very different design amplitudes, recorded as a measured current, can lose the
+    weak group to `gap_db`: record the reference, or switch it off.
+    """
+    mean = np.abs(periods.mean(axis=0))
+    mean[0] = 0.0
+    power = significant(periods)
+    power &= mean >= mean.max() * 10 ** (-floor_db / 20)
+    excited = power.copy()
+    if excited.any() and _measured(periods, mean):
+        excited &= mean >= _step(mean[excited], gap_db)
+    return Found(mean, excited, power & ~excited)
+
+
+def _measured(periods: Complex, mean: Floats) -> bool:
+    scatter = np.median(np.sum(np.abs(periods[:, 1:] - periods[:, 1:].mean(axis=0)) ** 2, axis=1))
+    return bool(scatter > _REFERENCE_NOISE * np.sum(mean**2))
+
+
+def _step(amplitudes: Floats, gap_db: float) -> float:
+    # The amplitude just above the first step down that is high enough; 0 without one.
+    falling = np.sort(amplitudes)[::-1]
+    high = falling[:-1] >= falling[1:] * 10 ** (gap_db / 20)
+    below = np.cumsum(falling[::-1] ** 2)[::-1][1:]
+    steps = np.flatnonzero(high & (below <= _DISTORTION_SHARE * np.sum(falling**2)))
+    return float(falling[steps[0]]) if steps.size else 0.0

@@ -1,0 +1,72 @@
+"""Which periods are not like the steady ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+FALSE_ALARM = 1e-3  # that any period of a recording is called unlike by chance
+# With fewer periods no majority says what is steady.
+_PERIODS_MIN = 3
+# Two periods differ by rounding when below this share of their size, whichever of the two is unlike.
+_ROUNDING = 1e-9
+# A period counts as unlike only from three times the usual distance: noise of a machine is seldom stationary, and a
+# period with twice the usual noise still serves.
+_FACTOR_MIN = 3.0
+
+
+def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
+    """Periods that differ from the median period by more than their noise, shape (periods,).
+
+    Parameters
+    ----------
+    blocks
+        Periods without drift, shape (periods, samples).
+    spectra
+        Their spectra, shape (periods, bins).
+    excited
+        Bins of the excitation, shape (bins,).
+
+    Notes
+    -----
+    Two distances: at the excited lines, |X_mk − X̃_k|² in units of its usual size at line k, averaged over lines, which
+    finds a transient at a weak line below the noise of a strong one; and the largest difference of a sample, which
+    finds a spike. Each is compared, in logarithms, with its median over the periods and their spread (median absolute
+    deviation, a scale that less than half of the periods cannot move). Biased where more than half of the
+    recording is transient: then the transient is taken for the usual.
+    """
+    count = len(blocks)
+    if count < _PERIODS_MIN:
+        return np.zeros(count, dtype=np.bool_)
+    if not excited.any():
+        return np.zeros(count, dtype=np.bool_)
+    away = np.abs(_from_median(spectra[:, excited])) ** 2
+    usual = np.median(away, axis=0) + (_ROUNDING * np.abs(np.median(spectra[:, excited].real, axis=0))) ** 2
+    usual += np.finfo(np.float64).tiny
+    at_lines = np.sqrt(np.mean(away / usual, axis=1))
+    size = np.max(np.abs(blocks), axis=1)
+    at_samples = np.max(np.abs(blocks - np.median(blocks, axis=0)), axis=1)
+    return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * np.median(size))
+
+
+def leading(flags: Flags) -> int:
+    """How many periods from the start are unlike without a break."""
+    return int(np.argmin(flags)) if not flags.all() else 0
+
+
+def _from_median(spectra: Complex) -> Complex:
+    return np.asarray(spectra - np.median(spectra.real, axis=0) - 1j * np.median(spectra.imag, axis=0))
+
+
+def _far(distance: Floats, rounding: float | Floats) -> Flags:
+    # Equal periods have the distance 0; adding the rounding keeps the logarithm.
+    log = np.log(distance + rounding + np.finfo(np.float64).tiny)
+    middle = np.median(log)
+    spread = np.median(np.abs(log - middle)) / norm.ppf(0.75)
+    sigmas = norm.isf(FALSE_ALARM / len(log))
+    return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))
