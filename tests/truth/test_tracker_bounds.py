@@ -15,7 +15,7 @@ import pytest
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import PID, Block, Cascade, Lines, Loop, Responses
-from tests.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
+from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 
 RUNS, SIGMA = 1000, 0.1
 PERIODS = 10

@@ -8,7 +8,7 @@ import pytest
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import PID, Block, Cascade, Lines, Loop, Response
-from tests.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
+from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 TRUTH = Plant().response(LINES.frequency_hz)

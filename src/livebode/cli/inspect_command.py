@@ -43,7 +43,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
     gaps = f"{found.gaps} gaps ({found.missing} samples missing)" if found.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
-        jitter = f", period {log.timing.mean_s * 1e6:.6g} µs ± {log.timing.std_s * 1e6:.3g} µs"
+        jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"
     console.print(f"{found.samples / log.rate_hz:.6g} s{jitter}, {gaps}")
     table = Table(box=None, header_style="bold")
     for heading in ("channel", "unit", "from", "to", "not finite"):
@@ -66,7 +66,8 @@ def _show_excitation(found: Inspection, console: Console) -> None:
     lines = excitation.lines
     console.print(
         f"excitation repeats every [bold]{excitation.period}[/bold] samples "
-        f"({excitation.period / lines.rate_hz:.6g} s), {excitation.periods} periods from sample {excitation.start} on; crest factor {excitation.crest_factor:.2f}, "
+        f"({excitation.period / lines.rate_hz:.6g} s), {excitation.periods} periods from sample {excitation.start} on; "
+        f"crest factor {excitation.crest_factor:.2f}, "
         f"rms {excitation.rms:.4g}, peak {excitation.peak:.4g}"
     )
     if excitation.transient:

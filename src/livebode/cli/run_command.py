@@ -149,5 +149,6 @@ def _show(outcome: Outcome) -> None:
     gaps = f", {counts['gaps']} gaps" if counts["gaps"] else ""
     print(
         f"{counts['responses']} responses at {len(found['frequency_hz'])} lines{invalid}, "
-        f"from {counts['samples']} samples{gaps}: {speed['recorded_s']:.1f} s of machine in {speed['run_s']:.2f} s\n{outcome.directory}/"
+        f"from {counts['samples']} samples{gaps}: {speed['recorded_s']:.1f} s of machine in {speed['run_s']:.2f} s\n"
+        f"{outcome.directory}/"
     )
