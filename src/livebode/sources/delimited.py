@@ -58,7 +58,6 @@ class DelimitedRecording(Recording):
                 parse_options=csv.ParseOptions(
                     delimiter=dialect.delimiter or "\x1f",
                     quote_char=False if dialect.spaced else '"',
-                    invalid_row_handler=skip_comment,
                 ),
                 convert_options=csv.ConvertOptions(
                     column_types=types,
@@ -80,7 +79,7 @@ class DelimitedRecording(Recording):
     def _opened(self) -> Iterator[Any]:
         """The file from its first row of numbers on, as bytes that Arrow understands."""
         dialect = self._dialect
-        if dialect.spaced or dialect.encoding.startswith("utf-16"):
+        if dialect.spaced or dialect.commented or dialect.encoding.startswith("utf-16"):
             with self.path.open("rb") as raw:
                 raw.seek(dialect.offset)
                 yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)
@@ -88,10 +87,6 @@ class DelimitedRecording(Recording):
             with pa.OSFile(str(self.path)) as file:
                 file.seek(dialect.offset)
                 yield file
-
-
-def skip_comment(row: csv.InvalidRow) -> str:
-    return "skip" if row.text.lstrip().startswith(("#", "%")) else "error"
 
 
 READER = DelimitedRecording

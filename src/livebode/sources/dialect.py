@@ -22,6 +22,7 @@ EMPTY = frozenset([*(" " * count for count in range(33)), *WORDS, *(f'"{word}"' 
 """Cells that mean "no value"."""
 NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
 UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 
 
@@ -47,6 +48,8 @@ class Dialect:
         One for each column: its name with the unit in it, the unit from a row of units, and what it holds.
     zone
         Time zone of moments that state one.
+    commented
+        True where comments stand between the rows.
     """
 
     delimiter: str
@@ -59,6 +62,7 @@ class Dialect:
     units: tuple[str, ...] = ()
     kinds: tuple[Kind, ...] = ()
     zone: str | None = None
+    commented: bool = False
 
     @property
     def width(self) -> int:
@@ -136,7 +140,8 @@ def find_dialect(path: Path) -> Dialect:
     if best.dialect.width > COLUMNS_MAX:
         raise InputError(f"{path} has {best.dialect.width} columns, more than {COLUMNS_MAX}; is it a recording?")
     offset = mark + len(text[: best.start.at].encode(encoding, "replace"))
-    return replace(best.dialect, encoding=encoding, offset=offset, first_line=best.start.number)
+    commented = COMMENT.search(text, best.start.at) is not None
+    return replace(best.dialect, encoding=encoding, offset=offset, first_line=best.start.number, commented=commented)
 
 
 def find_encoding(sample: bytes) -> tuple[str, int]:

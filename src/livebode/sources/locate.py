@@ -18,7 +18,7 @@ def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max:
     with path.open("r", encoding=dialect.encoding, errors="replace", newline=None) as file:
         while line := file.readline(line_bytes_max + 1):
             number += 1
-            if number < dialect.first_line or not line.strip() or is_comment(line):
+            if number < dialect.first_line or not line.strip() or (dialect.commented and is_comment(line)):
                 continue
             if len(line) > line_bytes_max:
                 return InputError(f"line {number} of {path} is longer than {line_bytes_max} bytes; is it a recording?")

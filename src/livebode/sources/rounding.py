@@ -16,7 +16,7 @@ def exact_rate_hz(period_s: float, uncertainty: float) -> float:
     4000.0
     >>> exact_rate_hz(0.0003, 1e-9)
     3333.3333333333335
-    >>> exact_rate_hz(1 / 1000.0037, 1e-9)
+    >>> exact_rate_hz(1 / 1000.0037, 1e-12)
     1000.0037
     """
     room = uncertainty + EPSILON

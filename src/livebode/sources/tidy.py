@@ -1,4 +1,4 @@
-"""A byte stream made plain for Arrow: UTF-16 becomes UTF-8, runs of blanks become one tab."""
+"""A byte stream made plain for Arrow: UTF-8 without comments, runs of blanks one tab where blanks part columns."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import re
 from typing import BinaryIO
 
 PIECE = 1 << 20
+COMMENT = re.compile(r"(?m)^[ \t]*[#%].*\n?")
 MARGINS = re.compile(r"(?m)^[ \t]+|[ \t]+(?=\r?$)")
 BLANKS = re.compile(r"[ \t]+")
 
 
 class Tidied(io.RawIOBase):
-    """The text of `raw` from where it stands, tidied line by line; `spaced` where blanks part the columns.
+    r"""The text of `raw` from where it stands, tidied line by line; `spaced` where blanks part the columns.
 
-    >>> Tidied(io.BytesIO(b"  1   2 \\n 3 4"), "utf-8", True).read(100)
-    b'1\\t2\\n3\\t4'
+    >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), "utf-8", True)).read()
+    b'1\t2\n3\t4'
     """
 
     def __init__(self, raw: BinaryIO, encoding: str, spaced: bool) -> None:
@@ -45,6 +46,7 @@ class Tidied(io.RawIOBase):
         if end == 0 and len(text) > 4 * PIECE:  # no line is as long; let Arrow say so
             end = len(text)
         text, self._kept = text[:end], text[end:]
+        text = COMMENT.sub("", text)
         if self._spaced:
             text = BLANKS.sub("\t", MARGINS.sub("", text))
         self._ready = text.encode("utf-8")
