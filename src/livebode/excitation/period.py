@@ -39,6 +39,12 @@ def find_period(x: Floats) -> tuple[int, int, int]:
     have in common; multiply by 2 or 3 where that finds lines in between. 6. Refuse it if more changes at the lines than
     noise explains, or if the recording repeats better after more than its half.
 
+    Notes
+    -----
+    Some recordings look periodic and are not: a tone or an oscillation that decays more slowly than the recording
+    lasts has the period of its best lag; a random drift resembles itself, about once in forty recordings, after
+    nearly half of its length. In noise of 0 dB with two or three periods the answer may be a refusal.
+
     Raises
     ------
     InputError
@@ -97,14 +103,14 @@ def _sharpened(flat: Floats, lag: int, width: int) -> int:
     reach = min(max(width, 2), _NEIGHBOURS_MAX)
     lines = _lines(flat, lag) or None
     tried = [p for p in range(lag - reach, lag + reach + 1) if LAG_MIN <= p <= flat.size // 2]
+    # The same number of periods for each: with one more, even a wrong period would explain more.
+    count = flat.size // tried[-1]
 
     def power(period: int) -> float:
-        count = flat.size // period
         mean = np.fft.rfft(flat[: count * period].reshape(count, period).mean(axis=0))[1 : (period + 1) // 2]
         if lines:
             mean = mean[[k - 1 for k in lines if k <= mean.size]]
-        # Power per sample times the samples used: what the fold explains of the recording.
-        return float(np.sum(np.abs(mean) ** 2)) / period * count
+        return float(np.sum(np.abs(mean) ** 2)) / period**2
 
     return max(tried, key=lambda p: (power(p), -abs(p - lag)))
 

@@ -114,7 +114,7 @@ def recognise(
     >>> found.period, found.lines.bins, found.periods
     (200, (1, 2, 3, 4, 5, 6, 7), 10)
     >>> round(found.crest_factor, 2)
-    1.81
+    1.9
     """
     given, answer = _checked_together(excitation, rate_hz, output)
     x = filled(given)

@@ -1,0 +1,35 @@
+"""The public face of the excitation folder."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from livebode import excitation
+from livebode.nouns import Lines
+
+FOUND = excitation.recognise(np.tile(excitation.multisine(Lines.parse("20:140:20", 4000, 200)), 5), 4000)
+
+
+def test_names():
+    assert set(excitation.__all__) == {"Excitation", "multisine", "recognise", "schroeder_phases"}
+
+
+def test_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        FOUND.start = 3
+
+
+def test_window_is_the_period_and_shapes_agree():
+    assert FOUND.period == FOUND.lines.window == 200
+    assert FOUND.amplitude.shape == (len(FOUND.lines),)
+    assert FOUND.snr_db is None
+    assert FOUND.steady == tuple(range(FOUND.periods))
+    assert FOUND.stop - FOUND.start >= FOUND.periods * FOUND.period
+
+
+def test_same_recording_same_answer():
+    x = np.tile(excitation.multisine(Lines.parse("20:140:20", 4000, 200)), 5)
+    again = excitation.recognise(list(x), 4000.0, x)
+    assert again.lines == FOUND.lines
+    assert again.snr_db.shape == (7,)
