@@ -139,6 +139,7 @@ def clock_from_time(
     stated
         Rate that the file states elsewhere; it helps only where the unit of time cannot be told.
     """
+    unit = stated_unit(column, unit)
     steps = Steps(column.name)
     for (time,) in chunks:
         steps.add(time)
@@ -147,7 +148,7 @@ def clock_from_time(
             raise InputError(f"time column {column.name!r} has {steps.rows} samples, too few to tell the rate; give it")
         return Clock(rate_hz, "given", steps.rows)
     told = (rate_hz, "the given rate") if rate_hz is not None else stated
-    unit, scale, guessed = resolve_unit(column, unit, steps.mean, told)
+    unit, scale, guessed = (unit, SECONDS[unit.casefold()], "") if unit else guess_unit(column, steps.mean, told)
     refuse_jitter(column.name, steps)
     measured_hz = exact_rate_hz(steps.mean * scale, uncertainty(steps))
     if not 1e-9 < measured_hz < 1e12:
@@ -169,19 +170,20 @@ def clock_from_time(
     )
 
 
-def resolve_unit(column: Column, given: str, mean: float, told: tuple[float, str] | None) -> tuple[str, float, str]:
-    """Unit of a time column, its length in seconds, and how it was guessed (empty where it was said).
-
-    A column without unit is in seconds, unless a rate that is told from elsewhere differs from that by a power of
-    1000. Seconds that give 1 Hz or less are not believed without such a rate.
-    """
+def stated_unit(column: Column, given: str) -> str:
+    """Unit of a time column as the user, the file or its name says it; empty where none does."""
     unit = given or time_unit(column.name, column.unit)
-    if unit:
-        if unit.casefold() not in SECONDS:
-            raise InputError(
-                f"time column {column.name!r} is in {unit!r}, which is no unit of time; use s, ms, us or ns"
-            )
-        return unit, SECONDS[unit.casefold()], ""
+    if unit and unit.casefold() not in SECONDS:
+        raise InputError(f"time column {column.name!r} is in {unit!r}, which is no unit of time; use s, ms, us or ns")
+    return unit
+
+
+def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> tuple[str, float, str]:
+    """Unit of a time column that states none, its length in seconds, and what told it (empty for seconds).
+
+    It is in seconds, unless a rate that is told from elsewhere differs from that by a power of 1000. Seconds that give
+    1 Hz or less are not believed without such a rate.
+    """
     if told is None:
         if mean < 1.0:
             return "s", 1.0, ""

@@ -1,0 +1,310 @@
+"""Bad files: one clear sentence with its remedy, never another exception, and bounded memory."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from livebode.nouns import InputError
+from livebode.sources import open_log, sinumerik_spectra
+from tests.recordings import WRITERS, dspace, signals, with_time, write, write_dspace73
+
+MODULES = sorted(WRITERS)
+ROUNDS = int(os.environ.get("LIVEBODE_FUZZ_ROUNDS", "150"))
+"""Damaged files of each kind; raise it for a campaign."""
+
+
+def drain(path: Path, **options: object) -> None:
+    log = open_log(path, **options)
+    assert log.skipped is not None
+    assert log.aliases is not None
+    for _ in log.blocks():
+        pass
+
+
+def refused(path: Path, **options: object) -> str:
+    with pytest.raises(InputError) as caught:
+        drain(path, **options)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def survives(path: Path, **options: object) -> bool:
+    """True where the file could be read, False where it was refused in one line; anything else fails the test."""
+    message = ""
+    try:
+        drain(path, **options)
+    except InputError as error:
+        message = str(error)
+    assert "\n" not in message
+    return not message
+
+
+def text(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("t,u\n0,1\n0.1,abc\n0.2,3\n", r"line 3 of .*, column 'u': 'abc' is not a number"),
+        ("# x\n\nt,u\n0,1\n0.1,1\n0.2,3,4\n", r"line 6 of .* has 3 cells, the others 2"),
+        ("t,u\n0,1\n0.1,1\n0.2,3\n0.3", r"line 5 of .* has 1 cells, the others 2"),
+        ("t,u,u\n0,1,2\n0.1,1,2\n", r"'u' stands more than once .*columns 2 and 3"),
+        ("t,u\n", "no row of numbers"),
+        ("\n\n", "no row of numbers"),
+        ("just some prose\nand more of it\n", "no row of numbers"),
+        (b"t,u\n\x00\x01\x02", "not CSV, whatever its ending says"),
+        (b"t,u\n" + b"0,1\n" * 1000 + b"\x00\x00", "binary data"),
+        (bytes(range(256)) * 8, "not CSV, whatever its ending says"),
+        ("1" * 300_000, "longer than"),
+        ("", "is empty"),
+        ("a,b\nx,1\n", "'x'|no channel|rate"),
+    ],
+)
+def test_tables_that_are_refused(tmp_path, content, expected):
+    assert re.search(expected, refused(text(tmp_path, content)))
+
+
+def test_text_far_down_is_found_with_its_line(tmp_path):
+    lines = [f"{k / 1000},{k}" for k in range(200_000)]
+    lines[150_000] = "150.0,1.2.3"
+    message = refused(text(tmp_path, "t,u\n" + "\n".join(lines)))
+    assert "line 150002" in message
+    assert "'1.2.3'" in message
+
+
+def test_bytes_that_are_no_utf8_in_a_ragged_row(tmp_path):
+    rows = "".join(f"{k},1\n" for k in range(100_000)).encode()
+    assert "line 100002" in refused(text(tmp_path, b"t,u\n" + rows + b"\xff\xfe,1,2\n"), rate_hz=1)
+
+
+def test_a_very_long_line_far_down(tmp_path):
+    rows = "".join(f"{k},1\n" for k in range(100_000))
+    assert "line 100002" in refused(text(tmp_path, f"t,u\n{rows}1,{'2' * 9_000_000}\n"), rate_hz=1)
+
+
+def test_paths_that_are_no_recordings(tmp_path):
+    assert "there is no file" in refused(tmp_path / "none.csv")
+    os.mkfifo(tmp_path / "pipe.csv")
+    assert "is no regular file" in refused(tmp_path / "pipe.csv")
+    assert "is a directory" in refused(tmp_path)
+    assert "cannot read" in refused(Path("a\0b"))
+    assert "no known format" in refused(text(tmp_path, b"\x00\x01", "a.xyz"))
+    assert "is not Parquet, whatever its ending says" in refused(text(tmp_path, b"\x00\x01", "a.parquet"))
+
+
+@pytest.mark.parametrize(("number", "reason"), [(errno.EACCES, "Permission denied"), (errno.EIO, "Input/output error")])
+def test_a_file_that_the_system_does_not_give(tmp_path, monkeypatch, number, reason):
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    path = write("npz", tmp_path, signals())
+    monkeypatch.setattr(Path, "open", fail)  # permissions alone do not stop root, who runs many a container
+    assert reason in refused(path, rate_hz=1)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_truncated_anywhere(module, tmp_path):
+    given = signals(200) if module == "sinumerik" else with_time(signals(200))
+    whole = write(module, tmp_path, given).read_bytes()
+    for keep in range(1, len(whole) - 3, max(1, len(whole) // 40)):
+        path = text(tmp_path, whole[:keep], f"cut{Path(WRITERS[module][0]).suffix}")
+        assert not survives(path) or module == "delimited"  # only a table may end after any row
+
+
+@pytest.mark.parametrize("module", ["parquet", "arrow", "npz", "hdf5", "matlab"])
+def test_no_rows(module, tmp_path):
+    assert refused(write(module, tmp_path, {"u": np.empty(0), "v": np.empty(0)}), rate_hz=1)
+
+
+def test_duplicate_names_in_parquet(tmp_path):
+    pq.write_table(pa.table([[1.0, 2.0], [3.0, 4.0]], names=["u", "u"]), tmp_path / "a.parquet")
+    assert "'u' stands more than once" in refused(tmp_path / "a.parquet", rate_hz=1)
+
+
+def test_an_archive_with_a_password_and_one_with_pickles(tmp_path):
+    path = write("npz", tmp_path, signals())
+    raw = bytearray(path.read_bytes())
+    at = raw.find(b"PK\x01\x02")
+    while at >= 0:  # set the flag "encrypted" of each member, here and in front of the member
+        raw[at + 8] |= 1
+        local = int.from_bytes(raw[at + 42 : at + 46], "little")
+        raw[local + 6] |= 1
+        at = raw.find(b"PK\x01\x02", at + 1)
+    assert "password" in refused(text(tmp_path, bytes(raw), "b.npz"), rate_hz=1)
+    np.savez(tmp_path / "c.npz", a=np.array([{}], dtype=object), allow_pickle=True)
+    assert "not real numbers" in refused(tmp_path / "c.npz", rate_hz=1)
+
+
+def test_sizes_that_are_declared_and_not_there(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("huge", (2**50,), dtype="f8", chunks=(1024,))
+    assert "declares" in refused(tmp_path / "a.h5", rate_hz=1)
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive, archive.open("x.npy", "w") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (2**40,)})
+        file.write(b"\0" * 64)
+    assert "declares shape" in refused(tmp_path / "a.npz", rate_hz=1)
+    scipy.io.savemat(tmp_path / "a.mat", {"x": np.arange(100.0)})
+    raw = (tmp_path / "a.mat").read_bytes().replace(b"\x64\0\0\0", b"\xff\xff\xff\x7f")
+    assert "declares 2147483647 values" in refused(text(tmp_path, raw, "b.mat"), rate_hz=1)
+
+
+def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
+    write("hdf5", tmp_path, signals(), "other")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["u"] = np.arange(10.0)
+        file["out"] = h5py.ExternalLink("other.h5", "/input")
+        file.create_dataset("raw", (10,), "f8", external=[(str(tmp_path / "other.h5"), 0, 80)])
+    log = open_log(tmp_path / "a.h5", rate_hz=1)
+    assert [channel.name for channel in log.channels] == ["u"]
+    assert [skipped.name for skipped in log.skipped] == ["raw"]
+
+
+def test_xml_that_declares_entities_or_is_something_else(tmp_path):
+    bomb = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "c">]><ResponseTestCustom>&b;</ResponseTestCustom>'
+    assert "declares a document type" in refused(text(tmp_path, bomb, "a.xml"))
+    assert "time records of 0 signals" in refused(text(tmp_path, "<html><body/></html>", "b.xml"))
+    assert "deeper than" in refused(text(tmp_path, "<a>" * 1000 + "</a>" * 1000, "c.xml"))
+    with pytest.raises(InputError, match="no cross-spectrum"):
+        sinumerik_spectra(write("sinumerik", tmp_path, signals()))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"rate_hz": 0}, "rate_hz=0"),
+        ({"rate_hz": float("nan")}, "rate_hz=nan"),
+        ({"block_samples": 0}, "block_samples=0"),
+        ({"time": "clock"}, "no channel 'clock'"),
+        ({"time": "input [rad]"}, "no unit of time"),
+        ({"channels": ["nothing"]}, "no channel 'nothing'"),
+    ],
+)
+def test_options_that_are_refused(tmp_path, options, message):
+    assert message in refused(write("npz", tmp_path, signals()), **options)
+
+
+def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
+    log = open_log(write("npz", tmp_path, signals()), rate_hz=1)
+    with pytest.raises(InputError, match="more than once"):
+        log.blocks(["input", "input"])
+    with pytest.raises(InputError, match="is not a list"):
+        log.blocks("input")
+
+
+def test_hdf5_without_its_library(tmp_path, monkeypatch):
+    path = write("hdf5", tmp_path, signals())
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    assert "pip install livebode[hdf5]" in refused(path, rate_hz=1)
+
+
+@settings(max_examples=ROUNDS, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=600), st.sampled_from(["", "PAR1", "ARROW1\0\0", "PK\x03\x04", "<", "t,u\n0,1\n", "\ufeff"]))
+def test_any_bytes_are_read_or_refused(tmp_path, content, head):
+    path = text(tmp_path, head.encode() + content, "log.csv")
+    survives(path, rate_hz=1000)
+
+
+def damaged(whole: bytes, rng: random.Random) -> bytes:
+    """The file with bytes changed, sizes blown up, pieces lost or put in, the end cut off."""
+    raw = bytearray(whole)
+    for _ in range(rng.choice([1, 1, 2, 3, 8, 30])):
+        at = rng.randrange(len(raw)) if raw else 0
+        what = rng.randrange(5)
+        if what == 0:
+            raw[at : at + 1] = rng.randbytes(1)
+        elif what == 1 and raw:
+            raw[at] ^= 1 << rng.randrange(8)
+        elif what == 2:
+            raw[at : at + 4] = rng.choice([b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\0"])
+        elif what == 3:
+            del raw[at : at + rng.randrange(1, 16)]
+        else:
+            raw[at:at] = rng.randbytes(rng.randrange(1, 8))
+    return bytes(raw[: rng.randrange(len(raw))]) if raw and rng.random() < 0.15 else bytes(raw)
+
+
+def seeds(module: str, folder: Path) -> bytes:
+    if module == "struct":
+        scipy.io.savemat(folder / "a.mat", dspace(50))
+        return (folder / "a.mat").read_bytes()
+    if module == "struct73":
+        write_dspace73(folder / "a.mat", 50)
+        return (folder / "a.mat").read_bytes()
+    return write(module, folder, signals(50) if module == "sinumerik" else with_time(signals(50))).read_bytes()
+
+
+@pytest.mark.parametrize("module", [*MODULES, "struct", "struct73"])
+def test_damaged_files_are_read_or_refused(module, tmp_path):
+    whole = seeds(module, tmp_path)
+    for round_ in range(ROUNDS):
+        rng = random.Random(f"{module} {round_}")
+        path = text(tmp_path, damaged(whole, rng) or b"x", "damaged.bin")
+        survives(path, rate_hz=rng.choice([None, 4000.0]), time=rng.choice([None, "none"]))
+
+
+MEASURE = """
+import resource, sys
+import pyarrow, pyarrow.csv, pyarrow.parquet, numpy, h5py, zipfile
+from livebode.sources import open_log
+resource.setrlimit(resource.RLIMIT_DATA, (1 << 31, 1 << 31))
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+log = open_log(sys.argv[1])
+samples = sum(len(block) for block in log.blocks(["input", "output"]))
+print(samples, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
+"""
+
+
+def write_large(module: str, path: Path, samples: int) -> None:
+    """About 190 MB in memory, constant signals so that writing is quick."""
+    time = np.arange(samples) / 4000
+    if module == "delimited":
+        lines = "".join(f"{k / 4000:.5f},0.12345678901,-1.2345678901\n" for k in range(4000))
+        with path.open("w") as file:
+            file.write("t,input,output\n")
+            for second in range(samples // 4000):
+                file.write(
+                    lines
+                    if second == 0
+                    else lines.replace("\n0.", f"\n{second}.").replace("0.00000", f"{second}.00000", 1)
+                )
+        return
+    data = {"t": time, "input": np.full(samples, 0.5), "output": np.full(samples, 0.25)}
+    if module == "parquet":
+        pq.write_table(pa.table(data), path, row_group_size=1 << 20, use_dictionary=False)
+    elif module == "npz":
+        np.savez(path, **data)
+    elif module == "hdf5":
+        with h5py.File(path, "w") as file:
+            for name, values in data.items():
+                file[name] = values
+
+
+@pytest.mark.parametrize("module", ["delimited", "parquet", "npz", "hdf5"])
+def test_memory_stays_bounded_whatever_the_length(module, tmp_path):
+    path = tmp_path / f"large{WRITERS[module][0]}"
+    samples = 8_000_000 if module != "delimited" else 3_000_000
+    write_large(module, path, samples)
+    done = subprocess.run([sys.executable, "-c", MEASURE, str(path)], capture_output=True, text=True, check=True)
+    read, grown_mib = map(int, done.stdout.split())
+    assert read == samples
+    assert grown_mib < 100  # the file is above 110 MB, its arrays 72 (text) or 192 MB
