@@ -62,7 +62,7 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     t->table = (real *)take(at, rows * blocks * 2u * LB_BLOCK * bytes);
     t->sums = (real *)take(at, c->channels * blocks * 4u * LB_BLOCK * bytes);
     t->line = (real *)take(at, c->channels * line * bytes);
-    t->delta = (real *)take(at, (uint64_t)c->channels * LB_TILE * bytes);
+    t->delta = (real *)take(at, (uint64_t)c->channels * 3u * LB_TILE * bytes);
     t->spectrum = (real *)take(at, reach ? inner * 2u * bytes : 0u);
     t->bins = (uint32_t *)take(at, inner * sizeof(uint32_t));
     t->taps = (uint32_t *)take(at, reach ? (uint64_t)c->bin_count * 4u * sizeof(uint32_t) : 0u);
@@ -156,15 +156,15 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     }
     const lb_instruction_set set =
         config->instruction_set == LB_BEST ? lb_best_instruction_set() : config->instruction_set;
-    const lb_tile_function tile = LB(tile_of)(set);
-    if (!tile) {
+    const lb_kernel *kernel = LB(kernel_of)(set);
+    if (!kernel) {
         return LB_ERROR_INSTRUCTION_SET;
     }
 
     cursor at = {0, (unsigned char *)memory + (LB_ALIGN - (uintptr_t)memory % LB_ALIGN) % LB_ALIGN};
     LB_DFT *t = (LB_DFT *)take(&at, sizeof(LB_DFT));
     lay_out(t, &at, config);
-    t->tile = tile;
+    t->kernel = kernel;
     t->set = set;
     t->variant = config->variant;
     t->window = config->window;

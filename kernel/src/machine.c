@@ -4,7 +4,7 @@
 lb_instruction_set lb_best_instruction_set(void)
 {
 #ifdef LB_DISPATCH
-    if (__builtin_cpu_supports("avx512f")) {
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) {
         return LB_AVX512;
     }
     if (__builtin_cpu_supports("avx2")) {

@@ -28,10 +28,14 @@ typedef int32_t lb_lane_index;
 #define LB_BLOCK (512 / LB_BITS)
 #endif
 
-/* Samples whose sums are done in one go: long enough that loading and storing the sums is cheap, short enough
- * that samples, differences and table rows stay in the first-level cache. */
+/* Samples whose sums are done in one go: long enough that loading and storing the sums is cheap. */
 #ifndef LB_TILE
-#define LB_TILE 64
+#define LB_TILE 128
+#endif
+
+/* The same where every sample makes a row: rows, samples and table rows stay in the first-level cache. */
+#ifndef LB_DENSE_TILE
+#define LB_DENSE_TILE 64
 #endif
 
 #endif

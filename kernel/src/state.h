@@ -5,7 +5,7 @@
 #include "tile.h"
 
 struct LB_DFT {
-    lb_tile_function tile;
+    const lb_kernel *kernel;
     lb_instruction_set set;
     lb_variant variant;
     double damping;
@@ -23,7 +23,7 @@ struct LB_DFT {
     real *table;          /* [half + 1][blocks][2][LB_BLOCK]: cos, sin */
     real *sums;           /* [channels][blocks][4][LB_BLOCK] */
     real *line;           /* [channels][line_length], the newest N samples, by index */
-    real *delta;          /* [channels][LB_TILE], of the pending samples */
+    real *delta;          /* [channels][3][LB_TILE], of the pending samples: see tile.h */
     real *spectrum;       /* [inner_count][2], scratch of the windows */
     uint32_t *bins;       /* [inner_count] */
     uint32_t *taps;       /* [bin_count][4]: places among the inner bins of k−1, k+1, k−2, k+2 */
@@ -60,7 +60,7 @@ static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards
 static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + channel * t->blocks * 4 * LB_BLOCK; }
 
 /* The instruction set's kernel, or null. */
-lb_tile_function LB(tile_of)(lb_instruction_set set);
+const lb_kernel *LB(kernel_of)(lb_instruction_set set);
 
 /* Brings the sums up to date with the pending samples. */
 void LB(catch_up)(LB_DFT *t);

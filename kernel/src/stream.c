@@ -3,22 +3,38 @@
 
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
-/* Samples that may still become pending: up to a tile, within one half of the period. */
+
+/* Samples that may still become pending: up to a tile, within the period. */
 static size_t room(const LB_DFT *t)
 {
-    const uint32_t end = t->index - t->pending < t->half ? t->half : t->window;
-    return smaller(LB_TILE - t->pending, end - t->index);
+    return smaller(LB_TILE - t->pending, t->window - t->index);
 }
 
-/* Sets the differences and the delay line of one channel's next samples. */
+/* The differences and the delay line of one channel's next samples. */
 static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
 {
     real *line = t->line + channel * t->line_length + t->index;
-    real *delta = t->delta + channel * LB_TILE + t->pending;
+    real *delta = t->delta + channel * 3 * LB_TILE + t->pending;
+    if (t->variant != LB_DAMPED) {
+        t->kernel->take_in(delta, line, samples, stride, length);
+        return;
+    }
     for (size_t i = 0; i < length; ++i, samples += stride) {
-        const real x = *samples;
-        delta[i] = x - t->radius_window * line[i];
-        line[i] = x;
+        delta[i] = *samples - t->radius_window * line[i];
+        line[i] = *samples;
+    }
+}
+
+/* F = x_0, the sample without an image. */
+static void seed(LB_DFT *t, size_t channel)
+{
+    real *sums = lb_sums(t, channel);
+    const real first = t->line[channel * t->line_length];
+    for (size_t block = 0; block < t->blocks; ++block, sums += 4 * LB_BLOCK) {
+        for (size_t i = 0; i < LB_BLOCK; ++i) {
+            sums[2 * LB_BLOCK + i] = first;
+            sums[3 * LB_BLOCK + i] = 0;
+        }
     }
 }
 
@@ -38,30 +54,67 @@ typedef struct {
     const real *end;      /* of channel 0's rows */
 } rows_due;
 
-/* The sums of the pending samples, and the rows due among them. */
-static void run_tiles(LB_DFT *t, rows_due due)
+/* The sums of `length` samples from `start` on, which lie in one half of the period and are pending from `offset`
+ * on, and the rows due among them. */
+static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length, const rows_due *due)
 {
-    const uint32_t start = t->index - t->pending;
     lb_tile tile;
+    tile.channels = t->channels;
+    tile.blocks = t->blocks;
+    tile.sums = t->sums;
+    tile.line = t->line + start;
+    tile.image = (ptrdiff_t)t->window - 2 * (ptrdiff_t)start;
+    tile.line_step = t->line_length;
+    tile.middle = 2 * start == t->window;
     tile.row = lb_row(t, start, &tile.backwards);
     tile.row_step = tile.backwards ? -(ptrdiff_t)t->row_length : (ptrdiff_t)t->row_length;
-    tile.blocks = t->blocks;
-    tile.length = t->pending;
-    tile.swap = t->index == t->window;
-    tile.first = due.first;
-    tile.hop = due.hop;
-    tile.phase = due.phase;
+    tile.delta = t->delta + offset;
+    tile.length = length;
+    tile.swap = start + length == t->window;
+    tile.first = due->first;
+    tile.hop = due->hop;
+    tile.phase = due->phase;
     tile.bins = t->inner_count;
-    for (size_t c = 0; c < t->channels; ++c) {
-        tile.sums = lb_sums(t, c);
-        tile.delta = t->delta + c * LB_TILE;
-        tile.samples = t->line + c * t->line_length + start;
-        tile.out = due.out ? due.out + c * due.channel_reals : due.out;
-        tile.out_end = due.end ? due.end + c * due.channel_reals : due.end;
-        t->tile(&tile);
+    tile.out = due->out;
+    tile.out_end = due->end;
+    tile.out_step = due->channel_reals;
+    for (size_t c = 0; c < t->channels && (start == t->half || t->window == 1); ++c) {
+        seed(t, c);
+    }
+    t->kernel->run(&tile);
+}
+
+/* Moves on to the rows due after `length` further samples. */
+static void passed(rows_due *due, size_t length, size_t row_reals)
+{
+    if (due->first >= length) {
+        due->first -= length;
+        return;
+    }
+    const uint32_t beyond = (uint32_t)(length - 1 - due->first); /* < LB_TILE */
+    const uint32_t rows = due->hop > beyond ? 1u : 1u + beyond / (uint32_t)due->hop;
+    due->out += rows * row_reals;
+    due->first += rows * due->hop - length;
+}
+
+/* All pending samples. */
+static void run_pending(LB_DFT *t, rows_due *due)
+{
+    const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
+    uint32_t start = t->index - t->pending;
+    for (uint32_t offset = 0; start < t->index;) {
+        const uint32_t end = start < t->half ? t->half : t->window;
+        const uint32_t ahead = (t->index < end ? t->index : end) - start;
+        const uint32_t length = ahead < longest ? ahead : longest;
+        run_part(t, start, offset, length, due);
+        if (due->out) {
+            passed(due, length, 2 * (size_t)t->bin_count);
+        }
+        start += length;
+        offset += length;
     }
     t->pending = 0;
-    t->index = tile.swap ? 0 : t->index;
+    t->index = t->index == t->window ? 0 : t->index;
 }
 
 void LB(catch_up)(LB_DFT *t)
@@ -70,12 +123,12 @@ void LB(catch_up)(LB_DFT *t)
         return;
     }
     if (lb_renews(t->variant)) {
-        const rows_due none = {LB_TILE, LB_TILE, LB_PHASE_FIXED, 0, 0, 0};
-        run_tiles(t, none);
+        rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
+        run_pending(t, &none);
         return;
     }
     for (size_t c = 0; c < t->channels; ++c) {
-        LB(recur)(t, c, t->delta + c * LB_TILE, t->pending);
+        LB(recur)(t, c, t->delta + c * 3 * LB_TILE, t->pending);
     }
     t->pending = 0;
     t->index = t->index == t->window ? 0 : t->index;
@@ -87,7 +140,9 @@ lb_status LB(queue)(LB_DFT *t, const real *samples)
         return LB_ERROR_NULL;
     }
     for (size_t c = 0; c < t->channels; ++c) {
-        take_in(t, c, samples + c, 1, 1);
+        real *at = t->line + c * t->line_length + t->index;
+        t->delta[c * 3 * LB_TILE + t->pending] = samples[c] - t->radius_window * *at;
+        *at = samples[c];
     }
     counted(t, 1);
     if (!room(t)) {
@@ -143,22 +198,9 @@ static void skip(LB_DFT *t, input *in, size_t length)
 /* Rows written by the inner kernels themselves. */
 static void fused_rows(LB_DFT *t, input *in, size_t length, rows_due due)
 {
-    const size_t hop = due.hop;
-    due.hop = smaller(hop, LB_TILE); /* beyond a tile all hops are one; a sum with them cannot overflow */
     while (length) {
-        const size_t n = next_tile(t, in, length);
-        length -= n;
-        const size_t first = due.first;
-        due.first = smaller(first, LB_TILE);
-        run_tiles(t, due);
-        due.first = first;
-        if (due.first >= n) {
-            due.first -= n;
-            continue;
-        }
-        const size_t rows = hop == 1 ? n : 1 + (n - 1 - due.first) / hop;
-        due.out += rows * 2 * t->bin_count;
-        due.first += rows * hop - n;
+        length -= next_tile(t, in, length);
+        run_pending(t, &due);
     }
 }
 

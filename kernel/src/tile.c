@@ -3,9 +3,11 @@
 #include "tile.h"
 #include "vec.h"
 
-#ifndef LB_TILE_NAME
-#define LB_TILE_NAME LB(tile_baseline)
+#ifndef LB_KERNEL_NAME
+#define LB_KERNEL_NAME LB(kernel_baseline)
 #endif
+
+extern const lb_kernel LB_KERNEL_NAME;
 
 #define LB_PARTS (LB_BLOCK / LB_LANES) /* vectors per block */
 #define LB_MOST (LB_PARTS * LB_ABREAST)
@@ -23,23 +25,33 @@ typedef struct {
     vec cosine[LB_MOST], sine[LB_MOST];
 } unit_row;
 
-LB_INLINE unit_sums load_sums(const real *p, int n)
+LB_INLINE void load_s(unit_sums *a, const real *p, int n)
 {
-    unit_sums a;
     for (int v = 0; v < n; ++v) {
-        a.s_re[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK));
-        a.s_im[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + LB_BLOCK);
-        a.f_re[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + 2 * LB_BLOCK);
-        a.f_im[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + 3 * LB_BLOCK);
+        a->s_re[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK));
+        a->s_im[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + LB_BLOCK);
     }
-    return a;
 }
 
-LB_INLINE void store_sums(real *p, unit_sums a, int n)
+LB_INLINE void load_f(unit_sums *a, const real *p, int n)
+{
+    for (int v = 0; v < n; ++v) {
+        a->f_re[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + 2 * LB_BLOCK);
+        a->f_im[v] = lb_load(p + LB_PLACE(v, 4 * LB_BLOCK) + 3 * LB_BLOCK);
+    }
+}
+
+LB_INLINE void store_s(real *p, unit_sums a, int n)
 {
     for (int v = 0; v < n; ++v) {
         lb_store(p + LB_PLACE(v, 4 * LB_BLOCK), a.s_re[v]);
         lb_store(p + LB_PLACE(v, 4 * LB_BLOCK) + LB_BLOCK, a.s_im[v]);
+    }
+}
+
+LB_INLINE void store_f(real *p, unit_sums a, int n)
+{
+    for (int v = 0; v < n; ++v) {
         lb_store(p + LB_PLACE(v, 4 * LB_BLOCK) + 2 * LB_BLOCK, a.f_re[v]);
         lb_store(p + LB_PLACE(v, 4 * LB_BLOCK) + 3 * LB_BLOCK, a.f_im[v]);
     }
@@ -55,29 +67,26 @@ LB_INLINE unit_row load_row(const real *p, int n)
     return t;
 }
 
-/* S += d·e^(−jθ), F += x·e^(−jθ); on the way back the table holds e^(+jθ). */
-LB_INLINE unit_sums step(unit_sums a, unit_row t, real d, real x, int backwards, int n)
+/* S += d·e^(−jθ) on the way out, d·e^(+jθ) on the way back. */
+LB_INLINE unit_sums step_s(unit_sums a, unit_row t, const real *delta, int backwards, int n)
 {
     for (int v = 0; v < n; ++v) {
-        a.s_re[v] += t.cosine[v] * d;
-        a.f_re[v] += t.cosine[v] * x;
+        a.s_re[v] += t.cosine[v] * delta[0];
         if (backwards) {
-            a.s_im[v] += t.sine[v] * d;
-            a.f_im[v] += t.sine[v] * x;
+            a.s_im[v] += t.sine[v] * delta[0];
         } else {
-            a.s_im[v] -= t.sine[v] * d;
-            a.f_im[v] -= t.sine[v] * x;
+            a.s_im[v] -= t.sine[v] * delta[0];
         }
     }
     return a;
 }
 
-LB_INLINE unit_sums swap_sums(unit_sums a, int n)
+/* F, on the way back only: by the even and the odd part. */
+LB_INLINE unit_sums step_f(unit_sums a, unit_row t, const real *delta, int n)
 {
     for (int v = 0; v < n; ++v) {
-        a.s_re[v] = a.f_re[v];
-        a.s_im[v] = a.f_im[v];
-        a.f_re[v] = a.f_im[v] = (vec){0};
+        a.f_re[v] += t.cosine[v] * delta[LB_TILE];
+        a.f_im[v] += t.sine[v] * delta[2 * LB_TILE];
     }
     return a;
 }
@@ -102,7 +111,9 @@ LB_INLINE void emit(real *out, unit_sums a, unit_row next, lb_phase phase, int b
 typedef struct {
     real *sums;
     const real *row;
+    const real *delta;
     real *out; /* place in the first row due */
+    const real *out_end;
     lb_phase phase;
     int backwards;
     int n;        /* vectors */
@@ -111,9 +122,9 @@ typedef struct {
 
 /* A row of the last block: what it writes too much, the next rows overwrite; where there are none, only what
  * exists is written. */
-LB_INLINE void emit_tail(const lb_tile *t, unit u, unit_sums a, unit_row next)
+LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
 {
-    if (t->out_end - u.out >= 2 * LB_BLOCK) {
+    if (u.out_end - u.out >= 2 * LB_BLOCK) {
         emit(u.out, a, next, u.phase, u.backwards, u.n);
         return;
     }
@@ -127,7 +138,7 @@ LB_INLINE void emit_tail(const lb_tile *t, unit u, unit_sums a, unit_row next)
 LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
 {
     if (u.valid) {
-        emit_tail(t, u, a, next);
+        emit_tail(u, a, next);
     } else {
         emit(u.out, a, next, u.phase, u.backwards, u.n);
     }
@@ -135,71 +146,125 @@ LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
     return u;
 }
 
+/* F of a whole tile by itself, for processors whose registers do not hold S, F and a row at once. */
+LB_INLINE void renew(const lb_tile *t, unit u)
+{
+    unit_sums a;
+    load_f(&a, u.sums, u.n);
+    LB_UNROLL_4
+    for (size_t i = 0; i < t->length; ++i, u.row += t->row_step) {
+        a = step_f(a, load_row(u.row, u.n), u.delta + i, u.n);
+    }
+    store_f(u.sums, a, u.n);
+}
+
+/* The end of a period: S = F. Returns S to be stored; F is final in memory. */
+LB_INLINE unit_sums swapped(unit_sums a, const real *sums, int n)
+{
+    load_f(&a, sums, n);
+    for (int v = 0; v < n; ++v) {
+        a.s_re[v] = a.f_re[v];
+        a.s_im[v] = a.f_im[v];
+    }
+    return a;
+}
+
 /* A row after every sample. The next sample's table row demodulates this one's, so each is loaded once. */
 LB_INLINE void run_dense(const lb_tile *t, unit u)
 {
+    const int apart = u.backwards && !LB_MANY_REGISTERS, together = u.backwards && LB_MANY_REGISTERS;
     const size_t before_swap = t->length - (size_t)t->swap;
-    unit_sums a = load_sums(u.sums, u.n);
+    unit_sums a;
+    if (apart) {
+        renew(t, u);
+    }
+    load_s(&a, u.sums, u.n);
+    if (together) {
+        load_f(&a, u.sums, u.n);
+    }
     unit_row row = load_row(u.row, u.n), next;
-    size_t i = 0;
-    for (; i < before_swap; ++i, row = next) {
+    for (size_t i = 0; i < before_swap; ++i, row = next) {
         u.row += t->row_step;
         next = load_row(u.row, u.n);
-        a = step(a, row, t->delta[i], t->samples[i], u.backwards, u.n);
+        a = step_s(a, row, u.delta + i, u.backwards, u.n);
+        if (together) {
+            a = step_f(a, row, u.delta + i, u.n);
+        }
         u = emit_row(t, u, a, next);
     }
+    if (together) {
+        a = t->swap ? step_f(a, row, u.delta + before_swap, u.n) : a;
+        store_f(u.sums, a, u.n);
+    }
     if (t->swap) {
-        a = swap_sums(step(a, row, t->delta[i], t->samples[i], u.backwards, u.n), u.n);
+        a = swapped(a, u.sums, u.n);
         (void)emit_row(t, u, a, load_row(u.row + t->row_step, u.n));
     }
-    store_sums(u.sums, a, u.n);
+    store_s(u.sums, a, u.n);
 }
 
 /* A row after every hop-th sample, or none. */
 LB_INLINE void run_sparse(const lb_tile *t, unit u)
 {
     const size_t before_swap = t->length - (size_t)t->swap;
-    unit_sums a = load_sums(u.sums, u.n);
     size_t due = t->first, i = 0;
+    unit_sums a;
+    load_s(&a, u.sums, u.n);
+    if (u.backwards) {
+        load_f(&a, u.sums, u.n);
+    }
     for (;;) {
         const size_t stop = due < before_swap ? due + 1 : before_swap;
         LB_UNROLL_4
         for (; i < stop; ++i, u.row += t->row_step) {
-            a = step(a, load_row(u.row, u.n), t->delta[i], t->samples[i], u.backwards, u.n);
+            const unit_row row = load_row(u.row, u.n);
+            a = step_s(a, row, u.delta + i, u.backwards, u.n);
+            if (u.backwards) {
+                a = step_f(a, row, u.delta + i, u.n);
+            }
         }
         if (due >= before_swap) {
             break;
         }
         u = emit_row(t, u, a, load_row(u.row, u.n));
-        due += t->hop;
+        due = t->hop > before_swap ? SIZE_MAX : due + t->hop;
+    }
+    if (u.backwards) {
+        a = t->swap ? step_f(a, load_row(u.row, u.n), u.delta + i, u.n) : a;
+        store_f(u.sums, a, u.n);
     }
     if (t->swap) {
-        a = swap_sums(step(a, load_row(u.row, u.n), t->delta[i], t->samples[i], u.backwards, u.n), u.n);
+        a = swapped(a, u.sums, u.n);
         if (due == i) {
             (void)emit_row(t, u, a, load_row(u.row + t->row_step, u.n));
         }
     }
-    store_sums(u.sums, a, u.n);
+    store_s(u.sums, a, u.n);
 }
 
 LB_INLINE void run_blocks(const lb_tile *t, size_t block, int backwards, int blocks, int tail)
 {
-    unit u;
-    u.sums = t->sums + block * 4 * LB_BLOCK;
-    u.row = t->row + block * 2 * LB_BLOCK;
-    u.out = t->out ? t->out + block * 2 * LB_BLOCK : t->out;
-    u.backwards = backwards;
-    u.n = blocks * LB_PARTS;
-    u.valid = tail ? 2 * (t->bins - block * LB_BLOCK) : 0;
-    if (t->hop != 1) {
-        u.phase = t->phase;
-        run_sparse(t, u);
-    } else if (t->phase == LB_PHASE_FIXED) {
-        u.phase = LB_PHASE_FIXED;
-        run_dense(t, u);
-    } else {
-        u.phase = LB_PHASE_WINDOW;
-        run_dense(t, u);
+    /* Channels within blocks: the table's rows come from afar, and are near for the second channel. */
+    for (size_t c = 0; c < t->channels; ++c) {
+        unit u;
+        u.sums = t->sums + (c * t->blocks + block) * 4 * LB_BLOCK;
+        u.row = t->row + block * 2 * LB_BLOCK;
+        u.delta = t->delta + c * 3 * LB_TILE;
+        u.out = t->out ? t->out + c * t->out_step + block * 2 * LB_BLOCK : t->out;
+        u.out_end = t->out ? t->out_end + c * t->out_step : t->out;
+        u.backwards = backwards;
+        u.n = blocks * LB_PARTS;
+        u.valid = tail ? 2 * (t->bins - block * LB_BLOCK) : 0;
+        if (t->hop != 1) {
+            u.phase = t->phase;
+            run_sparse(t, u);
+        } else if (t->phase == LB_PHASE_FIXED) {
+            u.phase = LB_PHASE_FIXED;
+            run_dense(t, u);
+        } else {
+            u.phase = LB_PHASE_WINDOW;
+            run_dense(t, u);
+        }
     }
 }
 
@@ -219,11 +284,48 @@ LB_INLINE void run(const lb_tile *t, int backwards)
     }
 }
 
-void LB_TILE_NAME(const lb_tile *t)
+/* Even and odd parts of a tile in the second half; all images are in the line. */
+static void fold(const lb_tile *t, size_t channel)
 {
-    if (t->backwards) {
-        run(t, 1);
-    } else {
-        run(t, 0);
+    const real *restrict here = t->line + channel * t->line_step;
+    const real *image = here + t->image;
+    real *restrict even = t->delta + (channel * 3 + 1) * LB_TILE;
+    for (size_t i = 0; i < t->length; ++i) {
+        const real x = *(image - i);
+        even[i] = here[i] + x;
+        even[LB_TILE + i] = here[i] - x;
+    }
+    if (t->middle) { /* it counts once */
+        even[0] = even[LB_TILE] = here[0];
     }
 }
+
+static void run_tile(const lb_tile *t)
+{
+    if (!t->backwards) {
+        run(t, 0);
+        return;
+    }
+    for (size_t c = 0; c < t->channels; ++c) {
+        fold(t, c);
+    }
+    run(t, 1);
+}
+
+static void take_in(real *restrict delta, real *restrict line, const real *restrict samples, ptrdiff_t stride,
+                    size_t length)
+{
+    if (stride == 1) { /* apart, so that it becomes vectors */
+        for (size_t i = 0; i < length; ++i) {
+            delta[i] = samples[i] - line[i];
+            line[i] = samples[i];
+        }
+        return;
+    }
+    for (size_t i = 0; i < length; ++i, samples += stride) {
+        delta[i] = *samples - line[i];
+        line[i] = *samples;
+    }
+}
+
+const lb_kernel LB_KERNEL_NAME = {take_in, run_tile};

@@ -84,8 +84,19 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 #define LB_UNROLL_4
 #endif
 
+#if defined(__AVX512VL__) || defined(__aarch64__)
+#define LB_MANY_REGISTERS 1
+#else
+#define LB_MANY_REGISTERS 0
+#endif
+
+/* Blocks worked on at once: enough independent sums to hide the adder's latency, few enough for the registers. */
 #ifndef LB_ABREAST
+#if LB_LANES > 1 && LB_LANES == LB_BLOCK
+#define LB_ABREAST 2
+#else
 #define LB_ABREAST 1
+#endif
 #endif
 
 #endif
