@@ -29,7 +29,7 @@ def test_the_fundamental_and_not_the_window_of_the_design(window):
     assert (found.transient, found.outlying, found.distortion) == ((), (), ())
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     period=st.one_of(st.integers(50, 20000), st.sampled_from([53, 127, 499, 1999, 4999, 9973, 19997])),
     count=st.integers(7, 300),

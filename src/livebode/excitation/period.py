@@ -11,7 +11,7 @@ from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
 from livebode.excitation.prepare import clipped, whitened
-from livebode.excitation.repetition import LAG_MIN, best_lag, difference
+from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
 from livebode.nouns import InputError
 
@@ -43,7 +43,8 @@ def find_period(x: Floats) -> tuple[int, int, int]:
     -----
     Some recordings look periodic and are not: a tone or an oscillation that decays more slowly than the recording
     lasts has the period of its best lag; a random drift resembles itself, about once in forty recordings, after
-    nearly half of its length. In noise of 0 dB with two or three periods the answer may be a refusal.
+    nearly half of its length. In noise of 0 dB, two or three periods may give a refusal or a
+    period one sample off.
 
     Raises
     ------
@@ -71,11 +72,15 @@ def _fundamental_of(calm: Floats) -> int:
     d = difference(calm)
     standing_out = difference(peaks)
     views = [_judged(calm, d), _judged(flat, standing_out)]
+    needed = np.log(FALSE_ALARM) - np.log(calm.size)  # two views of half as many lags
     evidence, period, view = min(views, key=lambda v: v[0])
+    # A shorter lag has more periods to show for itself; the other counts where the recording repeats twice as well.
+    if views[0][0] <= needed and 2 * d[views[0][1]] + ROUNDING < d[period]:
+        evidence, period, view = views[0]
     fundamental = 0
-    if evidence + np.log(calm.size) <= np.log(FALSE_ALARM):  # two views of half as many lags
+    if evidence <= needed:
         start, stop = extent(view, period)
-        fundamental = _fundamental(view[start:stop], period)
+        fundamental = _fundamental(view[start:stop], period, (d, standing_out))
     if short := _too_short(flat, d, fundamental):
         raise InputError(short)
     repeats = min(d[fundamental], standing_out[fundamental]) <= _DIFFERENT_MAX
@@ -121,10 +126,13 @@ def _lines(flat: Floats, period: int) -> list[int]:
     return [int(k) for k in np.flatnonzero(find_lines(spectra(cut(flat, period))).excited)]
 
 
-def _fundamental(flat: Floats, period: int) -> int:
+def _fundamental(flat: Floats, period: int, differences: tuple[Floats, ...]) -> int:
     lines = _lines(flat, period)
     common = gcd(period, *lines) if lines else 1
-    period //= common
+    # Two periods may be too few to see the one line that the others have nothing in common with; then the shorter lag
+    # differs more, by that line. Up to twice is allowed: it has other samples of a transient and of the noise.
+    if any(d[period // common] <= 2 * max(d[period], 0.0) + ROUNDING for d in differences):
+        period //= common
     for factor in (2, 3):
         while (
             flat.size >= 2 * factor * period and gcd(factor, *(lines := _lines(flat, factor * period))) == 1 and lines

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_ROUNDING = 1e-9
+# The rounding of an FFT autocorrelation, with room; a line 60 dB below the rest is still 1e-6.
+ROUNDING = 1e-10
 LAG_MIN = 3  # samples: the shortest period with a line below the Nyquist frequency
 
 
@@ -30,7 +31,7 @@ def difference(x: Floats) -> Floats:
     both = head2 + tail2 - (head**2 + tail**2) / overlap
     unlike = both - 2 * (product - head * tail / overlap)
     # Where a part is constant its variance is rounding, and says nothing.
-    clear = both > _ROUNDING * max(float(both[0]), 0.0)
+    clear = both > ROUNDING * max(float(both[0]), 0.0)
     return np.where(clear, unlike / np.where(clear, both, 1.0), 1.0)
 
 
@@ -53,8 +54,7 @@ def best_lag(d: Floats, lag_max: int) -> tuple[int, int]:
     first = max(LAG_MIN, int(np.argmax(lags >= halfway)))
     lags = lags[first:]
     best = float(lags.min())
-    # 1e-10: the rounding of an FFT autocorrelation, with room; a line 60 dB down is still 1e-6.
-    limit = max(best, 0.0) * (1 + 3 * 2 * np.sqrt(2 / (d.size - lag_max))) + 1e-10
+    limit = max(best, 0.0) * (1 + 3 * 2 * np.sqrt(2 / (d.size - lag_max))) + ROUNDING
     good = lags <= max(limit, best)
     start = int(np.argmax(good))
     ends = np.flatnonzero(~good[start:])
