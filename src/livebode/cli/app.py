@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 
-import click
 import typer
 
 from livebode.cli.inspect_command import inspect_command
@@ -22,7 +22,7 @@ app.command("run")(run_command)
 app.command("inspect")(inspect_command)
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def _version(
     version: bool = typer.Option(False, "--version", help="Print the version and exit.", is_eager=True),
 ) -> None:
@@ -35,29 +35,21 @@ def _version(
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    sys.exit(_run())
-
-
-def _run() -> int:
     try:
-        code = app(standalone_mode=False)
+        app()
     except InputError as error:
-        return _say(f"livebode: {error}", 2)
-    except click.ClickException as error:
-        error.show()
-        return 2
-    except (KeyboardInterrupt, click.Abort):
-        return _say("livebode: stopped; nothing was left", 130)
+        _stop(f"livebode: {error}", 2)
+    except KeyboardInterrupt:
+        _stop("livebode: stopped; nothing was left", 130)
     except BrokenPipeError:
-        # The reader of our output went away; what was to be done is done.
-        sys.stderr.close()
-        return 0
+        # Who read our output has gone; Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
     except Exception:
         traceback.print_exc()
-        return _say("livebode: this is a fault in livebode, not yours; please report it with the lines above", 1)
-    return code or 0
+        _stop("livebode: this is a fault in livebode, not yours; please report it with the lines above", 1)
 
 
-def _say(sentence: str, code: int) -> int:
+def _stop(sentence: str, code: int) -> None:
     print(sentence, file=sys.stderr)
-    return code
+    sys.exit(code)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -11,7 +11,9 @@ from rich.table import Table
 
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.records import to_json
-from livebode.session import Inspection, inspect
+
+if TYPE_CHECKING:
+    from livebode.session.inspection import Inspection
 
 _LINES_SHOWN = 24
 
@@ -25,6 +27,8 @@ def inspect_command(
     as_json: Json = False,
 ) -> None:
     """List channels, rate, gaps and samples that are not finite; for an excitation its period, lines and SNR."""
+    from livebode.session.inspection import inspect  # with its statistics half a second to import
+
     found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output)
     if as_json:
         print(to_json(found.plain()))

@@ -164,7 +164,7 @@ class Tracker:
         pair = np.stack([signals["output"][:, lines], signals[s.method.denominator][:, lines]]) * reference.conj()
         powers = np.stack([power(reference), power(signals["output"][:, lines]), self._quiet_power(signals, pair)])
         excited = self._watch.excited(powers[0], rows.whole, _EXCITED)
-        usable = rows.clean & excited.all(axis=1)
+        usable = rows.clean & excited.any(axis=1)
         place = int((rows.sample[0] + 1) % s.lines.window // s.step - 1) % self._places if usable.size else 0
         first = rows.sample - s.lines.window + 1
         moment = np.concatenate([moment, first[np.newaxis]])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
 
 from livebode.estimation.bounds import power
 from livebode.nouns import Block, InputError, Lines, Response
@@ -71,6 +70,8 @@ def welch(
     if not np.isfinite(u.sum() + y.sum() + w.sum()):
         raise InputError("the recording holds samples that are not finite; cut it before or after them")
 
+    from scipy import signal  # takes half a second to import
+
     def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         _, s = signal.csd(
             a, b, fs=block.rate_hz, window=taper, nperseg=window, noverlap=window - step, detrend="constant"
@@ -100,7 +101,9 @@ def welch(
 
 def _independent_segments(segments: int, step: int, window: int, taper: str) -> float:
     """How many segments without overlap would average as well (Welch 1967), for noise that is smooth over a bin."""
-    shape = signal.get_window(taper, window)
+    from scipy.signal import get_window
+
+    shape = get_window(taper, window)
     shifts = np.arange(1, min(segments, -(-window // step)))
     overlaps = np.array([np.dot(shape[k * step :], shape[: window - k * step]) for k in shifts])
     correlation = (overlaps / np.dot(shape, shape)) ** 2

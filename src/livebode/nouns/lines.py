@@ -159,7 +159,10 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
         return [parts[0] * unit]
     start, stop, step = parts
     if step <= 0 or stop < start:
-        raise InputError(f"the range {item!r} is empty; give start:stop:step with start ≤ stop and step > 0")
+        swapped = (
+            f"; did you mean {float(start):g}:{float(step):g}:{float(stop):g}?" if stop > 0 and start <= step else ""
+        )
+        raise InputError(f"the range {item!r} is empty; give start:stop:step with start ≤ stop and step > 0{swapped}")
     count = floor((stop - start) / step) + 1
     if count > _LINES_MAX:
         raise InputError(f"the range {item!r} has {count} lines, more than {_LINES_MAX}; take a larger step")

@@ -48,9 +48,13 @@ class RunDirectory:
         with _disk_errors(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.partial = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.partial-", dir=self.path.parent))
-            self.partial.chmod(0o755)
-            self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
-            self._responses = ResponseTable(self.partial / "responses.parquet")
+            try:
+                self.partial.chmod(0o755)
+                self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
+                self._responses = ResponseTable(self.partial / "responses.parquet")
+            except BaseException:
+                shutil.rmtree(self.partial, ignore_errors=True)
+                raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:

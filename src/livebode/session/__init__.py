@@ -1,7 +1,6 @@
 """From a source to the record: what one run of livebode does."""
 
 from livebode.session.axis import Axis
-from livebode.session.inspection import Inspection, inspect
-from livebode.session.run import Outcome, run
+from livebode.session.tracking import Outcome, run
 
-__all__ = ["Axis", "Inspection", "Outcome", "inspect", "run"]
+__all__ = ["Axis", "Outcome", "run"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from livebode.nouns import Responses
 
-_ROWS_MAX = 4096
+_ROWS_MAX = 2048
 
 
 class Overview:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.estimation import Settings
-from livebode.excitation import recognise
 from livebode.nouns import InputError, Lines
 from livebode.session.axis import Axis
 from livebode.sources import Log
@@ -42,6 +41,9 @@ def _lines(axis: Axis, log: Log) -> Lines:
     reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
     if reference is None:
         raise InputError("lines or window are 'auto', but no excitation is named to find them from; name its channel")
+    # Its statistics take half a second to import, which a run with known lines is spared.
+    from livebode.excitation import recognise
+
     found = recognise(beginning(log, reference), log.rate_hz)
     if window == "auto":
         window = found.period
