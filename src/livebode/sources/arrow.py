@@ -1,4 +1,4 @@
-"""Arrow IPC, the file format (also called Feather 2) and the stream format: batch by batch from the mapped file."""
+"""Arrow IPC, the file format (also called Feather 2) and the stream format: batch by batch."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ArrowRecording(Recording):
             self.scalars = schema_scalars(reader.schema)
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        del rows  # batches are as the writer cut them, and mapped, not read
+        del rows  # batches are as the writer cut them
         wanted = sorted({column.key for column in columns})
         places = [wanted.index(column.key) for column in columns]
         with self._opened(wanted) as reader:
@@ -42,7 +42,7 @@ class ArrowRecording(Recording):
         self, fields: list[int] | None
     ) -> Iterator[pa.ipc.RecordBatchFileReader | pa.ipc.RecordBatchStreamReader]:
         options = pa.ipc.IpcReadOptions(included_fields=fields)
-        with pa.memory_map(str(self.path)) as file:
+        with pa.OSFile(str(self.path)) as file:  # not mapped: a mapped file that shrinks kills the process
             if self._is_file:
                 with pa.ipc.open_file(file, options=options) as reader:
                     yield reader

@@ -19,7 +19,7 @@ from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.tidy import Tidied
 from livebode.sources.units import split_units
 
-ARROW_BLOCK_BYTES = 1 << 22
+ARROW_BLOCK_BYTES = 1 << 20
 """Arrow parses pieces of this size; no line can be longer."""
 
 

@@ -196,7 +196,7 @@ def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: 
     if recording.rate_hz is not None:
         stated = recording.rate_hz, "metadata"
     if column is not None:
-        chunks = guarded(recording.chunks([column], 1 << 18), recording.path, recording.format)
+        chunks = guarded(recording.chunks([column], 1 << 16), recording.path, recording.format)
         return clock_from_time(column, unit, chunks, rate_hz, stated)
     if rate_hz is not None:
         if recording.rate_hz is not None and abs(recording.rate_hz / rate_hz - 1) > 1e-3:

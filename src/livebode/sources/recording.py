@@ -121,9 +121,10 @@ def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:
 
 def stacked(chunk: Chunk) -> NDArray[np.float64]:
     """The arrays of a chunk as rows of float64, shape (channels, samples); one float64 array is not copied."""
-    if len(chunk) == 1:
-        return np.asarray(chunk[0], dtype=np.float64)[np.newaxis]
-    data = np.empty((len(chunk), len(chunk[0])))
-    for row, values in zip(data, chunk, strict=True):
-        row[:] = values
+    with np.errstate(all="ignore"):  # wider types than float64 may overflow to infinity
+        if len(chunk) == 1:
+            return np.asarray(chunk[0], dtype=np.float64)[np.newaxis]
+        data = np.empty((len(chunk), len(chunk[0])))
+        for row, values in zip(data, chunk, strict=True):
+            row[:] = values
     return data
