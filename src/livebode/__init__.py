@@ -1,5 +1,89 @@
-"""livebode: the Bode plot of a machine while the machine works."""
+"""livebode: the Bode plot of a machine while the machine works.
 
+The names below are the public face; everything is importable from here and loaded when it is first used.
+"""
+
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from livebode.estimation import Settings, Tracker, welch
+    from livebode.excitation import Excitation, multisine, recognise
+    from livebode.kernel import SlidingDFT
+    from livebode.nouns import (
+        PID,
+        Block,
+        Cascade,
+        Channel,
+        Event,
+        GridError,
+        InputError,
+        Lines,
+        Loop,
+        Model,
+        PositionPD,
+        Response,
+        Responses,
+    )
+    from livebode.sources import Log, open_log
 
 __version__ = version("livebode")
+
+_HOME = {
+    "estimation": ("Settings", "Tracker", "welch"),
+    "excitation": ("Excitation", "multisine", "recognise"),
+    "kernel": ("SlidingDFT",),
+    "nouns": (
+        "PID",
+        "Block",
+        "Cascade",
+        "Channel",
+        "Event",
+        "GridError",
+        "InputError",
+        "Lines",
+        "Loop",
+        "Model",
+        "PositionPD",
+        "Response",
+        "Responses",
+    ),
+    "sources": ("Log", "open_log"),
+}
+_MODULE = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "PID",
+    "Block",
+    "Cascade",
+    "Channel",
+    "Event",
+    "Excitation",
+    "GridError",
+    "InputError",
+    "Lines",
+    "Log",
+    "Loop",
+    "Model",
+    "PositionPD",
+    "Response",
+    "Responses",
+    "Settings",
+    "SlidingDFT",
+    "Tracker",
+    "multisine",
+    "open_log",
+    "recognise",
+    "welch",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module 'livebode' has no attribute {name!r}")
+    return getattr(import_module(f"livebode.{_MODULE[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -148,7 +148,7 @@ class LineSpectra:
             spectrum, position = spectrum[:, chosen], position[chosen]
         if not self._plain:
             spectrum = spectrum * self._after[:, np.newaxis, :]
-        return spectrum, position + offset
+        return np.asarray(spectrum, dtype=np.complex128), (position + offset).astype(np.int64)
 
     def _without(
         self, bad: NDArray[np.intp], kind: int, samples: int, position: NDArray[np.int64]
