@@ -6,6 +6,7 @@ import errno
 import os
 import random
 import re
+import struct
 import subprocess
 import sys
 import zipfile
@@ -77,7 +78,7 @@ def text(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
         (bytes(range(256)) * 8, "not CSV, whatever its ending says"),
         ("1" * 300_000, "longer than"),
         ("", "is empty"),
-        ("a,b\nx,1\n", "'x'|no channel|rate"),
+        ("t;u\n0;1.234,5\n1;2.345,6\n", "no channel but the time .'u': it holds text"),
     ],
 )
 def test_tables_that_are_refused(tmp_path, content, expected):
@@ -166,6 +167,17 @@ def test_sizes_that_are_declared_and_not_there(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"x": np.arange(100.0)})
     raw = (tmp_path / "a.mat").read_bytes().replace(b"\x64\0\0\0", b"\xff\xff\xff\x7f")
     assert "declares 2147483647 values" in refused(text(tmp_path, raw, "b.mat"), rate_hz=1)
+
+
+@pytest.mark.parametrize("kind", [0, 10, 14, 40, 0x7F00])
+def test_an_element_type_that_matlab_does_not_have(tmp_path, kind):
+    """SciPy looks such a type up behind the end of its table, which ends the process."""
+    scipy.io.savemat(tmp_path / "a.mat", {"x": np.arange(100.0) + 0.5})
+    tag = struct.pack("<II", 9, 800)
+    raw = (tmp_path / "a.mat").read_bytes()
+    assert raw.count(tag) == 1
+    path = text(tmp_path, raw.replace(tag, struct.pack("<II", kind, 800)), "b.mat")
+    assert f"an element of type {kind} where none can be" in refused(path, rate_hz=1)
 
 
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):

@@ -67,6 +67,11 @@ def test_preamble_as_wide_as_the_table(tmp_path):
     assert samples(log, "t", "u").tolist() == [[0, 0.001], [1, 2]]
 
 
+def test_what_excel_writes_above_a_table(tmp_path):
+    log = opened(tmp_path, "sep=;\nt;u\n0;1\n0,5;2\n")
+    assert (log.rate_hz, samples(log, "u").tolist()) == (2, [[1, 2]])
+
+
 def test_a_delimiter_that_ends_each_line(tmp_path):
     for header in ("t;u;", "t;u"):
         log = opened(tmp_path, f"{header}\n0;1;\n0,5;2;\n")

@@ -22,6 +22,8 @@ EMPTY = frozenset([*(" " * count for count in range(33)), *WORDS, *(f'"{word}"' 
 """Cells that mean "no value"."""
 NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+SEPARATOR = re.compile(r"sep=.\s*$", re.IGNORECASE)
+"""What Excel writes above a table; the table itself tells more surely."""
 COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
 UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 
@@ -161,7 +163,7 @@ def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:
     lines, at = [], 0
     for number, line in enumerate(text.splitlines(keepends=True) if "\r" not in text else split_ends(text), start=1):
         complete = whole or line.endswith(("\n", "\r"))
-        if complete and line.strip() and not is_comment(line):
+        if complete and line.strip() and not is_comment(line) and not (number == 1 and SEPARATOR.match(line)):
             lines.append(Line(number, at, line.rstrip("\r\n")))
         at += len(line)
         if len(lines) >= SAMPLE_LINES:
@@ -251,7 +253,7 @@ def find_header(
     """
     width = len(kinds)
     lengths = (width, width - 1) if trailing and width > 1 else (width,)
-    heads = [at for at, cells in enumerate(table[:-1]) if len(cells) in lengths and is_words(cells, decimal)]
+    heads = [at for at, cells in enumerate(table[:-1]) if len(cells) in lengths and is_words(cells, decimal, trailing)]
     for at in heads:
         header, below = padded(table[at], width), table[at + 1]
         if fits(below, kinds, decimal):
@@ -266,9 +268,9 @@ def find_header(
     return first, [], []
 
 
-def is_words(cells: list[str], decimal: str) -> bool:
+def is_words(cells: list[str], decimal: str, trailing: bool) -> bool:
     """True for a line that may be a header: no value and no gap in it, but for a delimiter at its end."""
-    body = cells if cells[-1] or len(cells) == 1 else cells[:-1]
+    body = cells[:-1] if trailing and len(cells) > 1 and not cells[-1] else cells
     return all(body) and no_values(body, decimal)
 
 

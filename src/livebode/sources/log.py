@@ -183,9 +183,10 @@ def open_log(
     recording = open_recording(Path(path))
     columns = together(recording, channels)
     time_column, unit = find_time(columns, time)
-    clock = find_clock(recording, time_column, unit, rate_hz)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
-    log = Log(recording, columns, chosen, clock)
+    if not chosen:
+        raise InputError(f"{recording.path} holds no channel but the time{reasons(recording)}")
+    log = Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz))
     log.block_samples = block_samples
     return log
 

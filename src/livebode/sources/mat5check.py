@@ -23,6 +23,10 @@ CLASSES = {
 }  # fmt: skip
 CELL, STRUCT, OBJECT, FUNCTION, OPAQUE = 1, 2, 3, 16, 17
 COMPLEX = 0x0800
+FLAGS, DIMENSIONS, TEXT = frozenset({6}), frozenset({5}), frozenset({1, 16})
+VALUES = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18})
+"""Types of elements: integers of 8 to 32 bits, single, double, 64 bits, UTF-8, UTF-16, UTF-32."""
+DIMENSIONS_MAX = 32
 DEPTH_MAX = 32
 ELEMENTS_MAX = 1_000_000
 UNPACKED_MAX = 1 << 34
@@ -157,23 +161,29 @@ class Walk:
             raise InputError(f"a variable declares {length} bytes where {room - 8} are left; is the file whole?")
         return kind, length
 
-    def element(self, room: int, keep: int) -> tuple[bytes, int, int]:
+    def element(self, room: int, keep: int, types: frozenset[int]) -> tuple[bytes, int, int]:
         """Read one element: its first `keep` bytes, its length, and the room that is left after it.
 
-        Up to four bytes may stand inside the tag itself; a type above 65535 tells it.
+        Its type must be among `types`: SciPy looks types up in a table without asking whether they are in it. Up to
+        four bytes may stand inside the tag itself; a type above 65535 tells it.
         """
         raw = self.source.read(8)
         if len(raw) < 8 or room < 8:
             raise InputError("a variable ends in the middle of a tag; is the file whole?")
-        first, second = struct.unpack(self.order + "II", raw)
-        if first >> 16:
-            return raw[4 : 4 + min(4, first >> 16)], first >> 16, room - 8
-        padded = second + -second % 8
-        if second > room - 8:
-            raise InputError(f"a variable declares {second} bytes where {room - 8} are left; is the file whole?")
-        data = self.source.read(min(second, keep))
-        self.source.skip(min(padded, room - 8) - len(data))
-        return data, second, max(0, room - 8 - padded)
+        kind, length = struct.unpack(self.order + "II", raw)
+        inside = kind >> 16
+        if inside:
+            kind, length = kind & 0xFFFF, inside
+        if kind not in types:
+            raise InputError(f"a variable holds an element of type {kind} where none can be; is the file damaged?")
+        if length > (4 if inside else room - 8):
+            raise InputError(f"a variable declares {length} bytes where {room - 8} are left; is the file whole?")
+        if inside:
+            return raw[4 : 4 + length], length, room - 8
+        padded = min(length + -length % 8, room - 8)
+        data = self.source.read(min(length, keep))
+        self.source.skip(padded - len(data))
+        return data, length, room - 8 - padded
 
     def matrix(self, room: int, depth: int) -> Variable:
         """Check a matrix of `room` bytes, and those inside it; its head."""
@@ -182,53 +192,66 @@ class Walk:
             raise InputError(f"the file nests deeper than {DEPTH_MAX} or has more than {ELEMENTS_MAX} elements")
         if room == 0:
             return Variable("", "double", (0, 0))
-        raw, _, room = self.element(room, 8)
+        raw, _, room = self.element(room, 8, FLAGS)
         if len(raw) < 8:
             raise InputError("a variable has no flags; is the file damaged?")
         flags = struct.unpack(self.order + "I", raw[:4])[0]
         kind = flags & 0xFF
         if kind not in CLASSES:
             raise InputError(f"a variable is of class {kind}, which MATLAB does not have; is the file damaged?")
-        if kind in (OPAQUE, FUNCTION):
-            raw, _, room = self.element(room, 64)
-            self.source.skip(room)
-            return Variable(raw.decode("latin-1") if kind == OPAQUE else "", CLASSES[kind])
-        raw, _, room = self.element(room, 256)
+        if kind == OPAQUE:
+            return Variable(self._opaque(room, depth), CLASSES[kind])
+        raw, _, room = self.element(room, 4 * DIMENSIONS_MAX + 4, DIMENSIONS)
         shape = struct.unpack(f"{self.order}{len(raw) // 4}i", raw[: len(raw) // 4 * 4])
-        if len(shape) < 2 or any(length < 0 for length in shape):
-            raise InputError(f"a variable declares the dimensions {shape}; is the file damaged?")
-        name, _, room = self.element(room, 64)
+        if not 2 <= len(shape) <= DIMENSIONS_MAX or any(length < 0 for length in shape):
+            raise InputError(f"a variable declares the dimensions {shape[:4]}…; is the file damaged?")
+        name, _, room = self.element(room, 64, TEXT)
         if kind in (CELL, STRUCT, OBJECT):
             self._nested(kind, math.prod(shape), room, depth)
+        elif kind == FUNCTION:
+            self._inner(room, depth)
         else:
             self._values(math.prod(shape) if CLASSES[kind] != "sparse" else 0, room)
         return Variable(name.decode("latin-1"), CLASSES[kind], shape, bool(flags & COMPLEX))
+
+    def _opaque(self, room: int, depth: int) -> str:
+        """An object that only MATLAB understands: its name, two more texts and a matrix."""
+        texts = []
+        for _ in range(3):
+            text, _, room = self.element(room, 64, TEXT)
+            texts.append(text)
+        self._inner(room, depth)
+        return texts[0].decode("latin-1")
+
+    def _inner(self, room: int, depth: int) -> int:
+        """Check a matrix inside another; the room that is left after it."""
+        inner, length = self.tag(room)
+        if inner != MATRIX:
+            raise InputError(f"a variable holds an element of type {inner} for a matrix; is the file damaged?")
+        self.matrix(length, depth + 1)
+        return room - 8 - length
 
     def _values(self, count: int, room: int) -> None:
         """Real and imaginary part of a matrix of `count` values, a byte each at least."""
         if count > room:
             raise InputError(f"a variable declares {count} values where {room} bytes are left; is the file whole?")
         while room >= 8:
-            _, _, room = self.element(room, 0)
+            _, _, room = self.element(room, 0, VALUES)
         self.source.skip(room)
 
     def _nested(self, kind: int, count: int, room: int, depth: int) -> None:
         if kind == OBJECT:
-            _, _, room = self.element(room, 64)  # the class name
+            _, _, room = self.element(room, 64, TEXT)  # the class name
         fields = 1
         if kind != CELL:
-            raw, _, room = self.element(room, 4)
+            raw, _, room = self.element(room, 4, DIMENSIONS)
             width = struct.unpack(self.order + "i", raw)[0] if len(raw) == 4 else 0
             if width <= 0:
                 raise InputError(f"a struct declares field names of {width} bytes; is the file damaged?")
-            _, length, room = self.element(room, 0)
+            _, length, room = self.element(room, 0, TEXT)
             fields = length // width
         if count * fields * 8 > room:
             raise InputError(f"a struct or cell declares {count} × {fields} parts where {room} bytes are left")
         for _ in range(count * fields):
-            inner, length = self.tag(room)
-            if inner != MATRIX:
-                raise InputError(f"a struct or cell holds an element of type {inner}; is the file damaged?")
-            self.matrix(length, depth + 1)
-            room -= 8 + length
+            room = self._inner(room, depth)
         self.source.skip(max(0, room))
