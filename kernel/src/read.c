@@ -12,7 +12,7 @@ static const real window_taps[3][3] = {
 static void rotate(const LB_DFT *t, size_t bins, int sign, real *out)
 {
     int backwards;
-    const real *row = lb_row(t, t->index, &backwards);
+    const real *row = lb_next_row(t, &backwards);
     for (size_t b = 0; b < bins; ++b) {
         const real re = out[2 * b], im = out[2 * b + 1];
         const real c = row[lb_cos_at(b)], sine = row[lb_cos_at(b) + LB_BLOCK];

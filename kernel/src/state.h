@@ -57,6 +57,15 @@ static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards
     return t->table + (size_t)(*backwards ? t->window - index : index) * t->row_length;
 }
 
+/* The row that demodulates the sums now: the next sample's, as the last one's direction finds it. It is the same row
+ * as lb_row's where the directions meet, and yet another sign of its zeros. */
+static inline const real *lb_next_row(const LB_DFT *t, int *backwards)
+{
+    const uint32_t last = (t->index ? t->index : t->window) - 1u;
+    *backwards = last >= t->half;
+    return t->table + (size_t)(*backwards ? t->window - last - 1u : last + 1u) * t->row_length;
+}
+
 static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + channel * t->blocks * 4 * LB_BLOCK; }
 
 /* The instruction set's kernel, or null. */

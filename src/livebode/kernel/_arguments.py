@@ -114,11 +114,11 @@ def _as_real(x: object, is_double: bool) -> Array:
 
 def as_sample(x: object, channels: int, is_double: bool) -> Array:
     """One sample of every channel, contiguous."""
-    array = np.ascontiguousarray(_as_real(x, is_double))
-    if array.shape != (channels,) and not (channels == 1 and np.ndim(x) == 0):  # type: ignore[arg-type]
+    array = _as_real(x, is_double)
+    if array.shape != (channels,) and not (channels == 1 and array.ndim == 0):
         want = "a number" if channels == 1 else f"{channels} numbers, one a channel"
-        raise ValueError(f"a sample of shape {np.shape(x)} was pushed; give {want}")  # type: ignore[arg-type]
-    return array
+        raise ValueError(f"a sample of shape {array.shape} was pushed; give {want}")
+    return np.ascontiguousarray(array)
 
 
 def as_samples(x: object, channels: int, is_double: bool) -> Array:

@@ -328,10 +328,10 @@ NB_MODULE(_native, m) {
         .def_prop_ro("count", &Engine::count)
         .def("_instruction_set", &Engine::instruction_set)
         .def("push", &Engine::push)
-        .def("process", &Engine::process, nb::arg("x"), nb::arg("hop") = 1, nb::arg("out") = nb::none(),
-             nb::arg("phase") = "window")
+        .def("process", &Engine::process, nb::arg("x").none(), nb::arg("hop").none() = 1, nb::arg("out") = nb::none(),
+             nb::arg("phase").none() = "window")
         .def("advance", &Engine::advance)
-        .def("spectrum", &Engine::spectrum, nb::arg("phase") = "window")
+        .def("spectrum", &Engine::spectrum, nb::arg("phase").none() = "window")
         .def("snapshot", &Engine::snapshot)
         .def("restore", &Engine::restore)
         .def("reset", &Engine::reset);
