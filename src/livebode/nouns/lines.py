@@ -158,11 +158,11 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
     if len(parts) == 1:
         return [parts[0] * unit]
     start, stop, step = parts
-    if step <= 0 or stop < start:
+    if step <= 0 or stop < start or step > stop:
         swapped = (
             f"; did you mean {float(start):g}:{float(step):g}:{float(stop):g}?" if stop > 0 and start <= step else ""
         )
-        raise InputError(f"the range {item!r} is empty; give start:stop:step with start ≤ stop and step > 0{swapped}")
+        raise InputError(f"the range {item!r} is no start:stop:step with start ≤ stop and 0 < step ≤ stop{swapped}")
     count = floor((stop - start) / step) + 1
     if count > _LINES_MAX:
         raise InputError(f"the range {item!r} has {count} lines, more than {_LINES_MAX}; take a larger step")

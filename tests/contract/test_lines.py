@@ -1,0 +1,89 @@
+"""Lines: what is on the grid, and what is said about what is not."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from livebode.nouns import GridError, InputError, Lines
+
+
+@given(window=st.integers(8, 5000), rate_hz=st.sampled_from([1000, 2500, 4000, 8000.0]), data=st.data())
+def test_every_bin_parses_back_from_its_frequency(window: int, rate_hz: float, data: st.DataObject) -> None:
+    bins = data.draw(st.sets(st.integers(1, (window - 1) // 2), min_size=1, max_size=8))
+    text = ",".join(repr(k * rate_hz / window) for k in bins)
+    lines = Lines.parse(text, rate_hz, window)
+    assert lines.bins == tuple(sorted(bins))
+    assert np.allclose(lines.frequency_hz, np.array(lines.bins) * rate_hz / window, rtol=1e-15)
+    assert np.allclose(lines.z, np.exp(2j * np.pi * lines.frequency_hz / rate_hz))
+    assert set(lines.quiet) == set(range(min(bins), max(bins))) - bins
+
+
+@given(window=st.integers(10, 3000), tenths=st.integers(1, 20_000))
+def test_the_windows_that_would_fit_do_fit(window: int, tenths: int) -> None:
+    frequency, rate_hz = tenths / 10, 4000
+    try:
+        assert Lines.parse(str(frequency), rate_hz, window).frequency_hz[0] == pytest.approx(frequency, rel=1e-5)
+    except GridError as error:
+        if "nearest" not in str(error):
+            assert frequency >= rate_hz / 2 or frequency < rate_hz / window
+            return
+        near, fitting = re.search(r"nearest lines? (?:are|is) (.*?) Hz, and (.*)", str(error)).groups()
+        for line in near.split(" and "):
+            assert abs(float(line) - frequency) < rate_hz / window
+        for size in re.findall(r"\d+", fitting):
+            assert Lines.parse(str(frequency), rate_hz, int(size)).frequency_hz[0] == pytest.approx(frequency)
+
+
+@pytest.mark.parametrize(
+    ("text", "bins"),
+    [
+        ("20:140:20", (2, 4, 6, 8, 10, 12, 14)),
+        ("20:145:20", (2, 4, 6, 8, 10, 12, 14)),
+        (" 140 , 20:60:20 ", (2, 4, 6, 14)),
+        ("k=3:9:2, 100", (3, 5, 7, 9, 10)),
+        ("k=1:4", (1, 2, 3, 4)),
+    ],
+)
+def test_ranges_are_inclusive_and_commas_join(text: str, bins: tuple[int, ...]) -> None:
+    assert Lines.parse(text, rate_hz=4000, window=400).bins == bins
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "'' in lines '' cannot be read"),
+        ("20:140", "'20:140' in lines"),
+        ("20:140:20:3", "'20:140:20:3'"),
+        ("20:20:140", "did you mean 20:140:20?"),
+        ("20:5:120", "did you mean 20:120:5?"),
+        ("40:20:5", "no start:stop:step"),
+        ("1/0", "cannot be read"),
+        ("nan", "cannot be read"),
+        ("0", "0 Hz is not between 0 and the Nyquist frequency 2000 Hz"),
+        ("-20", "-20 Hz is not between"),
+        ("2000", "2000 Hz is not between"),
+        ("10:1990:0.00001", "take a larger step"),
+        ("20,20", "bin 2 (20 Hz) is named more than once"),
+    ],
+)
+def test_what_cannot_be_a_line(text: str, says: str) -> None:
+    with pytest.raises(InputError) as refused:
+        Lines.parse(text, rate_hz=4000, window=400)
+    assert says in str(refused.value)
+
+
+@pytest.mark.parametrize("window", [0, -4, 2, 2.5, True, "400"])
+def test_windows_that_cannot_be(window: object) -> None:
+    with pytest.raises(GridError, match="window="):
+        Lines.parse("20", rate_hz=4000, window=window)
+
+
+@pytest.mark.parametrize("rate_hz", [0, -1, float("nan"), float("inf")])
+def test_rates_that_cannot_be(rate_hz: float) -> None:
+    with pytest.raises(InputError, match="rate_hz="):
+        Lines.parse("20", rate_hz=rate_hz, window=400)
