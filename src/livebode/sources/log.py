@@ -24,12 +24,14 @@ class Log:
     Nothing but the time column is read before `blocks` is iterated; every call of `blocks` reads from the start.
     """
 
-    def __init__(self, recording: Recording, columns: Sequence[Column], chosen: Sequence[str], clock: Clock) -> None:
+    def __init__(
+        self, recording: Recording, columns: Sequence[Column], chosen: Sequence[str], clock: Clock, block_samples: int
+    ) -> None:
         self._recording = recording
         self._columns = tuple(columns)
         self._chosen = tuple(chosen)
         self._clock = clock
-        self.block_samples = 65536
+        self._block_samples = block_samples
 
     @property
     def path(self) -> Path:
@@ -114,7 +116,7 @@ class Log:
         InputError
             At once for a missing channel; while iterating for damage further down in the file.
         """
-        limit = checked_block_samples(self.block_samples if block_samples is None else block_samples)
+        limit = checked_block_samples(self._block_samples if block_samples is None else block_samples)
         names = list(self._chosen if channels is None else channels)
         if isinstance(channels, str) or not names:
             raise InputError(f"channels={channels!r} is not a list of at least one channel name")
@@ -186,9 +188,7 @@ def open_log(
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
     if not chosen:
         raise InputError(f"{recording.path} holds no channel but the time{reasons(recording)}")
-    log = Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz))
-    log.block_samples = block_samples
-    return log
+    return Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz), block_samples)
 
 
 def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: float | None) -> Clock:
