@@ -1,6 +1,7 @@
 """Where samples come from: recordings of every usual format, as Blocks."""
 
-from livebode.sources.log import Log, open_log
+from livebode.sources.log import Log
+from livebode.sources.opening import open_log
 from livebode.sources.recording import Skipped
 from livebode.sources.sinumerik import SinumerikSpectra, sinumerik_spectra
 from livebode.sources.steps import Gap

@@ -12,8 +12,9 @@ import pyarrow as pa
 from pyarrow import csv
 
 from livebode.nouns import InputError
+from livebode.sources.cells import EMPTY, Kind
 from livebode.sources.columnar import to_numpy
-from livebode.sources.dialect import EMPTY, Kind, find_dialect
+from livebode.sources.dialect import find_dialect
 from livebode.sources.locate import locate
 from livebode.sources.recording import Chunk, Column, Recording, Skipped
 from livebode.sources.tidy import Tidied

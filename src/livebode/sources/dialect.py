@@ -7,33 +7,21 @@ import csv
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
-from enum import Enum
 from pathlib import Path
 
 from livebode.nouns import InputError
+from livebode.sources.cells import EMPTY, Kind, is_comment, is_value, kind_of, zoned
+from livebode.sources.header import find_header, fits
 from livebode.sources.recording import COLUMNS_MAX
 
 SAMPLE_BYTES = 1 << 18
 SAMPLE_LINES = 400
 DELIMITERS = "\t", ";", ",", "|", " ", ""
 """In the order that settles a tie; a blank stands for runs of blanks, the empty one for a single column."""
-WORDS = "NA", "N/A", "#N/A", "NaN", "nan", "NAN", "-nan", "-NaN", "null", "NULL", "None", "1.#QNAN", "1.#IND", "-1.#IND"
-EMPTY = frozenset([*(" " * count for count in range(33)), *WORDS, *(f'"{word}"' for word in ("", "NaN"))])
-"""Cells that mean "no value"."""
-NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
-MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 SEPARATOR = re.compile(r"sep=.\s*$", re.IGNORECASE)
 """What Excel writes above a table; the table itself tells more surely."""
 COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
 UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
-
-
-class Kind(Enum):
-    """What a column holds."""
-
-    NUMBER = "numbers"
-    MOMENT = "moments"
-    TEXT = "text"
 
 
 @dataclass(frozen=True)
@@ -95,28 +83,6 @@ class Layout:
     score: tuple[float, bool, int]
     dialect: Dialect
     start: Line
-
-
-def is_number(cell: str, decimal: str = ".") -> bool:
-    """
-    >>> is_number("-1.5e3"), is_number("1,5"), is_number("1,5", ","), is_number("abc")
-    (True, False, True, False)
-    """
-    if decimal != ".":
-        cell = cell.replace(".", "x").replace(decimal, ".")
-    return NUMBER.fullmatch(cell) is not None
-
-
-def is_moment(cell: str) -> bool:
-    """
-    >>> is_moment("2024-05-01 12:00:00.000250"), is_moment("12:00")
-    (True, False)
-    """
-    return MOMENT.fullmatch(cell) is not None
-
-
-def is_comment(line: str) -> bool:
-    return line.lstrip().startswith(("#", "%"))
 
 
 def find_dialect(path: Path) -> Dialect:
@@ -217,82 +183,8 @@ def fitting_share(rows: list[list[str]], kinds: tuple[Kind, ...], decimal: str) 
     return sum(fits(cells, kinds, decimal) for cells in rows) / max(len(rows), 1)
 
 
-def is_value(cell: str, decimal: str) -> bool:
-    return is_number(cell, decimal) or is_moment(cell)
-
-
-def zoned(cell: str) -> bool:
-    match = MOMENT.fullmatch(cell)
-    return bool(match and match["zone"])
-
-
-def kind_of(cells: list[str], decimal: str) -> Kind:
-    """What a column holds: text only where no cell is a value, so that text among numbers is found as an error."""
-    filled = [cell for cell in cells if cell not in EMPTY]
-    if any(is_number(cell, decimal) for cell in filled) or not filled:
-        return Kind.NUMBER
-    return Kind.MOMENT if any(is_moment(cell) for cell in filled) else Kind.TEXT
-
-
 def drop_trailing(kinds: tuple[Kind, ...], header: list[str], columns: list[list[str]]) -> tuple[Kind, ...]:
     """The kinds, with a last column that has neither heading nor values (a delimiter ends each line) as text."""
     if len(kinds) > 1 and not any(columns[-1]) and not (header and header[-1]):
         return (*kinds[:-1], Kind.TEXT)
     return kinds
-
-
-def find_header(
-    table: list[list[str]], kinds: tuple[Kind, ...], decimal: str, *, trailing: bool
-) -> tuple[int, list[str], list[str]]:
-    """Index of the first row of values, the header above it and the units between them (each empty without).
-
-    `trailing` says that each row ends in a delimiter, which the header may lack.
-
-    The header is the first line of words as wide as the table above a row that fits the table; a line of preamble may
-    be as wide, but what follows it does not fit.
-    """
-    width = len(kinds)
-    lengths = (width, width - 1) if trailing and width > 1 else (width,)
-    heads = [at for at, cells in enumerate(table[:-1]) if len(cells) in lengths and is_words(cells, decimal, trailing)]
-    for at in heads:
-        header, below = padded(table[at], width), table[at + 1]
-        if fits(below, kinds, decimal):
-            return at + 1, header, []
-        if len(below) in lengths and no_values(below, decimal) and fits_at(table, at + 2, kinds, decimal):
-            return at + 2, header, [unit.strip("[]()-") for unit in padded(below, width)]
-    first = next(
-        at for at, cells in enumerate(table) if len(cells) == width and any(is_value(cell, decimal) for cell in cells)
-    )
-    if heads and heads[0] < first:
-        return heads[0] + 1, padded(table[heads[0]], width), []
-    return first, [], []
-
-
-def is_words(cells: list[str], decimal: str, trailing: bool) -> bool:
-    """True for a line that may be a header: no value and no gap in it, but for a delimiter at its end."""
-    body = cells[:-1] if trailing and len(cells) > 1 and not cells[-1] else cells
-    return all(body) and no_values(body, decimal)
-
-
-def no_values(cells: list[str], decimal: str) -> bool:
-    return any(cells) and not any(is_value(cell, decimal) for cell in cells)
-
-
-def fits_at(table: list[list[str]], at: int, kinds: tuple[Kind, ...], decimal: str) -> bool:
-    return at < len(table) and fits(table[at], kinds, decimal)
-
-
-def fits(cells: list[str], kinds: tuple[Kind, ...], decimal: str) -> bool:
-    if len(cells) != len(kinds):
-        return False
-    return all(cell in EMPTY or fits_kind(cell, kind, decimal) for cell, kind in zip(cells, kinds))
-
-
-def fits_kind(cell: str, kind: Kind, decimal: str) -> bool:
-    if kind is Kind.NUMBER:
-        return is_number(cell, decimal)
-    return kind is Kind.TEXT or is_moment(cell)
-
-
-def padded(cells: list[str], width: int) -> list[str]:
-    return [*cells, *[""] * (width - len(cells))]

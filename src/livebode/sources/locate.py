@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from livebode.nouns import InputError
-from livebode.sources.dialect import EMPTY, Dialect, Kind, is_comment, is_moment, is_number
+from livebode.sources.cells import EMPTY, Kind, is_comment, is_moment, is_number
+from livebode.sources.dialect import Dialect
 
 
 def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> InputError | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError, missing_channel
-from livebode.sources.formats import open_recording
+from livebode.nouns import Block, Channel, InputError
+from livebode.sources.naming import resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, stacked
-from livebode.sources.timing import Clock, Timing, clock_from_time, find_time, rate_in_file
+from livebode.sources.timing import Clock, Timing
 
 BLOCK_SAMPLES_MAX = 1 << 24
 
@@ -148,111 +147,6 @@ class Log:
             row += length
         if row == 0:
             raise InputError(f"{self.path} has no samples; is the recording whole?")
-
-
-def open_log(
-    path: str | os.PathLike[str],
-    *,
-    rate_hz: float | None = None,
-    time: str | None = None,
-    channels: Sequence[str] | None = None,
-    block_samples: int = 65536,
-) -> Log:
-    """Open a recording of any format that `docs/readers.md` lists.
-
-    Parameters
-    ----------
-    path
-        The file; its content, not its ending, decides about the format.
-    rate_hz
-        Samples per second, taken as exact. Left out, it comes from a time column or from the file's metadata.
-    time
-        Name of the time column, with its unit where the file does not say it: "clock [us]". Left out, it is found by
-        name; "none" ignores it.
-    channels
-        What to read; fixes which series belong together where the file has series of several lengths.
-    block_samples
-        Largest length of a Block.
-
-    Raises
-    ------
-    InputError
-        For anything that cannot be used, in one sentence with its remedy.
-    """
-    if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
-    checked_block_samples(block_samples)
-    recording = open_recording(Path(path))
-    columns = together(recording, channels)
-    time_column, unit = find_time(columns, time)
-    chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
-    if not chosen:
-        raise InputError(f"{recording.path} holds no channel but the time{reasons(recording)}")
-    return Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz), block_samples)
-
-
-def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: float | None) -> Clock:
-    """Rate and gaps: from the time column, from the format or a number in the file, or as given."""
-    stated = rate_in_file(recording.scalars)
-    if recording.rate_hz is not None:
-        stated = recording.rate_hz, "metadata"
-    if column is not None:
-        chunks = guarded(recording.chunks([column], 1 << 16), recording.path, recording.format)
-        return clock_from_time(column, unit, chunks, rate_hz, stated)
-    if rate_hz is not None:
-        if recording.rate_hz is not None and abs(recording.rate_hz / rate_hz - 1) > 1e-3:
-            raise InputError(
-                f"{recording.path} states {recording.rate_hz:.8g} Hz, but the given rate is {rate_hz:.8g} Hz; "
-                "correct it, or leave it out"
-            )
-        return Clock(rate_hz, "given")
-    if stated is None:
-        raise InputError(f"{recording.path} has neither a time column nor a rate; give --rate, or name the time column")
-    return Clock(*stated)
-
-
-def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
-    """The columns of the length that counts: that of `channels`, or the one that holds most of the file's values."""
-    everything = recording.columns
-    if channels:
-        asked = [resolve(name, everything, everything) for name in channels]
-        if len({column.samples for column in asked}) > 1:
-            lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(channels, asked))
-            raise InputError(f"the channels have different numbers of samples ({lengths}); name channels of one length")
-        length = asked[0].samples
-    else:
-        values: Counter[int | None] = Counter()
-        for column in everything:
-            values[column.samples] += 1 if column.samples is None else column.samples
-        length = max(values, key=lambda samples: values[samples], default=0)
-    if length is not None and length < 2:
-        raise InputError(f"{recording.path} holds no channel of at least 2 samples{reasons(recording)}")
-    return [column for column in everything if column.samples == length]
-
-
-def reasons(recording: Recording) -> str:
-    """What was skipped, for the error that nothing is left."""
-    listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
-    return f" ({'; '.join(listed)})" if listed else "; is the recording whole?"
-
-
-def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column:
-    """The column that `name` means: exactly, else by alias, else as a path that leaves out a lone (1)."""
-    found = [column for column in columns if column.name == name and not column.temporal]
-    found = found or [column for column in columns if name in column.aliases and not column.temporal]
-    plain = name.replace("(1).", ".")
-    found = found or [column for column in columns if column.name.replace("(1).", ".") == plain and not column.temporal]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        paths = ", ".join(column.name for column in found[:5])
-        raise InputError(f"channel {name!r} means more than one: {paths}; name the one by its path")
-    for column in everything:
-        if column.name == name and not column.temporal:
-            raise InputError(
-                f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}; open it on its own"
-            )
-    raise InputError(missing_channel(name, [column.name for column in columns if not column.temporal]))
 
 
 def pieces(first: int, last: int, cuts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:

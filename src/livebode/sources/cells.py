@@ -1,0 +1,59 @@
+"""What a cell of a table in text may hold: a number, a moment, nothing, or text."""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+
+WORDS = "NA", "N/A", "#N/A", "NaN", "nan", "NAN", "-nan", "-NaN", "null", "NULL", "None", "1.#QNAN", "1.#IND", "-1.#IND"
+EMPTY = frozenset([*(" " * count for count in range(33)), *WORDS, *(f'"{word}"' for word in ("", "NaN"))])
+"""Cells that mean "no value"."""
+NUMBER = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
+MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+
+
+class Kind(Enum):
+    """What a column holds."""
+
+    NUMBER = "numbers"
+    MOMENT = "moments"
+    TEXT = "text"
+
+
+def is_number(cell: str, decimal: str = ".") -> bool:
+    """
+    >>> is_number("-1.5e3"), is_number("1,5"), is_number("1,5", ","), is_number("abc")
+    (True, False, True, False)
+    """
+    if decimal != ".":
+        cell = cell.replace(".", "x").replace(decimal, ".")
+    return NUMBER.fullmatch(cell) is not None
+
+
+def is_moment(cell: str) -> bool:
+    """
+    >>> is_moment("2024-05-01 12:00:00.000250"), is_moment("12:00")
+    (True, False)
+    """
+    return MOMENT.fullmatch(cell) is not None
+
+
+def is_comment(line: str) -> bool:
+    return line.lstrip().startswith(("#", "%"))
+
+
+def is_value(cell: str, decimal: str) -> bool:
+    return is_number(cell, decimal) or is_moment(cell)
+
+
+def zoned(cell: str) -> bool:
+    match = MOMENT.fullmatch(cell)
+    return bool(match and match["zone"])
+
+
+def kind_of(cells: list[str], decimal: str) -> Kind:
+    """What a column holds: text only where no cell is a value, so that text among numbers is found as an error."""
+    filled = [cell for cell in cells if cell not in EMPTY]
+    if any(is_number(cell, decimal) for cell in filled) or not filled:
+        return Kind.NUMBER
+    return Kind.MOMENT if any(is_moment(cell) for cell in filled) else Kind.TEXT

@@ -1,0 +1,62 @@
+"""Where a table in text begins: its header, a row of units, the first row of values."""
+
+from __future__ import annotations
+
+from livebode.sources.cells import EMPTY, Kind, is_moment, is_number, is_value
+
+
+def find_header(
+    table: list[list[str]], kinds: tuple[Kind, ...], decimal: str, *, trailing: bool
+) -> tuple[int, list[str], list[str]]:
+    """Index of the first row of values, the header above it and the units between them (each empty without).
+
+    `trailing` says that each row ends in a delimiter, which the header may lack.
+
+    The header is the first line of words as wide as the table above a row that fits the table; a line of preamble may
+    be as wide, but what follows it does not fit.
+    """
+    width = len(kinds)
+    lengths = (width, width - 1) if trailing and width > 1 else (width,)
+    heads = [at for at, cells in enumerate(table[:-1]) if len(cells) in lengths and is_words(cells, decimal, trailing)]
+    for at in heads:
+        header, below = padded(table[at], width), table[at + 1]
+        if fits(below, kinds, decimal):
+            return at + 1, header, []
+        if len(below) in lengths and no_values(below, decimal) and fits_at(table, at + 2, kinds, decimal):
+            return at + 2, header, [unit.strip("[]()-") for unit in padded(below, width)]
+    first = next(
+        at for at, cells in enumerate(table) if len(cells) == width and any(is_value(cell, decimal) for cell in cells)
+    )
+    if heads and heads[0] < first:
+        return heads[0] + 1, padded(table[heads[0]], width), []
+    return first, [], []
+
+
+def is_words(cells: list[str], decimal: str, trailing: bool) -> bool:
+    """True for a line that may be a header: no value and no gap in it, but for a delimiter at its end."""
+    body = cells[:-1] if trailing and len(cells) > 1 and not cells[-1] else cells
+    return all(body) and no_values(body, decimal)
+
+
+def no_values(cells: list[str], decimal: str) -> bool:
+    return any(cells) and not any(is_value(cell, decimal) for cell in cells)
+
+
+def fits_at(table: list[list[str]], at: int, kinds: tuple[Kind, ...], decimal: str) -> bool:
+    return at < len(table) and fits(table[at], kinds, decimal)
+
+
+def fits(cells: list[str], kinds: tuple[Kind, ...], decimal: str) -> bool:
+    if len(cells) != len(kinds):
+        return False
+    return all(cell in EMPTY or fits_kind(cell, kind, decimal) for cell, kind in zip(cells, kinds))
+
+
+def fits_kind(cell: str, kind: Kind, decimal: str) -> bool:
+    if kind is Kind.NUMBER:
+        return is_number(cell, decimal)
+    return kind is Kind.TEXT or is_moment(cell)
+
+
+def padded(cells: list[str], width: int) -> list[str]:
+    return [*cells, *[""] * (width - len(cells))]
