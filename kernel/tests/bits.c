@@ -1,0 +1,82 @@
+/* Prints a hash of everything the kernel makes, over many configurations, blocks, hops and instruction sets: the
+ * same on every machine and compiler. Buffers have their exact size, so that sanitizers see what is beyond them.
+ * Exit code 1 if two instruction sets, or two ways of cutting, differ. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "livebode/sdft.h"
+
+#define CHANNELS 2u
+
+static void demand(int holds, const char *what)
+{
+    if (!holds) {
+        fprintf(stderr, "failed: %s\n", what);
+        exit(1);
+    }
+}
+#define DEMAND(x) demand((x), #x)
+
+static void *claim(size_t bytes)
+{
+    void *memory = malloc(bytes ? bytes : 1);
+    DEMAND(memory != NULL);
+    return memory;
+}
+
+static uint64_t hashed(uint64_t hash, const void *data, size_t bytes)
+{
+    for (size_t i = 0; i < bytes; ++i) {
+        hash = (hash ^ ((const unsigned char *)data)[i]) * 1099511628211u;
+    }
+    return hash;
+}
+
+/* Samples from integers alone; |x| < 4, exact in float. */
+static int32_t noise(uint32_t *state)
+{
+    *state = *state * 1664525u + 1013904223u;
+    return (int32_t)(*state >> 12) - (1 << 19);
+}
+
+#define REAL double
+#define FN(name) lb_sdft64_##name
+#define DFT lb_sdft64
+#define RUN run64
+#include "bits_of_type.h"
+#undef REAL
+#undef FN
+#undef DFT
+#undef RUN
+
+#define REAL float
+#define FN(name) lb_sdft32_##name
+#define DFT lb_sdft32
+#define RUN run32
+#include "bits_of_type.h"
+
+int main(void)
+{
+    static const uint32_t windows[] = {1, 2, 3, 7, 50, 128, 129, 300};
+    uint64_t total = 14695981039346656037u;
+    for (size_t w = 0; w < sizeof windows / sizeof *windows; ++w) {
+        for (uint32_t bins = 1; bins <= 35 && bins <= windows[w]; bins += bins < 18 ? 1 : 5) {
+            for (int variant = LB_MODULATED; variant <= LB_BLACKMAN; variant += bins % 3 ? 6 : 1) {
+                uint64_t first64 = 0, first32 = 0;
+                for (int set = LB_BASELINE; set <= (int)lb_best_instruction_set(); ++set) {
+                    const uint64_t h64 = run64(windows[w], bins, (lb_variant)variant, (lb_instruction_set)set);
+                    const uint64_t h32 = run32(windows[w], bins, (lb_variant)variant, (lb_instruction_set)set);
+                    first64 = set == LB_BASELINE ? h64 : first64;
+                    first32 = set == LB_BASELINE ? h32 : first32;
+                    DEMAND(h64 == first64);
+                    DEMAND(h32 == first32);
+                }
+                total = hashed(hashed(total, &first64, sizeof first64), &first32, sizeof first32);
+            }
+        }
+    }
+    printf("%016" PRIx64 "\n", total);
+    return 0;
+}

@@ -1,0 +1,164 @@
+"""The C kernel as C: warnings, symbols, fused instructions, sanitizers, and the same bits from every build."""
+
+import os
+import re
+import shutil
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+KERNEL = ROOT / "kernel"
+WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"]
+# The flags that kernel/CMakeLists.txt sets.
+ALWAYS = ["-ffp-contract=off"]
+SETS = {"avx2": ["-mavx2", "-mno-fma"], "avx512": ["-mavx512f", "-mavx512vl"]}
+TYPED = ["layout", "stream", "read", "recur", "snapshot", "dispatch", "tile"]
+X86 = os.uname().machine == "x86_64"
+# What compilers may call in place of a loop, even in a freestanding build.
+FREESTANDING = {"memcpy", "memset", "memmove", "memcmp"}
+
+
+def needed(program: str) -> str:
+    """A tool's path; without it the test is skipped on a laptop and fails in CI."""
+    path = shutil.which(program)
+    if path is None:
+        message = f"{program} is not installed: `make system-packages` installs it"
+        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
+    return path
+
+
+def run(*command: object) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86) -> list[Path]:
+    """All objects of the kernel."""
+    switch = ["-DLB_DISPATCH"] if dispatch else []
+    jobs = [(name, name, []) for name in ("twiddle", "machine")]
+    for bits in (32, 64):
+        jobs += [(name, f"{name}{bits}", [f"-DLB_BITS={bits}"]) for name in TYPED]
+        for name, isa in SETS.items() if dispatch else ():
+            kernel = f"-DLB_KERNEL_NAME=lb_sdft{bits}_kernel_{name}"
+            jobs.append(("tile", f"tile{bits}_{name}", [f"-DLB_BITS={bits}", kernel, *isa]))
+
+    def compile_one(job: tuple[str, str, list[str]]) -> Path:
+        source, name, extra = job
+        paths = f"-I{KERNEL / 'include'}", "-c", KERNEL / "src" / f"{source}.c", "-o", directory / f"{name}.o"
+        run(compiler, *WARNINGS, *ALWAYS, *switch, *flags, *extra, *paths)
+        return directory / f"{name}.o"
+
+    directory.mkdir(exist_ok=True)
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(compile_one, jobs))
+
+
+def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str) -> str:
+    source = KERNEL / "tests" / f"{name}.c"
+    include = f"-I{KERNEL / 'include'}"
+    run(compiler, *WARNINGS, *flags, include, source, *objects, "-o", directory / name)
+    return run(directory / name)
+
+
+Built = tuple[str, Path, list[Path]]
+
+
+def build_once(name: str, tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """The kernel as it is released, by a named compiler: built by the first test process that asks."""
+    compiler, base = needed(name), tmp_path_factory.getbasetemp()
+    directory = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / f"kernel-{name}"
+    done = directory / "done"
+    try:
+        directory.mkdir()
+    except FileExistsError:
+        deadline = time.monotonic() + 120
+        while not done.exists():
+            assert time.monotonic() < deadline, f"the other process did not build {directory}"
+            time.sleep(0.1)
+        return compiler, directory, sorted(directory.glob("*.o"))
+    objects = build(directory, compiler, "-O3", "-ffreestanding")
+    done.touch()
+    return compiler, directory, sorted(objects)
+
+
+@pytest.fixture(scope="module", params=["gcc", "clang"])
+def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
+    return build_once(request.param, tmp_path_factory)
+
+
+def test_no_object_holds_a_fused_multiply_add(built):
+    _, _, objects = built
+    for file in objects:
+        assembly = run(needed("objdump"), "-d", file)
+        assert not re.search(r"\bv?fn?m(add|sub)", assembly), f"{file.name} rounds once where others round twice"
+
+
+def test_wide_objects_use_wide_registers(built):
+    if not X86:
+        pytest.skip("instruction sets are x86-64's")
+    for name, register in (("avx2", "ymm"), ("avx512", "zmm")):
+        for bits, suffix in ((32, "ps"), (64, "pd")):
+            (file,) = (f for f in built[2] if f.name == f"tile{bits}_{name}.o")
+            assembly = run(needed("objdump"), "-d", file)
+            assert len(re.findall(rf"vmul{suffix} .*%{register}", assembly)) > 20
+
+
+def test_undefined_symbols_are_few_and_known(built):
+    own, wanted = set(), set()
+    for file in built[2]:
+        for line in run(needed("nm"), file).splitlines():
+            kind, name = line.split()[-2:]
+            (wanted if kind == "U" else own).add(name)
+    allowed = FREESTANDING | ({"__cpu_model", "__cpu_indicator_init", "_GLOBAL_OFFSET_TABLE_"} if X86 else set())
+    assert wanted - own <= allowed
+
+
+def test_misuse_is_refused(built, tmp_path):
+    compiler, _, objects = built
+    program(tmp_path, compiler, objects, "misuse")
+
+
+def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factory):
+    builds = {name: build_once(name, tmp_path_factory) for name in ("gcc", "clang")}
+    for name, flags in {
+        "gcc one by one": ["-O2", "-DLB_SCALAR", "-DLB_TILE=1", "-DLB_DENSE_TILE=1"],
+        "clang one by one": ["-O1", "-DLB_SCALAR"],
+    }.items():
+        compiler = needed(name.split()[0])
+        builds[name] = compiler, tmp_path, build(tmp_path / name, compiler, *flags, dispatch=False)
+    hashes = {}
+    for name, (compiler, _, objects) in builds.items():
+        (tmp_path / f"run {name}").mkdir()
+        hashes[name] = program(tmp_path / f"run {name}", compiler, objects, "bits")
+    assert len(set(hashes.values())) == 1, hashes
+
+
+def test_sanitizers_find_nothing(tmp_path):
+    # gcc alone: Debian's clang comes without the sanitizers' run-time library.
+    sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    compiler = needed("gcc")
+    objects = build(tmp_path / "objects", compiler, "-O0", *sanitize)
+    program(tmp_path, compiler, objects, "misuse", *sanitize)
+    program(tmp_path, compiler, objects, "bits", *sanitize)
+
+
+def test_the_documented_example_compiles_and_runs(built, tmp_path):
+    compiler, _, objects = built
+    text = (ROOT / "docs" / "kernel.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```c\n(.*?)```", text, re.S)
+    (expected,) = re.findall(r"```text prints\n(.*?)```", text, re.S)
+    source = tmp_path / "example.c"
+    source.write_text(example, encoding="utf-8")
+    run(compiler, *WARNINGS, f"-I{KERNEL / 'include'}", source, *objects, "-o", tmp_path / "example")
+    assert run(tmp_path / "example") == expected
+
+
+def test_the_header_is_also_cpp(tmp_path):
+    source = tmp_path / "header.cpp"
+    source.write_text('#include "livebode/sdft.h"\nint main() { return lb_best_instruction_set() == LB_BEST; }\n')
+    run(needed("g++"), "-Wall", "-Wextra", "-Werror", f"-I{KERNEL / 'include'}", "-c", source, "-o", tmp_path / "o")
