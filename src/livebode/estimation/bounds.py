@@ -22,10 +22,5 @@ def between_periods(moments: Moments) -> Floats:
     Feedback carries noise into both; the difference holds only what the plant does not explain, to first order the
     output noise that joint and indirect estimates have in common.
     """
-    numerator, denominator, _ = moments.mean
+    numerator, denominator = moments.pair
     return np.asarray(moments.unexplained(numerator / denominator) / moments.unbiased[:, np.newaxis])
-
-
-def coherence(moments: Moments) -> Floats:
-    """γ² = |S_ry|²/(S_rr·S_yy), Nevaranta 2016, eq. (18), shape (rows, lines); 1 for a single window."""
-    return np.asarray(power(moments.mean[0]) / (moments.power[0] * moments.power[1]))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MEANS, _PLANES = 9, 13
+_MEANS, _SCATTER = 9, 4
 _SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, but for rounding
 
 
@@ -23,59 +25,59 @@ class Moments:
 
     Attributes
     ----------
-    planes
-        Real, shape (13, rows, lines): means of the real and imaginary parts of numerator, denominator and reference
-        (6) and of three powers (3); then Σλ^i|δnum|², Σλ^i|δden|² and Σλ^i·δnum·conj(δden) (real, imaginary) with δ the
-        deviation from the mean. One array, so that a period is taken in by few calls.
-    rows
-        Shape (6, rows): Σλ^i, Σλ^2i, Σλ^3i; means of the window centre's time and schedule; number of the oldest
-        sample.
+    means
+        Means of the real and imaginary parts of numerator, denominator and reference (6) and of three powers (3),
+        shape (9, rows, lines). Real and in one array, so that a period is taken in by few calls.
+    scatter
+        Σλ^i|δnum|², Σλ^i|δden|² and the real and imaginary part of Σλ^i·δnum·conj(δden) with δ the deviation from the
+        mean, shape (4, rows, lines).
+    moment
+        Means of the window centre's time and schedule, and the number of the oldest sample, shape (3, rows).
+    weights
+        Σλ^i, Σλ^2i, Σλ^3i, shape (3, rows).
     """
 
-    planes: Floats
-    rows: Floats
-
-    @classmethod
-    def zeros(cls, rows: int, lines: int) -> Moments:
-        return cls(np.zeros((_PLANES, rows, lines)), np.zeros((6, rows)))
-
-    def at(self, rows: slice) -> Moments:
-        """These rows, as views."""
-        return Moments(self.planes[:, rows], self.rows[:, rows])
-
-    def put(self, rows: slice, other: Moments) -> None:
-        """Write `other` over these rows."""
-        self.planes[:, rows], self.rows[:, rows] = other.planes, other.rows
+    means: Floats
+    scatter: Floats
+    moment: Floats
+    weights: Floats
 
     @property
-    def mean(self) -> Complex:
-        """Means of numerator, denominator and reference, shape (3, rows, lines)."""
-        return np.asarray(self.planes[0:6:2] + 1j * self.planes[1:6:2])
+    def pair(self) -> Complex:
+        """Means of numerator and denominator, shape (2, rows, lines)."""
+        pair = np.empty((2, *self.means.shape[1:]), dtype=np.complex128)
+        pair.real, pair.imag = self.means[0:4:2], self.means[1:4:2]
+        return pair
+
+    @property
+    def coherence(self) -> Floats:
+        """γ² = |S_ry|²/(S_rr·S_yy), Nevaranta 2016, eq. (18), shape (rows, lines); 1 for a single window."""
+        return np.asarray((self.means[0] ** 2 + self.means[1] ** 2) / (self.means[6] * self.means[7]))
+
+    @property
+    def repeatability(self) -> Floats:
+        """|S_r|²/S_rr: the share of the reference's power that its mean keeps, shape (rows, lines)."""
+        return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
 
     @property
     def power(self) -> Floats:
         """Means of the powers, shape (3, rows, lines)."""
-        return self.planes[6:_MEANS]
+        return self.means[6:]
 
     @property
     def weight(self) -> Floats:
         """Σλ^i, shape (rows,); 0 before the first window."""
-        return np.asarray(self.rows[0])
-
-    @property
-    def moment(self) -> Floats:
-        """Means of time and schedule, shape (2, rows)."""
-        return self.rows[3:5]
+        return np.asarray(self.weights[0])
 
     @property
     def first(self) -> NDArray[np.int64]:
         """Number of the oldest sample that went in, shape (rows,)."""
-        return np.asarray(self.rows[5], dtype=np.int64)
+        return np.asarray(self.moment[2], dtype=np.int64)
 
     @property
     def unbiased(self) -> Floats:
         """What a scatter is to be divided by for the variance of one window, shape (rows,); NaN for less than two."""
-        one, two, _ = self.rows[:3]
+        one, two, _ = self.weights
         with np.errstate(invalid="ignore"):
             rest = one - two / one
             return np.where(rest > _SEVERAL, rest, np.nan)
@@ -83,7 +85,7 @@ class Moments:
     @property
     def of_mean(self) -> Floats:
         """Variance of the weighted mean over that of one window, shape (rows,)."""
-        return np.asarray(self.rows[1] / self.rows[0] ** 2)
+        return np.asarray(self.weights[1] / self.weights[0] ** 2)
 
     @property
     def dof(self) -> Floats:
@@ -92,13 +94,13 @@ class Moments:
         Exactly m − 1 for m windows of equal weight; else matched in two moments, tr(M)²/tr(M²) with
         M = diag(v) − vvᵀ/Σv, v = λ^i (Satterthwaite 1946).
         """
-        one, two, three = self.rows[:3]
+        one, two, three = self.weights
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.unbiased**2 / (two - 2 * three / one + (two / one) ** 2))
 
     def unexplained(self, ratio: Complex) -> Floats:
         """Σλ^i|δnum − ratio·δden|², shape (rows, lines)."""
-        numerator, denominator, re, im = self.planes[_MEANS:]
+        numerator, denominator, re, im = self.scatter
         shared = ratio.real * re + ratio.imag * im
         total = numerator - 2 * shared + (ratio.real**2 + ratio.imag**2) * denominator
         return np.asarray(np.maximum(total, 0.0))  # what rounding leaves below zero is zero
@@ -125,15 +127,25 @@ class PeriodMoments:
 
     def __init__(self, places: int, lines: int, forgetting: float, *, own: bool) -> None:
         self._own = own
-        self._forgetting = forgetting
-        self._decay = forgetting ** np.array([[1.0], [2.0], [3.0]])
-        self.now = Moments.zeros(places, lines)
+        self._weights = Weights(forgetting)
+        self._count = np.zeros(places, dtype=np.int64)
+        self._means = np.zeros((_MEANS, places, lines))
+        self._scatter = np.zeros((_SCATTER, places, lines))
+        self._moment = np.zeros((3, places))
+
+    _STATE = ("_count", "_means", "_scatter", "_moment")
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"planes": self.now.planes.copy(), "rows": self.now.rows.copy()}
+        return {name: getattr(self, name).copy() for name in self._STATE}
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self.now.planes[...], self.now.rows[...] = state["planes"], state["rows"]
+        for name in self._STATE:
+            getattr(self, name)[...] = state[name]
+
+    @property
+    def now(self) -> Moments:
+        """The moments at every place in the period."""
+        return Moments(self._means, self._scatter, self._moment, self._weights.after(self._count))
 
     def update(self, place: int, spectra: Complex, power: Floats, moment: Floats, usable: NDArray[np.bool_]) -> Moments:
         """Take in windows at consecutive places from `place` on and return the Moments that go with each.
@@ -147,48 +159,110 @@ class PeriodMoments:
         usable
             Shape (rows,); windows that are not usable leave their place's moments as they are.
         """
-        places = self.now.planes.shape[1]
-        rows, lines = spectra.shape[1:]
-        new = np.empty((_MEANS, rows, lines))
+        parts = _parts(place, self._count.size, usable)
+        before, after = self._counts(parts, usable.size)
+        share, kept = self._weights.shares(after)
+        new = np.empty((_MEANS, *spectra.shape[1:]))
         new[0:6:2], new[1:6:2], new[6:] = spectra.real, spectra.imag, power
-        kept = Moments.zeros(rows, lines)
-        done = 0
-        while done < rows:
-            n = min(rows - done, places - place)
-            now, new_rows = self.now.at(slice(place, place + n)), slice(done, done + n)
+        means, deviation = self._take_means(parts, new, share)
+        products = _products(deviation) * kept[:, np.newaxis]
+        scatter = self._take_scatter(parts, products)
+        moment = self._take_moment(parts, moment, share)
+        return Moments(means, scatter, moment, self._weights.after(after if self._own else before))
+
+    def _counts(self, parts: list[_Part], rows: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Windows taken in at the place of each row, before it and with it."""
+        before, after = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
+        for places, at, usable in parts:
+            before[at] = self._count[places]
+            self._count[places] += usable
+            after[at] = self._count[places]
+        return before, after
+
+    def _take_means(self, parts: list[_Part], new: Floats, share: Floats) -> tuple[Floats, Floats]:
+        kept, deviation = np.empty_like(new), np.zeros_like(new)
+        column = share[:, np.newaxis]
+        for places, at, usable in parts:
+            means = self._means[:, places]
             if not self._own:
-                kept.put(new_rows, now)
-            for start, stop in _stretches(usable[done : done + n]):
-                at = slice(done + start, done + stop)
-                self._take(now.at(slice(start, stop)), new[:, at], moment[:, at])
+                kept[:, at] = means
+            if usable:
+                np.subtract(new[:, at], means, out=deviation[:, at])
+                means += deviation[:, at] * column[at]
             if self._own:
-                kept.put(new_rows, now)
-            done, place = done + n, 0
+                kept[:, at] = means
+        return kept, deviation
+
+    def _take_scatter(self, parts: list[_Part], products: Floats) -> Floats:
+        kept = np.empty_like(products)
+        for places, at, usable in parts:
+            scatter = self._scatter[:, places]
+            if not self._own:
+                kept[:, at] = scatter
+            if usable:
+                scatter *= self._weights.forgetting
+                scatter += products[:, at]
+            if self._own:
+                kept[:, at] = scatter
         return kept
 
-    def _take(self, now: Moments, new: Floats, moment: Floats) -> None:
-        weights, means, scatter = now.rows[:3], now.planes[:_MEANS], now.planes[_MEANS:]
-        old = self._forgetting * weights[0]
-        now.rows[5] = np.where(old > 0, now.rows[5], moment[2])
-        weights *= self._decay
-        weights += 1.0
-        share = 1.0 / weights[0]
-        now.rows[3:5] += (moment[:2] - now.rows[3:5]) * share
-        deviation = new - means
-        means += deviation * share[:, np.newaxis]
-        numerator, denominator = deviation[0:2], deviation[2:4]
-        squares = deviation[:4] ** 2
-        straight, crosswise = numerator * denominator, numerator[::-1] * denominator
-        product = np.stack(
-            [squares[0] + squares[1], squares[2] + squares[3], straight[0] + straight[1], crosswise[0] - crosswise[1]]
-        )
-        scatter *= self._forgetting
-        scatter += product * (old * share)[:, np.newaxis]
+    def _take_moment(self, parts: list[_Part], moment: Floats, share: Floats) -> Floats:
+        if not self._own:
+            return moment
+        kept = np.empty_like(moment)
+        for places, at, usable in parts:
+            mean = self._moment[:, places]
+            if usable:
+                mean[2] = np.where(share[at] < 1, mean[2], moment[2, at])
+                mean[:2] += (moment[:2, at] - mean[:2]) * share[at]
+            kept[:, at] = mean
+        return kept
 
 
-def _stretches(usable: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and stop of each run of usable windows."""
-    if usable.all():
-        return [(0, usable.size)]
-    edges = np.flatnonzero(np.diff(np.r_[False, usable, False]))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+class Weights:
+    """Sums of the forgetting weights over c windows: Σλ^i, Σλ^2i, Σλ^3i for i < c."""
+
+    def __init__(self, forgetting: float) -> None:
+        self.forgetting = forgetting
+        # From where on another window's weight is below rounding.
+        self._enough = 0 if forgetting == 1 else min(ceil(log(1e-17) / log(forgetting)), 1 << 20)
+        powers = np.cumprod(np.full((3, self._enough), forgetting ** np.array([[1.0], [2.0], [3.0]])), axis=1)
+        self._table = np.concatenate([np.zeros((3, 1)), np.ones((3, 1)), 1 + np.cumsum(powers, axis=1)], axis=1)
+
+    def after(self, count: NDArray[np.int64]) -> Floats:
+        """The three sums, shape (3, rows)."""
+        if self.forgetting == 1:
+            return np.tile(count.astype(np.float64), (3, 1))
+        return np.asarray(self._table[:, np.minimum(count, self._enough + 1)])
+
+    def shares(self, count: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """With `count` windows: the newest one's share of the mean, and the share of its deviation in the scatter."""
+        with np.errstate(divide="ignore"):
+            share = 1 / self.after(count)[0]
+        return share, 1 - share
+
+
+_Part = tuple[slice, slice, bool]
+
+
+def _parts(place: int, places: int, usable: NDArray[np.bool_]) -> list[_Part]:
+    """Stretches of rows that lie in one period and are all usable or all not: their places, their rows, and which."""
+    rows = np.arange(1, usable.size)
+    cut = (np.diff(usable.view(np.int8)) != 0) | ((place + rows) % places == 0)
+    edges = [0, *(rows[cut]).tolist(), usable.size]
+    parts = []
+    for start, stop in pairwise(edges):
+        at = (place + start) % places
+        if stop > start:
+            parts.append((slice(at, at + stop - start), slice(start, stop), bool(usable[start])))
+    return parts
+
+
+def _products(deviation: Floats) -> Floats:
+    """|δnum|², |δden|², and δnum·conj(δden) in real and imaginary part, shape (4, rows, lines)."""
+    numerator, denominator = deviation[0:2], deviation[2:4]
+    squares = deviation[:4] ** 2
+    straight, crosswise = numerator * denominator, numerator[::-1] * denominator
+    return np.stack(
+        [squares[0] + squares[1], squares[2] + squares[3], straight[0] + straight[1], crosswise[0] - crosswise[1]]
+    )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import snapshots
-from livebode.estimation.bounds import between_periods, coherence, power
+from livebode.estimation.bounds import between_periods, power
 from livebode.estimation.centre import Centre
 from livebode.estimation.estimators import Role
 from livebode.estimation.hann import Hann
@@ -102,7 +102,7 @@ class Tracker:
         """
         now = self._moments.now
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(np.isfinite(now.dof)[:, np.newaxis], power(now.mean[2]) / now.power[0], np.nan)
+            share = np.where(np.isfinite(now.dof)[:, np.newaxis], now.repeatability, np.nan)
         return self._over_places(share)
 
     def _over_places(self, values: Floats) -> Floats:
@@ -182,7 +182,7 @@ class Tracker:
             value=np.where(valid, value, np.nan),
             sigma=np.where(valid, sigma, np.nan),
             dof=dof,
-            coherence=np.where(valid & several, coherence(moments), np.nan),
+            coherence=np.where(valid & several, moments.coherence, np.nan),
             valid=valid,
             first=first,
             sample=rows.sample,
@@ -205,7 +205,7 @@ class Tracker:
     def _estimate(self, pair: Complex, powers: Floats, moments: Moments) -> tuple[Complex, Floats, Floats]:
         """Value and sigma (rows, lines), and the degrees of freedom (rows,)."""
         s, f = self.settings, self.settings.lines.frequency_hz
-        numerator, denominator = moments.mean[:2] if s.average else pair
+        numerator, denominator = moments.pair if s.average else pair
         ratio = numerator / denominator
         share = moments.of_mean if s.average else np.ones(len(ratio))
         if self._quiet:

@@ -29,7 +29,7 @@ sigma with its degrees of freedom, coherence, validity. NaN where there is no va
 
 # Columns that repeat over the lines or rows compress by a dictionary; the measured ones never do.
 _REPEATING = ["sample", "time_s", "schedule", "frequency_hz", "dof"]
-_GROUP_ROWS = 1 << 20
+_GROUP_ROWS = 1 << 18
 
 
 class ResponseTable:

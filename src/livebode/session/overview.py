@@ -17,16 +17,18 @@ class Overview:
         self._kept = 0
 
     def add(self, responses: Responses) -> None:
-        kept = responses[-self._seen % self._stride :: self._stride]
+        self._keep(responses[-self._seen % self._stride :: self._stride])
         self._seen += len(responses)
-        self._parts.append(kept)
-        self._kept += len(kept)
         while self._kept > _ROWS_MAX:
-            whole = Responses.join(self._parts)[::2]
-            # A copy, so that the rows that are no longer kept do not stay in memory.
-            self._parts = [Responses.join([whole])]
-            self._kept = len(whole)
+            whole = self.responses()
+            self._parts, self._kept = [], 0
+            self._keep(whole[::2])
             self._stride *= 2
+
+    def _keep(self, responses: Responses) -> None:
+        # Joining copies, so that the rows that are not kept do not stay in memory behind views.
+        self._parts.append(Responses.join([responses]))
+        self._kept += len(responses)
 
     def responses(self) -> Responses:
         """What was kept."""
