@@ -36,6 +36,7 @@ def record(seed: int) -> Block:
     y = np.convolve(u, [0.5, 0.3, 0.2])[:SAMPLES] + 0.1 * rng.standard_normal(SAMPLES)
     y[205] = np.nan
     u[520] += 40.0
+    y[610] = 1e40
     return Block(np.array([w, u, y, np.linspace(0, 1, SAMPLES)]), ("w", "u", "y", "x"), RATE_HZ, start=17)
 
 

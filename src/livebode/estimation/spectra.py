@@ -8,6 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.spikes import SpikeGate
 from livebode.kernel import SlidingDFT
 
@@ -24,8 +25,8 @@ class Rows:
 
     `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
     other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds
-    a start, a gap, or a sample that was not finite, `clean` (rows,) False also where it holds a spike; `not_finite`
-    and `spikes` are the positions of such samples in the stretch.
+    a start, a gap, or a sample that was not finite or implausibly large, `clean` (rows,) False also where it holds a
+    spike; `not_finite`, `implausible` and `spikes` are the positions of such samples in the stretch.
     """
 
     spectrum: Complex
@@ -33,6 +34,7 @@ class Rows:
     whole: NDArray[np.bool_]
     clean: NDArray[np.bool_]
     not_finite: NDArray[np.intp]
+    implausible: NDArray[np.intp]
     spikes: NDArray[np.intp]
 
 
@@ -68,6 +70,7 @@ class LineSpectra:
         self._step = gcd(hop, window)
         self._differenced = differenced
         self._spikes = spikes
+        self._range = PlausibleRange(differenced.size, window)
         z = np.exp(2j * np.pi * bins / window)
         self._after = z ** advanced[:, np.newaxis]
         self._after[differenced] /= 1 - 1 / z
@@ -93,8 +96,8 @@ class LineSpectra:
             self._spikes.restart(sample)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        spikes = {} if self._spikes is None else {f"spikes.{k}": v for k, v in self._spikes.state().items()}
-        return spikes | {
+        parts = {"range": self._range.state(), "spikes": self._spikes.state() if self._spikes else {}}
+        return {f"{part}.{name}": array for part, state in parts.items() for name, array in state.items()} | {
             "dft": np.frombuffer(self._dft.snapshot(), dtype=np.uint8),
             "number": np.array([self._next, *self._last_bad, self._started]),
             "before": self._before.copy(),
@@ -105,20 +108,27 @@ class LineSpectra:
         self._next, *self._last_bad, started = (int(n) for n in state["number"])
         self._started = bool(started)
         self._before[:] = state["before"]
-        if self._spikes is not None:
-            self._spikes.load({k.removeprefix("spikes."): v for k, v in state.items() if k.startswith("spikes.")})
+        for name, part in (("range.", self._range), ("spikes.", self._spikes)):
+            if part is not None:
+                part.load({key.removeprefix(name): array for key, array in state.items() if key.startswith(name)})
 
     def process(self, data: Floats) -> Rows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
         finite, not_finite = self._prepare(data)
-        spikes = _NONE if self._spikes is None else self._spikes.process(finite)
+        implausible = self._range.process(finite)
+        if implausible.size:
+            finite = finite.copy()
+            finite[:, implausible] = 0.0
+        missing = np.concatenate([not_finite, implausible])
+        # What was put in for a missing sample may stand out, but is no spike of the signal.
+        spikes = _NONE if self._spikes is None else np.setdiff1d(self._spikes.process(finite), missing)
         step = max(self._step, _ROW_VALUES_MAX // (self._after.size or 1) * self._step)
         parts = [self._spectra(finite[:, i : i + step], i) for i in range(0, finite.shape[1], step)]
         spectrum = np.concatenate([p[0] for p in parts], axis=1)
         position = np.concatenate([p[1] for p in parts])
-        whole = self._without(not_finite, 0, data.shape[1], position)
+        whole = self._without(missing, 0, data.shape[1], position)
         clean = whole & self._without(spikes, 1, data.shape[1], position)
-        rows = Rows(spectrum, self._next + position, whole, clean, not_finite, spikes)
+        rows = Rows(spectrum, self._next + position, whole, clean, not_finite, implausible, spikes)
         self._next += data.shape[1]
         return rows
 

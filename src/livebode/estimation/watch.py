@@ -10,6 +10,7 @@ from livebode.nouns import Block, Event, InputError
 
 _KINDS = {
     "non-finite": "a sample is not finite",
+    "implausible": "a sample is more than 1e8 times larger than all in the period before",
     "spike": "a sample stands out from the periods before it and is left out",
 }
 
@@ -63,15 +64,18 @@ class Watch:
 
     def take(self, block: Block, rows: Rows) -> None:
         """Count the samples that were left out; one Event for all that lie within a window of each other."""
-        for kind, position in (("non-finite", rows.not_finite), ("spike", rows.spikes)):
+        found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
+        new: list[tuple[int, str]] = []
+        for kind, position in found.items():
             if not position.size:
                 continue
             self.counts[kind] += position.size
             number = block.start + position
             apart = np.diff(number, prepend=self._last[kind]) >= self._window
             self._last[kind] = int(number[-1])
-            for sample in number[apart]:
-                self._say(kind, block, int(sample), _KINDS[kind])
+            new += [(int(sample), kind) for sample in number[apart]]
+        for sample, kind in sorted(new):
+            self._say(kind, block, sample, _KINDS[kind])
 
     def excited(self, power: NDArray[np.float64], whole: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
         """Which lines have at least this share of the largest excitation so far, shape of `power` (rows, lines)."""
