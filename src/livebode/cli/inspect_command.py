@@ -33,7 +33,7 @@ def inspect_command(
     if as_json:
         print(to_json(found.plain()))
         return
-    console = Console(soft_wrap=False)
+    console = Console(highlight=False, markup=False)  # names and units may hold brackets
     _show_recording(found, console)
     if found.excitation is not None:
         _show_excitation(found, console)
@@ -42,7 +42,7 @@ def inspect_command(
 def _show_recording(found: Inspection, console: Console) -> None:
     log = found.log
     console.print(
-        f"[bold]{log.path}[/bold]: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})"
+        f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
     )
     gaps = f"{found.gaps} gaps ({found.missing} samples missing)" if found.gaps else "no gaps"
     jitter = ""
@@ -69,13 +69,14 @@ def _show_excitation(found: Inspection, console: Console) -> None:
     assert excitation is not None
     lines = excitation.lines
     console.print(
-        f"excitation repeats every [bold]{excitation.period}[/bold] samples "
+        f"excitation repeats every {excitation.period} samples "
         f"({excitation.period / lines.rate_hz:.6g} s), {excitation.periods} periods from sample {excitation.start} on; "
         f"crest factor {excitation.crest_factor:.2f}, "
         f"rms {excitation.rms:.4g}, peak {excitation.peak:.4g}"
     )
     if excitation.transient:
-        console.print(f"transient: the first {len(excitation.transient)} periods differ from the steady state")
+        first = "period differs" if len(excitation.transient) == 1 else f"{len(excitation.transient)} periods differ"
+        console.print(f"transient: the first {first} from the steady state")
     if excitation.outlying:
         console.print(f"outlying (spikes, pauses): periods {', '.join(map(str, excitation.outlying))}")
     console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")

@@ -14,7 +14,8 @@ Rate = Annotated[
 Time = Annotated[
     str | None,
     typer.Option(
-        metavar="COLUMN", help="Time column where its name does not tell, with its unit in brackets behind it."
+        metavar="COLUMN",
+        help="Time column where its name does not tell, with its unit in brackets behind it; none ignores it.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
