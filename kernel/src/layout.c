@@ -63,6 +63,7 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     t->sums = (real *)take(at, c->channels * blocks * 4u * LB_BLOCK * bytes);
     t->line = (real *)take(at, c->channels * line * bytes);
     t->delta = (real *)take(at, (uint64_t)c->channels * 3u * LB_TILE * bytes);
+    t->queue = (real *)take(at, (uint64_t)c->channels * LB_TILE * bytes);
     t->spectrum = (real *)take(at, reach ? inner * 2u * bytes : 0u);
     t->bins = (uint32_t *)take(at, inner * sizeof(uint32_t));
     t->taps = (uint32_t *)take(at, reach ? (uint64_t)c->bin_count * 4u * sizeof(uint32_t) : 0u);
@@ -195,7 +196,7 @@ lb_status LB(reset)(LB_DFT *t)
     }
     t->count = 0;
     t->index = 0;
-    t->pending = 0;
+    t->queued = 0;
     for (size_t i = 0; i < t->channels * t->blocks * 4u * LB_BLOCK; ++i) {
         t->sums[i] = 0;
     }

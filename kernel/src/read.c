@@ -8,26 +8,17 @@ static const real window_taps[3][3] = {
     {(real)0.42, (real)0.25, (real)0.04}, /* Blackman */
 };
 
-/* out *= e^(±jθ), θ of the next sample: + makes the phase the window's, − makes it that of the fixed grid. */
-static void rotate(const LB_DFT *t, size_t bins, int sign, real *out)
+/* out *= e^(−jθ), θ of the next sample: from the window's phase to that of the fixed grid. */
+static void turn_back(const LB_DFT *t, real *out)
 {
     int backwards;
     const real *row = lb_next_row(t, &backwards);
-    for (size_t b = 0; b < bins; ++b) {
+    for (size_t b = 0; b < t->bin_count; ++b) {
         const real re = out[2 * b], im = out[2 * b + 1];
         const real c = row[lb_cos_at(b)], sine = row[lb_cos_at(b) + LB_BLOCK];
-        const real s = backwards == (sign < 0) ? sine : -sine;
+        const real s = backwards ? sine : -sine;
         out[2 * b] = re * c - im * s;
         out[2 * b + 1] = im * c + re * s;
-    }
-}
-
-static void raw(const LB_DFT *t, size_t channel, size_t bins, real *out)
-{
-    const real *sums = lb_sums(t, channel);
-    for (size_t b = 0; b < bins; ++b) {
-        out[2 * b] = sums[lb_sum_at(b)];
-        out[2 * b + 1] = sums[lb_sum_at(b) + LB_BLOCK];
     }
 }
 
@@ -43,19 +34,34 @@ static void apply_taps(const LB_DFT *t, real *out)
     }
 }
 
+/* The way of the inner kernels' rows, and so their bits. */
+static void row(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
+{
+    lb_tile tile;
+    tile.sums = lb_sums(t, channel);
+    tile.row = lb_next_row(t, &tile.backwards);
+    tile.blocks = t->blocks;
+    tile.phase = phase;
+    tile.bins = t->inner_count;
+    tile.out = out;
+    tile.out_end = out + 2 * (size_t)t->inner_count;
+    t->kernel->read(&tile);
+}
+
 void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
+    if (t->variant == LB_MODULATED) {
+        row(t, channel, phase, out);
+        return;
+    }
     if (lb_is_windowed(t->variant)) {
-        raw(t, channel, t->inner_count, t->spectrum);
-        rotate(t, t->inner_count, 1, t->spectrum);
+        row(t, channel, LB_PHASE_WINDOW, t->spectrum);
         apply_taps(t, out);
     } else {
-        raw(t, channel, t->bin_count, out);
+        row(t, channel, LB_PHASE_FIXED, out); /* their sums are in the window's phase as they are */
     }
-    if (t->variant == LB_MODULATED && phase == LB_PHASE_WINDOW) {
-        rotate(t, t->bin_count, 1, out);
-    } else if (t->variant != LB_MODULATED && phase == LB_PHASE_FIXED) {
-        rotate(t, t->bin_count, -1, out);
+    if (phase == LB_PHASE_FIXED) {
+        turn_back(t, out);
     }
 }
 
@@ -79,7 +85,7 @@ lb_status LB(count)(const LB_DFT *t, uint64_t *count)
     if (!t || !count) {
         return LB_ERROR_NULL;
     }
-    *count = t->count;
+    *count = t->count + t->queued;
     return LB_OK;
 }
 

@@ -130,7 +130,7 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
     at += sizeof h + t->bin_count * sizeof(uint32_t);
     t->count = h.count;
     t->index = (uint32_t)(h.count % t->window);
-    t->pending = 0;
+    t->queued = 0;
     for (size_t c = 0; c < t->channels; ++c) {
         copy((unsigned char *)(t->line + c * t->line_length), at, t->window * sizeof(real));
         at += t->window * sizeof(real);

@@ -17,13 +17,14 @@ struct LB_DFT {
     size_t line_length;   /* reals per channel's delay line */
     real radius;          /* LB_DAMPED: r; else 1 */
     real radius_window;   /* r^N */
-    uint64_t count;       /* samples seen */
+    uint64_t count;       /* samples that the sums have seen */
     uint32_t index;       /* of the next sample in its period: count mod N */
-    uint32_t pending;     /* newest samples that the sums have not seen yet, ≤ LB_TILE, in one half period */
+    uint32_t queued;      /* newer samples that wait, < LB_TILE */
     real *table;          /* [half + 1][blocks][2][LB_BLOCK]: cos, sin */
     real *sums;           /* [channels][blocks][4][LB_BLOCK] */
     real *line;           /* [channels][line_length], the newest N samples, by index */
-    real *delta;          /* [channels][3][LB_TILE], of the pending samples: see tile.h */
+    real *delta;          /* [channels][3][LB_TILE], of the tile at work: see tile.h */
+    real *queue;          /* [channels][LB_TILE] */
     real *spectrum;       /* [inner_count][2], scratch of the windows */
     uint32_t *bins;       /* [inner_count] */
     uint32_t *taps;       /* [bin_count][4]: places among the inner bins of k−1, k+1, k−2, k+2 */
@@ -71,13 +72,13 @@ static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + 
 /* The instruction set's kernel, or null. */
 const lb_kernel *LB(kernel_of)(lb_instruction_set set);
 
-/* Brings the sums up to date with the pending samples. */
+/* Brings the sums up to date with the samples that wait. */
 void LB(catch_up)(LB_DFT *t);
 
 /* The unrenewed variants' recursion over a tile. */
 void LB(recur)(const LB_DFT *t, size_t channel, const real *delta, size_t length);
 
-/* One channel's spectrum; nothing may be pending. out[bin_count][2] */
+/* One channel's spectrum; nothing may wait. out[bin_count][2] */
 void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out);
 
 #endif

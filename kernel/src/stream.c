@@ -4,17 +4,11 @@
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
 
-/* Samples that may still become pending: up to a tile, within the period. */
-static size_t room(const LB_DFT *t)
-{
-    return smaller(LB_TILE - t->pending, t->window - t->index);
-}
-
 /* The differences and the delay line of one channel's next samples. */
 static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
 {
     real *line = t->line + channel * t->line_length + t->index;
-    real *delta = t->delta + channel * 3 * LB_TILE + t->pending;
+    real *delta = t->delta + channel * 3 * LB_TILE;
     if (t->variant != LB_DAMPED) {
         t->kernel->take_in(delta, line, samples, stride, length);
         return;
@@ -38,13 +32,6 @@ static void seed(LB_DFT *t, size_t channel)
     }
 }
 
-static void counted(LB_DFT *t, size_t length)
-{
-    t->count += length;
-    t->pending += (uint32_t)length;
-    t->index += (uint32_t)length;
-}
-
 /* Rows that a tile is to make. */
 typedef struct {
     size_t first, hop;
@@ -54,8 +41,8 @@ typedef struct {
     const real *end;      /* of channel 0's rows */
 } rows_due;
 
-/* The sums of `length` samples from `start` on, which lie in one half of the period and are pending from `offset`
- * on, and the rows due among them. */
+/* The sums of `length` samples from `start` on, which lie in one half of the period and whose differences begin at
+ * `offset`, and the rows due among them. */
 static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length, const rows_due *due)
 {
     lb_tile tile;
@@ -97,76 +84,29 @@ static void passed(rows_due *due, size_t length, size_t row_reals)
     due->first += rows * due->hop - length;
 }
 
-/* All pending samples. */
-static void run_pending(LB_DFT *t, rows_due *due)
+/* The sums of the `length` samples taken in last, which end at the index. */
+static void run(LB_DFT *t, uint32_t length, rows_due *due)
 {
     const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
-    uint32_t start = t->index - t->pending;
+    uint32_t start = t->index - length;
+    if (!lb_renews(t->variant)) {
+        for (size_t c = 0; c < t->channels; ++c) {
+            LB(recur)(t, c, t->delta + c * 3 * LB_TILE, length);
+        }
+        start = t->index;
+    }
     for (uint32_t offset = 0; start < t->index;) {
         const uint32_t end = start < t->half ? t->half : t->window;
         const uint32_t ahead = (t->index < end ? t->index : end) - start;
-        const uint32_t length = ahead < longest ? ahead : longest;
-        run_part(t, start, offset, length, due);
+        const uint32_t part = ahead < longest ? ahead : longest;
+        run_part(t, start, offset, part, due);
         if (due->out) {
-            passed(due, length, 2 * (size_t)t->bin_count);
+            passed(due, part, 2 * (size_t)t->bin_count);
         }
-        start += length;
-        offset += length;
+        start += part;
+        offset += part;
     }
-    t->pending = 0;
     t->index = t->index == t->window ? 0 : t->index;
-}
-
-void LB(catch_up)(LB_DFT *t)
-{
-    if (!t->pending) {
-        return;
-    }
-    if (lb_renews(t->variant)) {
-        rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
-        run_pending(t, &none);
-        return;
-    }
-    for (size_t c = 0; c < t->channels; ++c) {
-        LB(recur)(t, c, t->delta + c * 3 * LB_TILE, t->pending);
-    }
-    t->pending = 0;
-    t->index = t->index == t->window ? 0 : t->index;
-}
-
-lb_status LB(queue)(LB_DFT *t, const real *samples)
-{
-    if (!t || !samples) {
-        return LB_ERROR_NULL;
-    }
-    for (size_t c = 0; c < t->channels; ++c) {
-        real *at = t->line + c * t->line_length + t->index;
-        t->delta[c * 3 * LB_TILE + t->pending] = samples[c] - t->radius_window * *at;
-        *at = samples[c];
-    }
-    counted(t, 1);
-    if (!room(t)) {
-        LB(catch_up)(t);
-    }
-    return LB_OK;
-}
-
-lb_status LB(push)(LB_DFT *t, const real *samples)
-{
-    const lb_status status = LB(queue)(t, samples);
-    if (status == LB_OK) {
-        LB(catch_up)(t);
-    }
-    return status;
-}
-
-lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
-{
-    if (!t || !rows) {
-        return LB_ERROR_NULL;
-    }
-    *rows = hop ? (size_t)((t->count % hop + length) / hop) : 0;
-    return LB_OK;
 }
 
 /* Where the next samples come from. */
@@ -175,32 +115,77 @@ typedef struct {
     ptrdiff_t channel_stride, sample_stride;
 } input;
 
-/* As many of the samples as make one tile; the sums are left to the caller. */
-static size_t next_tile(LB_DFT *t, input *in, size_t length)
+/* As many of the samples as make one tile within the period, at most `length`; returns their number. */
+static size_t next_tile(LB_DFT *t, input *in, size_t length, rows_due *due)
 {
-    const size_t n = smaller(length, room(t));
+    const size_t n = smaller(length, smaller(LB_TILE, t->window - t->index));
     for (size_t c = 0; c < t->channels; ++c) {
         take_in(t, c, in->samples + (ptrdiff_t)c * in->channel_stride, in->sample_stride, n);
     }
-    counted(t, n);
     in->samples += (ptrdiff_t)n * in->sample_stride;
+    t->count += n;
+    t->index += (uint32_t)n;
+    run(t, (uint32_t)n, due);
     return n;
 }
 
+/* Without rows. */
 static void skip(LB_DFT *t, input *in, size_t length)
 {
+    rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
     while (length) {
-        length -= next_tile(t, in, length);
+        length -= next_tile(t, in, length, &none);
+    }
+}
+
+void LB(catch_up)(LB_DFT *t)
+{
+    if (t->queued) {
+        input in = {t->queue, LB_TILE, 1};
+        skip(t, &in, t->queued);
+        t->queued = 0;
+    }
+}
+
+lb_status LB(queue)(LB_DFT *t, const real *samples)
+{
+    if (!t || !samples) {
+        return LB_ERROR_NULL;
+    }
+    for (size_t c = 0; c < t->channels; ++c) {
+        t->queue[c * LB_TILE + t->queued] = samples[c];
+    }
+    if (++t->queued == LB_TILE) {
         LB(catch_up)(t);
     }
+    return LB_OK;
+}
+
+lb_status LB(push)(LB_DFT *t, const real *samples)
+{
+    if (!t || !samples) {
+        return LB_ERROR_NULL;
+    }
+    LB(catch_up)(t);
+    input in = {samples, 1, 1};
+    skip(t, &in, 1);
+    return LB_OK;
+}
+
+lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
+{
+    if (!t || !rows) {
+        return LB_ERROR_NULL;
+    }
+    *rows = hop ? (size_t)(((t->count + t->queued) % hop + length) / hop) : 0;
+    return LB_OK;
 }
 
 /* Rows written by the inner kernels themselves. */
 static void fused_rows(LB_DFT *t, input *in, size_t length, rows_due due)
 {
     while (length) {
-        length -= next_tile(t, in, length);
-        run_pending(t, &due);
+        length -= next_tile(t, in, length, &due);
     }
 }
 

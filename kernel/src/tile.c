@@ -312,6 +312,22 @@ static void run_tile(const lb_tile *t)
     run(t, 1);
 }
 
+static void read_row(const lb_tile *t)
+{
+    for (size_t block = t->blocks; block-- > 0;) {
+        unit u;
+        unit_sums a;
+        u.out = t->out + block * 2 * LB_BLOCK;
+        u.out_end = t->out_end;
+        u.phase = t->phase;
+        u.backwards = t->backwards;
+        u.n = LB_PARTS;
+        u.valid = 2 * (t->bins - block * LB_BLOCK);
+        load_s(&a, t->sums + block * 4 * LB_BLOCK, LB_PARTS);
+        emit_tail(u, a, load_row(t->row + block * 2 * LB_BLOCK, LB_PARTS));
+    }
+}
+
 static void take_in(real *restrict delta, real *restrict line, const real *restrict samples, ptrdiff_t stride,
                     size_t length)
 {
@@ -328,4 +344,4 @@ static void take_in(real *restrict delta, real *restrict line, const real *restr
     }
 }
 
-const lb_kernel LB_KERNEL_NAME = {take_in, run_tile};
+const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row};

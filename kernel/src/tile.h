@@ -40,6 +40,8 @@ typedef struct {
     /* delta[i] = samples[i·stride] − line[i]; line[i] = samples[i·stride] */
     void (*take_in)(real *delta, real *line, const real *samples, ptrdiff_t stride, size_t length);
     void (*run)(const lb_tile *tile);
+    /* channel 0's row now; uses sums, row, backwards, blocks, phase, bins, out, out_end */
+    void (*read)(const lb_tile *tile);
 } lb_kernel;
 
 /* Where bin b of a block lies: so that interleaving re and im within 128-bit lanes puts the bins in order. */
