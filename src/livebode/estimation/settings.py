@@ -119,6 +119,17 @@ class Settings:
         """Signals that go through the DFT, the output first."""
         return self.method.roles
 
+    @property
+    def identity(self) -> str:
+        """All that a tracker's state depends on: two with the same one may take each other's snapshots.
+
+        Not the controllers, which only turn what was measured into the plant.
+        """
+        logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
+        names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
+        options = ("noise", "differenced", "hann", "spikes")
+        return repr((*(getattr(self, name) for name in names + options), logged))
+
     def channel(self, role: Role) -> str | None:
         """Channel name of a signal."""
         return {"output": self.output, "input": self.input, "excitation": self.excitation}[role]
