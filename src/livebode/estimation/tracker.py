@@ -179,7 +179,7 @@ class Tracker:
         several = np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
-            value=np.where(valid, value, np.nan),
+            value=np.where(valid, value, complex(np.nan, np.nan)),
             sigma=np.where(valid, sigma, np.nan),
             dof=dof,
             coherence=np.where(valid & several, moments.coherence, np.nan),
