@@ -1,0 +1,160 @@
+"""SimulatedAxis: a BeltAxis as a source of Blocks, with its truth beside."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.simulation._axis import Engine
+from livebode.simulation.configuration import BeltAxis, engine_settings
+from livebode.simulation.faults import Condition
+from livebode.simulation.pace import paced
+from livebode.simulation.truth import Truth
+
+Floats = NDArray[np.float64]
+
+CHANNELS = (
+    Channel("w", "N m"),
+    Channel("u", "N m"),
+    Channel("velocity", "rad/s"),
+    Channel("position", "rad"),
+    Channel("x", "m"),
+    Channel("position_reference", "rad"),
+    Channel("velocity_reference", "rad/s"),
+)
+BLOCK_SAMPLES_MAX = 1 << 24
+
+
+class DivergenceError(ArithmeticError):
+    """The simulated machine left what can be: the time and the state stand in the message and as attributes."""
+
+    def __init__(self, time_s: float, state: Sequence[float], limits: tuple[float, float]) -> None:
+        self.time_s, self.state = time_s, tuple(state)
+        numbers = ", ".join(f"{value:.6g}" for value in self.state)
+        super().__init__(
+            f"the simulation stopped at {time_s:.6f} s: its state ({numbers}) is not finite, or the cart is outside "
+            f"{limits[0]:g} … {limits[1]:g} m (angle and speed of each pulley, then of the cart)"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedAxis:
+    """A machine on the bench. Every iteration starts it anew at rest at the motion's start; sample 0 is the first tick.
+
+    Channels: w and u (N m, as applied), velocity and position of the motor as the drive reads them, the cart's
+    position x, and the references of the motor. How the samples are cut into Blocks changes none of them.
+
+    Examples
+    --------
+    >>> axis = SimulatedAxis(BeltAxis(excitation_n_m=np.sin(2 * np.pi * np.arange(100) / 100), seconds=0.5))
+    >>> [len(block) for block in axis.blocks(["u", "velocity"], block_samples=1500)]
+    [1500, 500]
+    >>> block, truth = axis.run()
+    >>> len(block), float(truth.stiffness_n_per_m[0])
+    (2000, 500000.0)
+    """
+
+    axis: BeltAxis
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return CHANNELS
+
+    @property
+    def rate_hz(self) -> float:
+        return self.axis.drive.rate_hz
+
+    @property
+    def samples(self) -> int | None:
+        """Samples of the run; None without end."""
+        return self.axis.samples
+
+    def blocks(
+        self,
+        channels: Sequence[str] | None = None,
+        block_samples: int = 4096,
+        *,
+        real_time: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> Iterator[Block]:
+        """The samples from the first to the last, as fast as it can, or with `real_time` none before its time.
+
+        Raises
+        ------
+        InputError
+            At once for a missing channel or a block size that is no whole number of at least 1.
+        DivergenceError
+            While iterating, when the state is not finite or the cart leaves its limits.
+        """
+        names = [channel.name for channel in CHANNELS] if channels is None else list(channels)
+        rows = [_row(name) for name in names]
+        blocks = (_chosen(block, rows) for block, _ in self.pairs(block_samples))
+        return paced(blocks, clock, sleep) if real_time else blocks
+
+    def pairs(self, block_samples: int = 4096) -> Iterator[tuple[Block, Truth]]:
+        """Blocks of all channels, each with the truth of its samples."""
+        if isinstance(block_samples, bool) or not (
+            isinstance(block_samples, int) and 1 <= block_samples <= BLOCK_SAMPLES_MAX
+        ):
+            raise InputError(f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}")
+        return self._pairs(block_samples)
+
+    def run(self) -> tuple[Block, Truth]:
+        """The whole run as one Block, with its truth; InputError for one without end."""
+        if self.samples is None:
+            raise InputError("seconds=inf: a run without end does not fit into one block; give seconds, or take blocks")
+        return next(self.pairs(max(1, self.samples)))
+
+    def _pairs(self, block_samples: int) -> Iterator[tuple[Block, Truth]]:
+        axis = self.axis
+        position, speed = (row / axis.mechanics.radius_m for row in axis.motion.cycle(self.rate_hz))
+        engine = Engine(engine_settings(axis), float(position[0]) * axis.mechanics.radius_m)
+        noise = np.random.default_rng(axis.seed)
+        start = 0
+        while self.samples is None or start < self.samples:
+            ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
+            number = np.arange(start, start + ticks)
+            condition = axis.condition(number / self.rate_hz)
+            w = np.resize(np.roll(axis.excitation_n_m, -(start % max(1, axis.excitation_n_m.size))), ticks)
+            references = [row[number % row.size] for row in (position, speed)]
+            inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition)])
+            output = self._advanced(engine, inputs, start)
+            data = np.vstack([w, output[:3], output[-2], inputs[:2]])
+            yield Block(data, CHANNELS, self.rate_hz, start=start), Truth(axis, start, output[3:], condition)
+            start += ticks
+
+    def _noise(self, generator: np.random.Generator, ticks: int) -> Floats:
+        sigma = self.axis.sensor.noise_rad_per_s
+        return sigma * generator.standard_normal(ticks) if sigma else np.zeros(ticks)
+
+    def _advanced(self, engine: Engine, inputs: Floats, start: int) -> Floats:
+        ticks = inputs.shape[1]
+        output = np.empty((3 + len(engine.plant), ticks))
+        done = engine.advance(inputs, output)
+        if done < ticks:
+            limits = self.axis.limits
+            raise DivergenceError(
+                (start + done) / self.rate_hz, engine.plant, (limits.position_m_min, limits.position_m_max)
+            )
+        return output
+
+
+def _rows(condition: Condition) -> list[Floats]:
+    return [condition.stiffness, condition.damping, condition.load_kg, condition.gap_m]
+
+
+def _row(name: str) -> int:
+    names = [channel.name for channel in CHANNELS]
+    if name not in names:
+        raise InputError(missing_channel(name, names))
+    return names.index(name)
+
+
+def _chosen(block: Block, rows: list[int]) -> Block:
+    return Block(block.data[rows], tuple(CHANNELS[i] for i in rows), block.rate_hz, start=block.start)
