@@ -17,13 +17,16 @@ static double friction(double coulomb, double stribeck, double vs, double w, dou
     return (coulomb + stribeck / (1.0 + ratio * ratio)) * (speed / sqrt(speed * speed + w * w));
 }
 
-/* Dead zone of total width gap, its corners rounded over a twentieth of it. */
+/* Dead zone of total width gap; within a twentieth of it around each corner a quartic joins the two straights, smooth up to
+ * its second derivative. */
 static lb_play play(double gap, double elongation, double rate) {
     if (gap == 0.0) return (lb_play){elongation, rate};
-    const double half = 0.5 * gap, round = 0.05 * gap;
-    const double above = elongation - half, below = elongation + half;
-    const double a = sqrt(above * above + round * round), b = sqrt(below * below + round * round);
-    return (lb_play){elongation + 0.5 * (a - b), rate * (1.0 + 0.5 * (above / a - below / b))};
+    const double round = 0.05 * gap, beyond = fabs(elongation) - 0.5 * gap, into = beyond + round;
+    if (into <= 0.0) return (lb_play){0.0, 0.0};
+    if (beyond >= round) return (lb_play){copysign(beyond, elongation), rate};
+    const double square = into * into, unit = 16.0 * (round * round * round);
+    const double slope = (3.0 * square * (3.0 * round - beyond) - square * into) / unit;
+    return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
 }
 
 static double spots(const lb_axis_config *c, double at) {

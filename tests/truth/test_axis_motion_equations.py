@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from livebode.nouns import Block
-from livebode.simulation import BeltAxis, Friction, Mechanics, SimulatedAxis, Strokes, Truth
+from livebode.simulation import Backlash, BeltAxis, Friction, Mechanics, SimulatedAxis, Strokes, Truth
 from tests.axes import MULTISINE, RATE_HZ, fast_stroke
 
 FRICTION = Friction(motor_coulomb_n_m=0.1, motor_viscous_n_m_s=1e-3, load_coulomb_n=15.0, load_viscous_n_s_per_m=3.0,
@@ -88,6 +88,24 @@ def stroke_error(masses: int, rubbing: bool, method: str, motion: Strokes) -> fl
 def test_a_fast_stroke_follows_the_equations_of_motion_by_another_method(masses: int) -> None:
     # RK45 shares no coefficient with the simulation, but takes many more steps.
     assert stroke_error(masses, False, "RK45", fast_stroke(dwell_s=0.02)) < 1e-8
+
+
+@pytest.mark.parametrize("masses", [2, 3])
+@pytest.mark.parametrize(
+    "options",
+    [{"friction": Friction(load_coulomb_n=15.0, smoothing_m_per_s=1e-3)}, {"faults": (Backlash(gap_m=1e-4),)}],
+    ids=["sharp friction", "play"],
+)
+def test_what_bends_sharply_gets_the_steps_that_it_needs(masses: int, options: dict) -> None:
+    states = []
+    for substeps in (None, 128):
+        axis = BeltAxis(
+            mechanics=Mechanics(masses=masses), motion=fast_stroke(dwell_s=0.02), excitation_n_m=MULTISINE, seconds=0.75,
+            substeps=substeps, **options,
+        )  # fmt: skip
+        states.append(SimulatedAxis(axis).run()[1].states)
+    chosen, fine = states
+    assert np.max(np.abs(chosen - fine) / np.max(np.abs(fine), axis=1, keepdims=True)) < 1e-6
 
 
 @pytest.mark.parametrize("masses", [2, 3])

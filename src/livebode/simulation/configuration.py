@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import ceil, inf, isnan
+from math import ceil, inf, isnan, sqrt
 from typing import Any
 
 import numpy as np
@@ -99,10 +99,11 @@ class BeltAxis:
         object.__setattr__(self, "excitation_n_m", excitation)
         object.__setattr__(self, "faults", tuple(self.faults))
         self._check_numbers()
-        if self.limits.position_m_max >= self.mechanics.pulley_distance_m:
+        low, high = self.limits.stops_m
+        if low <= 0 or high >= self.mechanics.pulley_distance_m:
             raise InputError(
-                f"position_m_max={self.limits.position_m_max} is not below "
-                f"pulley_distance_m={self.mechanics.pulley_distance_m}; the cart would meet the free pulley"
+                f"the stroke with its overrun goes from {low:g} to {high:g} m; it must lie between the pulleys, "
+                f"0 and pulley_distance_m={self.mechanics.pulley_distance_m}"
             )
         self.motion.check(self.limits)
         self._check_faults()
@@ -165,15 +166,16 @@ class BeltAxis:
         """Integration steps in a tick."""
         if self.substeps is not None:
             return self.substeps
-        ends = self.limits.position_m_min, self.limits.position_m_max
         fastest = max(
             float(np.max(np.abs(np.linalg.eigvals(self.linear(x, t).a))))
-            for x in ends
+            for x in self.limits.stops_m
             for t in self._moments_s.tolist()
         )
         smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)
         backlash = bool(np.any(self.condition(self._moments_s).gap_m))
-        return max(smooth, 2 if self.friction.dry else 1, 8 if backlash else 1)
+        # A sign smoothed over less speed bends within less time (measured: 5e-8 of a stroke at worst, docs/axis.md).
+        dry = 2 * ceil(sqrt(0.005 / self.friction.smoothing_m_per_s)) if self.friction.dry else 1
+        return max(smooth, dry, 16 if backlash else 1)
 
     def condition(self, time_s: Floats) -> Condition:
         """The machine's parameters at these times, without the soft spots."""
@@ -215,6 +217,6 @@ def engine_settings(axis: BeltAxis) -> dict[str, Any]:
         "integral_step": 1.0 / (d.velocity_rate_hz * d.integral_time_s),
         "encoder_step_rad": s.encoder_step_rad,
         "velocity_differenced": int(s.velocity_differenced),
-        "position_m_min": axis.limits.position_m_min,
-        "position_m_max": axis.limits.position_m_max,
+        "position_m_min": axis.limits.stops_m[0],
+        "position_m_max": axis.limits.stops_m[1],
     }

@@ -151,16 +151,26 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What the machine bears: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor."""
+    """What the machine bears: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor.
+
+    The motion keeps to them whole; the cart itself may overrun the stroke by `overrun_m` before the run is stopped.
+    """
 
     position_m_min: float = 0.2
     position_m_max: float = 1.8
+    overrun_m: float = 0.05
     speed_m_per_s_max: float = 5.9
     acceleration_m_per_s2_max: float = 50.0
 
     def __post_init__(self) -> None:
         positive(self, "position_m_min", "position_m_max", "speed_m_per_s_max", "acceleration_m_per_s2_max")
+        nonnegative(self, "overrun_m")
         if not self.position_m_min < self.position_m_max:
             raise InputError(
                 f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; swap them"
             )
+
+    @property
+    def stops_m(self) -> tuple[float, float]:
+        """Where the run is stopped."""
+        return self.position_m_min - self.overrun_m, self.position_m_max + self.overrun_m

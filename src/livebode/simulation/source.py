@@ -37,8 +37,8 @@ class DivergenceError(ArithmeticError):
         self.time_s, self.state = time_s, tuple(state)
         numbers = ", ".join(f"{value:.6g}" for value in self.state)
         super().__init__(
-            f"the simulation stopped at {time_s:.6f} s: its state ({numbers}) is not finite, or the cart is outside "
-            f"{limits[0]:g} … {limits[1]:g} m (angle and speed of each pulley, then of the cart)"
+            f"the simulation stopped at {time_s:.6f} s: its state ({numbers}; angle and speed of each pulley, position "
+            f"and speed of the cart) is not finite, or the cart is outside {limits[0]:g} … {limits[1]:g} m"
         )
 
 
@@ -138,10 +138,7 @@ class SimulatedAxis:
         output = np.empty((3 + len(engine.plant), ticks))
         done = engine.advance(inputs, output)
         if done < ticks:
-            limits = self.axis.limits
-            raise DivergenceError(
-                (start + done) / self.rate_hz, engine.plant, (limits.position_m_min, limits.position_m_max)
-            )
+            raise DivergenceError((start + done) / self.rate_hz, engine.plant, self.axis.limits.stops_m)
         return output
 
 

@@ -39,13 +39,18 @@ def friction(coulomb: float, stribeck: float, s: Settings, speed: float) -> floa
 
 
 def play(gap: float, elongation: float, rate: float) -> tuple[float, float]:
-    """Elongation beyond a play, and its rate: a dead zone whose corners are rounded over a twentieth of it."""
+    """Elongation beyond a play, and its rate: a dead zone whose corners a quartic rounds over a twentieth of it."""
     if gap == 0:
         return elongation, rate
-    half, rounding = 0.5 * gap, 0.05 * gap
-    above, below = elongation - half, elongation + half
-    a, b = sqrt(above * above + rounding * rounding), sqrt(below * below + rounding * rounding)
-    return elongation + 0.5 * (a - b), rate * (1 + 0.5 * (above / a - below / b))
+    rounding, beyond = 0.05 * gap, abs(elongation) - 0.5 * gap
+    into = beyond + rounding
+    if into <= 0:
+        return 0.0, 0.0
+    if beyond >= rounding:
+        return copysign(beyond, elongation), rate
+    square, unit = into * into, 16 * (rounding * rounding * rounding)
+    slope = (3 * square * (3 * rounding - beyond) - square * into) / unit
+    return copysign(square * into * (3 * rounding - beyond) / unit, elongation), rate * slope
 
 
 def weakening(s: Settings, at: float) -> float:
