@@ -3,6 +3,7 @@
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.configuration import BeltAxis
 from livebode.simulation.faults import Backlash, DampingGrowth, Fault, LoadChange, SoftSpot, TensionLoss
+from livebode.simulation.fmu import FmuAxis
 from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.motion import Motion, Standstill, Strokes
@@ -19,6 +20,7 @@ __all__ = [
     "DivergenceError",
     "Drive",
     "Fault",
+    "FmuAxis",
     "Friction",
     "Limits",
     "LoadChange",

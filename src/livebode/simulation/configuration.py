@@ -30,8 +30,6 @@ _OF_MECHANICS = (
     "damping_shape",
 )
 _OF_DRIVE = (
-    "torque_ripple_n_m",
-    "torque_ripple_per_turn",
     "rate_hz",
     "velocity_ticks",
     "position_ticks",
@@ -202,21 +200,32 @@ class BeltAxis:
         return ClosedLoop(self.linear(position_m, time_s), self.drive, self.sensor)
 
 
+def controller_settings(drive: Drive, sensor: Sensor) -> dict[str, Any]:
+    """What reading and control take, in C and in the twin."""
+    return {name: getattr(drive, name) for name in _OF_DRIVE} | {
+        "integral_step": 1.0 / (drive.velocity_rate_hz * drive.integral_time_s),
+        "encoder_step_rad": sensor.encoder_step_rad,
+        "velocity_differenced": int(sensor.velocity_differenced),
+    }
+
+
 def engine_settings(axis: BeltAxis) -> dict[str, Any]:
     """What the C simulation and its twin take."""
-    m, f, d, s = axis.mechanics, axis.friction, axis.drive, axis.sensor
+    m, f, d = axis.mechanics, axis.friction, axis.drive
     same = {name: getattr(f, name) for name in f.__dataclass_fields__}
     same |= {name: getattr(m, name) for name in _OF_MECHANICS}
-    same |= {name: getattr(d, name) for name in _OF_DRIVE}
-    return same | {
-        "states": 2 * m.masses,
-        "frozen": int(m.frozen_position_m is not None),
-        "frozen_position_m": m.frozen_position_m or 0.0,
-        "spots": [(spot.position_m, spot.width_m, spot.loss) for spot in axis.spots],
-        "substeps": axis.substeps_chosen,
-        "integral_step": 1.0 / (d.velocity_rate_hz * d.integral_time_s),
-        "encoder_step_rad": s.encoder_step_rad,
-        "velocity_differenced": int(s.velocity_differenced),
-        "position_m_min": axis.limits.stops_m[0],
-        "position_m_max": axis.limits.stops_m[1],
-    }
+    return (
+        controller_settings(d, axis.sensor)
+        | same
+        | {
+            "torque_ripple_n_m": d.torque_ripple_n_m,
+            "torque_ripple_per_turn": d.torque_ripple_per_turn,
+            "states": 2 * m.masses,
+            "frozen": int(m.frozen_position_m is not None),
+            "frozen_position_m": m.frozen_position_m or 0.0,
+            "spots": [(spot.position_m, spot.width_m, spot.loss) for spot in axis.spots],
+            "substeps": axis.substeps_chosen,
+            "position_m_min": axis.limits.stops_m[0],
+            "position_m_max": axis.limits.stops_m[1],
+        }
+    )

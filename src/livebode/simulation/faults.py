@@ -106,7 +106,7 @@ class DampingGrowth(OverTime):
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(OverTime):
-    """Play of `gap_m` in all between belt and cart; its corners are rounded over a twentieth of it, and within the cart is free."""
+    """Play of `gap_m` in all between belt and cart, which is free within it; corners rounded over a twentieth of it."""
 
     gap_m: float
 

@@ -9,25 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.nouns import Block, Channel, InputError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
+from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.faults import Condition
-from livebode.simulation.pace import paced
 from livebode.simulation.truth import Truth
 
 Floats = NDArray[np.float64]
-
-CHANNELS = (
-    Channel("w", "N m"),
-    Channel("u", "N m"),
-    Channel("velocity", "rad/s"),
-    Channel("position", "rad"),
-    Channel("x", "m"),
-    Channel("position_reference", "rad"),
-    Channel("velocity_reference", "rad/s"),
-)
-BLOCK_SAMPLES_MAX = 1 << 24
 
 
 class DivergenceError(ArithmeticError):
@@ -92,17 +81,11 @@ class SimulatedAxis:
         DivergenceError
             While iterating, when the state is not finite or the cart leaves its limits.
         """
-        names = [channel.name for channel in CHANNELS] if channels is None else list(channels)
-        rows = [_row(name) for name in names]
-        blocks = (_chosen(block, rows) for block, _ in self.pairs(block_samples))
-        return paced(blocks, clock, sleep) if real_time else blocks
+        return delivered((block for block, _ in self.pairs(block_samples)), channels, real_time, clock, sleep)
 
     def pairs(self, block_samples: int = 4096) -> Iterator[tuple[Block, Truth]]:
         """Blocks of all channels, each with the truth of its samples."""
-        if isinstance(block_samples, bool) or not (
-            isinstance(block_samples, int) and 1 <= block_samples <= BLOCK_SAMPLES_MAX
-        ):
-            raise InputError(f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}")
+        checked_block_samples(block_samples)
         return self._pairs(block_samples)
 
     def run(self) -> tuple[Block, Truth]:
@@ -121,7 +104,7 @@ class SimulatedAxis:
             ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
             number = np.arange(start, start + ticks)
             condition = axis.condition(number / self.rate_hz)
-            w = np.resize(np.roll(axis.excitation_n_m, -(start % max(1, axis.excitation_n_m.size))), ticks)
+            w = excitation_at(axis.excitation_n_m, number)
             references = [row[number % row.size] for row in (position, speed)]
             inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition)])
             output = self._advanced(engine, inputs, start)
@@ -144,14 +127,3 @@ class SimulatedAxis:
 
 def _rows(condition: Condition) -> list[Floats]:
     return [condition.stiffness, condition.damping, condition.load_kg, condition.gap_m]
-
-
-def _row(name: str) -> int:
-    names = [channel.name for channel in CHANNELS]
-    if name not in names:
-        raise InputError(missing_channel(name, names))
-    return names.index(name)
-
-
-def _chosen(block: Block, rows: list[int]) -> Block:
-    return Block(block.data[rows], tuple(CHANNELS[i] for i in rows), block.rate_hz, start=block.start)
