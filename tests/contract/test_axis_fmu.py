@@ -16,7 +16,7 @@ import pytest
 from livebode.estimation import Settings, Tracker
 from livebode.nouns import Block, InputError
 from livebode.simulation import DivergenceError, Drive, FmuAxis, Sensor, Standstill
-from tests.axes import LINES, MULTISINE, RATE_HZ
+from tests.axes import LINES, MULTISINE, RATE_HZ, fast_stroke
 
 fmpy = pytest.importorskip("fmpy", reason="the extra `fmu` is not installed")
 pytestmark = pytest.mark.skipif(
@@ -120,13 +120,6 @@ def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     return build(tmp_path_factory.mktemp("fmu"), request.param)
 
 
-class Still(Standstill):
-    """Holds the angle 0, where the FMU starts."""
-
-    def cycle(self, rate_hz: float) -> tuple[np.ndarray, np.ndarray]:  # noqa: ARG002
-        return np.zeros(1), np.zeros(1)
-
-
 def whole(axis: FmuAxis, block_samples: int = 4096) -> Block:
     blocks = list(axis.blocks(block_samples=block_samples))
     return Block(np.hstack([block.data for block in blocks]), blocks[0].channels, axis.rate_hz)
@@ -135,7 +128,7 @@ def whole(axis: FmuAxis, block_samples: int = 4096) -> Block:
 def test_an_estimator_sees_the_plant_of_the_fmu(fmu: Path) -> None:
     # A stiff position loop brings the periodic state within seconds.
     drive = Drive(position_gain_per_s=15.0)
-    record = whole(FmuAxis(path=fmu, drive=drive, motion=Still(), excitation_n_m=MULTISINE, seconds=6.0))
+    record = whole(FmuAxis(path=fmu, drive=drive, excitation_n_m=MULTISINE, seconds=6.0))
     settings = Settings(lines=LINES, output="velocity", input="u", excitation="w")
     found = Tracker(settings).process(record.cut(len(record) - 1200, len(record)))[-1].value
     decay = np.exp(-VISCOUS / INERTIA / RATE_HZ)
@@ -144,10 +137,15 @@ def test_an_estimator_sees_the_plant_of_the_fmu(fmu: Path) -> None:
     assert np.allclose(record["x"], 0.019 * record["position"])
 
 
+def test_the_motion_goes_from_where_the_plant_stands(fmu: Path) -> None:
+    drive, motion = Drive(position_gain_per_s=15.0, velocity_gain_n_m_s=1.0), fast_stroke()
+    record = whole(FmuAxis(path=fmu, drive=drive, motion=motion, seconds=0.9))
+    assert record["position_reference"][0] == record["position"][0] == 0
+    assert record["x"].max() == pytest.approx(motion.end_m - motion.start_m, rel=0.02)
+
+
 def test_cutting_changes_no_sample_and_every_iteration_starts_anew(fmu: Path) -> None:
-    axis = FmuAxis(
-        path=fmu, motion=Still(), excitation_n_m=MULTISINE, seconds=0.2, sensor=Sensor(noise_rad_per_s=0.1), seed=4
-    )
+    axis = FmuAxis(path=fmu, excitation_n_m=MULTISINE, seconds=0.2, sensor=Sensor(noise_rad_per_s=0.1), seed=4)
     first = whole(axis)
     assert len(first) == axis.samples == 800
     assert np.array_equal(first.data, whole(axis, 77).data)
@@ -155,7 +153,7 @@ def test_cutting_changes_no_sample_and_every_iteration_starts_anew(fmu: Path) ->
 
 
 def test_a_plant_that_blows_up_stops_the_run(fmu: Path) -> None:
-    axis = FmuAxis(path=fmu, motion=Still(), excitation_n_m=np.r_[np.zeros(50), 2000.0, np.zeros(900)], seconds=1)
+    axis = FmuAxis(path=fmu, excitation_n_m=np.r_[np.zeros(50), 2000.0, np.zeros(900)], seconds=1)
     with pytest.raises(DivergenceError) as stopped:
         whole(axis)
     assert stopped.value.time_s == pytest.approx(51 / RATE_HZ)

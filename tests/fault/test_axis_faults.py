@@ -196,7 +196,7 @@ def test_a_diverging_simulation_stops_with_time_and_state(masses: int) -> None:
     )
     blocks = SimulatedAxis(axis).blocks(block_samples=100)
     arrived = []
-    with pytest.raises(DivergenceError, match=r"stopped at 0\.\d+ s: its state \(") as stopped:
+    with pytest.raises(DivergenceError, match=r"stopped at 0\.\d+ s with the state \(") as stopped:
         arrived.extend(blocks)
     assert stopped.value.time_s > 0.1
     assert len(stopped.value.state) == 2 * masses

@@ -166,7 +166,7 @@ class BeltAxis:
             return self.substeps
         fastest = max(
             float(np.max(np.abs(np.linalg.eigvals(self.linear(x, t).a))))
-            for x in self.limits.stops_m
+            for x in (self._places_m[0] - self.limits.overrun_m, self._places_m[-1] + self.limits.overrun_m)
             for t in self._moments_s.tolist()
         )
         smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)

@@ -32,8 +32,8 @@ class FmuAxis:
     """Drive and motion as in a BeltAxis around a plant of one's own; needs the extra ``fmu`` (fmpy).
 
     At every tick the FMU's angle and velocity are read, the controllers updated, the torque set, and one step of a
-    tick made. The FMU starts with its own start values, so the motion should begin where it stands. There is no truth
-    beside, and stability is not judged beforehand; a value that is not finite stops the run with a DivergenceError.
+    tick made. The FMU starts with its own start values, and the motion goes from there. There is no truth beside, and
+    stability is not judged beforehand; a value that is not finite stops the run with a DivergenceError.
 
     Parameters
     ----------
@@ -127,6 +127,7 @@ class FmuAxis:
 
     def _run(self, plant: _Instance, block_samples: int) -> Iterator[Block]:
         position, speed = (row / self.radius_m for row in self.motion.cycle(self.rate_hz))
+        position = position - position[0] + plant.read()[0]
         noise = np.random.default_rng(self.seed)
         controller = Controller(controller_settings(self.drive, self.sensor), plant.read()[0])
         start = 0
@@ -147,7 +148,7 @@ class FmuAxis:
     ) -> tuple[float, float, float, float]:
         values = plant.read()
         if not all(isfinite(value) for value in values):
-            raise DivergenceError(number / self.rate_hz, values, self.limits.stops_m)
+            raise DivergenceError(number / self.rate_hz, values, "the FMU's outputs, of which one is not finite")
         now = Now._make([*given, *_NO_FAULT])
         torque, velocity, reading = controller.tick(values[0], values[1], now)
         plant.step(torque, number / self.rate_hz, 1 / self.rate_hz)

@@ -22,13 +22,10 @@ Floats = NDArray[np.float64]
 class DivergenceError(ArithmeticError):
     """The simulated machine left what can be: the time and the state stand in the message and as attributes."""
 
-    def __init__(self, time_s: float, state: Sequence[float], limits: tuple[float, float]) -> None:
+    def __init__(self, time_s: float, state: Sequence[float], why: str) -> None:
         self.time_s, self.state = time_s, tuple(state)
         numbers = ", ".join(f"{value:.6g}" for value in self.state)
-        super().__init__(
-            f"the simulation stopped at {time_s:.6f} s: its state ({numbers}; angle and speed of each pulley, position "
-            f"and speed of the cart) is not finite, or the cart is outside {limits[0]:g} … {limits[1]:g} m"
-        )
+        super().__init__(f"the simulation stopped at {time_s:.6f} s with the state ({numbers}): {why}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +118,12 @@ class SimulatedAxis:
         output = np.empty((3 + len(engine.plant), ticks))
         done = engine.advance(inputs, output)
         if done < ticks:
-            raise DivergenceError((start + done) / self.rate_hz, engine.plant, self.axis.limits.stops_m)
+            low, high = self.axis.limits.stops_m
+            why = (
+                "angle and speed of each pulley, position and speed of the cart, "
+                f"of which one is not finite or the cart is outside {low:g} … {high:g} m"
+            )
+            raise DivergenceError((start + done) / self.rate_hz, engine.plant, why)
         return output
 
 
