@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
-NATIVE  = $(shell find kernel CMakeLists.txt src/livebode/kernel -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
+NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
 .PHONY: help demo test lint bench fuzz system-packages lock clean
 

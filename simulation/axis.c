@@ -1,0 +1,175 @@
+#include "axis.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "dop853.h"
+
+/* What friction and play need of one degree of freedom. */
+typedef struct {
+    double slack, rate; /* elongation beyond the play, and its time derivative */
+} lb_play;
+
+/* viscous v + (coulomb + stribeck/(1 + (v/vs)^2)) v/sqrt(v^2 + w^2); `speed` is v in m/s at the belt. */
+static double friction(double coulomb, double stribeck, double vs, double w, double speed) {
+    if (coulomb == 0.0 && stribeck == 0.0) return 0.0;
+    const double ratio = speed / vs;
+    return (coulomb + stribeck / (1.0 + ratio * ratio)) * (speed / sqrt(speed * speed + w * w));
+}
+
+/* Dead zone of total width gap; within a twentieth of it around each corner a quartic joins the two straights, smooth up to
+ * its second derivative. */
+static lb_play play(double gap, double elongation, double rate) {
+    if (gap == 0.0) return (lb_play){elongation, rate};
+    const double round = 0.05 * gap, beyond = fabs(elongation) - 0.5 * gap, into = beyond + round;
+    if (into <= 0.0) return (lb_play){0.0, 0.0};
+    if (beyond >= round) return (lb_play){copysign(beyond, elongation), rate};
+    const double square = into * into, unit = 16.0 * (round * round * round);
+    const double slope = (3.0 * square * (3.0 * round - beyond) - square * into) / unit;
+    return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
+}
+
+static double spots(const lb_axis_config *c, double at) {
+    double factor = 1.0;
+    for (int i = 0; i < c->spots; ++i) {
+        const double u = (at - c->spot[i].position_m) / c->spot[i].width_m;
+        const double bump = 1.0 / (1.0 + u * u);
+        factor *= 1.0 - c->spot[i].loss * (bump * bump);
+    }
+    return factor;
+}
+
+static void two_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+    const double r = c->radius_m, at = c->frozen ? c->frozen_position_m : s[2];
+    const double shape = 1.0 / at + 1.0 / (2.0 * c->pulley_distance_m - at);
+    const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at) * shape;
+    const double b = c->damping_shape * now[LB_AXIS_DAMPING] * sqrt(shape);
+    const lb_play p = play(now[LB_AXIS_GAP], r * s[0] - s[2], r * s[1] - s[3]);
+    const double force = k * p.slack + b * p.rate;
+    d[0] = s[1];
+    d[1] = (torque - r * force) / c->motor_inertia_kg_m2;
+    d[2] = s[3];
+    d[3] = force;
+}
+
+static void three_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+    const double r = c->radius_m, at = c->frozen ? c->frozen_position_m : s[4], l3 = c->pulley_distance_m;
+    const double s1 = 1.0 / at, s2 = 1.0 / (l3 - at), s3 = 1.0 / l3;
+    const double shape = s1 + 1.0 / (2.0 * l3 - at);
+    const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at);
+    const double b = c->damping_shape * now[LB_AXIS_DAMPING] / sqrt(shape);
+    /* The belt where it holds the cart: the cart itself, or within the play where the spans alone would have it. */
+    const double free = (s1 * (r * s[0]) + s2 * (r * s[2])) / (s1 + s2);
+    const double free_rate = (s1 * (r * s[1]) + s2 * (r * s[3])) / (s1 + s2);
+    const lb_play p = play(now[LB_AXIS_GAP], free - s[4], free_rate - s[5]);
+    const double x = now[LB_AXIS_GAP] == 0.0 ? s[4] : free - p.slack;
+    const double v = now[LB_AXIS_GAP] == 0.0 ? s[5] : free_rate - p.rate;
+    const double f1 = s1 * (k * (r * s[0] - x) + b * (r * s[1] - v));
+    const double f2 = s2 * (k * (x - r * s[2]) + b * (v - r * s[3]));
+    const double f3 = s3 * (k * (r * (s[2] - s[0])) + b * (r * (s[3] - s[1])));
+    d[0] = s[1];
+    d[1] = (torque - r * f1 + r * f3) / c->motor_inertia_kg_m2;
+    d[2] = s[3];
+    d[3] = r * (f2 - f3) / c->pulley_inertia_kg_m2;
+    d[4] = s[5];
+    d[5] = f1 - f2;
+}
+
+void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+    const double omega = s[1], v = s[c->states - 1], vs = c->stribeck_speed_m_per_s, w = c->smoothing_m_per_s;
+    double drive = torque - c->motor_viscous_n_m_s * omega -
+                   friction(c->motor_coulomb_n_m, c->motor_stribeck_n_m, vs, w, c->radius_m * omega);
+    if (c->torque_ripple_n_m != 0.0) drive += c->torque_ripple_n_m * sin(c->torque_ripple_per_turn * s[0]);
+    if (c->states == 4)
+        two_masses(c, now, drive, s, d);
+    else
+        three_masses(c, now, drive, s, d);
+    const double resisting =
+        c->load_viscous_n_s_per_m * v + friction(c->load_coulomb_n, c->load_stribeck_n, vs, w, v);
+    d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
+}
+
+/* One step of order 8 under constant torque. */
+static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state) {
+    double slope[LB_STAGES][LB_AXIS_STATES], at[LB_AXIS_STATES];
+    const int n = c->states;
+    memcpy(at, state, sizeof at);
+    for (int stage = 0; stage < LB_STAGES; ++stage) {
+        lb_axis_derivative(c, now, torque, at, slope[stage]);
+        const lb_combination *mix = &lb_dop853[stage];
+        double sum[LB_AXIS_STATES] = {0.0};
+        for (int j = 0; j < mix->terms; ++j)
+            for (int i = 0; i < n; ++i) sum[i] += mix->weight[j] * slope[mix->stage[j]][i];
+        for (int i = 0; i < n; ++i) at[i] = state[i] + seconds * sum[i];
+    }
+    memcpy(state, at, sizeof at);
+}
+
+static int alive(const lb_axis_config *c, const lb_axis_state *state) {
+    for (int i = 0; i < c->states; ++i)
+        if (!isfinite(state->plant[i])) return 0;
+    const double x = state->plant[c->states - 2];
+    return x >= c->position_m_min && x <= c->position_m_max;
+}
+
+/* What the drive reads: the angle in steps of the encoder, and the velocity with the steps' differences. */
+static double read_velocity(const lb_axis_config *c, lb_axis_state *state) {
+    const double angle = state->plant[0], q = c->encoder_step_rad;
+    const double reading = q > 0.0 ? floor(angle / q + 0.5) * q : angle;
+    const double velocity =
+        c->velocity_differenced
+            ? (reading - state->reading) * c->rate_hz
+            : state->plant[1] + ((reading - angle) - (state->reading - state->angle)) * c->rate_hz;
+    state->reading = reading;
+    state->angle = angle;
+    return velocity;
+}
+
+/* Position and velocity loop (Nevaranta 2016, Fig. 7), then the delay, the excitation and the limit. */
+static double control(const lb_axis_config *c, lb_axis_state *state, const double *now, double velocity) {
+    if (state->tick % (uint64_t)c->position_ticks == 0)
+        state->held = c->position_gain_per_s * (now[LB_AXIS_POSITION_REFERENCE] - state->reading) +
+                      c->velocity_feedforward * now[LB_AXIS_VELOCITY_REFERENCE];
+    if (state->tick % (uint64_t)c->velocity_ticks == 0) {
+        const double error = state->held - velocity;
+        if (!state->limited) state->integral += error * c->integral_step;
+        state->control = c->velocity_gain_n_m_s * (error + state->integral);
+    }
+    double torque = state->control;
+    if (c->delay_ticks > 0) {
+        double *slot = &state->delayed[state->tick % (uint64_t)c->delay_ticks];
+        torque = *slot;
+        *slot = state->control;
+    }
+    torque += now[LB_AXIS_EXCITATION];
+    state->limited = fabs(torque) > c->torque_n_m_max;
+    return state->limited ? copysign(c->torque_n_m_max, torque) : torque;
+}
+
+void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *state) {
+    memset(state, 0, sizeof *state);
+    state->plant[0] = position_m / c->radius_m;
+    if (c->states == 6) state->plant[2] = position_m / c->radius_m;
+    state->plant[c->states - 2] = position_m;
+    state->angle = state->plant[0];
+    state->reading =
+        c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad : state->angle;
+}
+
+size_t lb_axis_advance(const lb_axis_config *c, lb_axis_state *state, size_t ticks, const double *input,
+                       double *output) {
+    const double seconds = 1.0 / (c->rate_hz * c->substeps);
+    for (size_t n = 0; n < ticks; ++n) {
+        if (!alive(c, state)) return n;
+        double now[LB_AXIS_INPUTS];
+        for (int i = 0; i < LB_AXIS_INPUTS; ++i) now[i] = input[(size_t)i * ticks + n];
+        const double velocity = read_velocity(c, state) + now[LB_AXIS_NOISE];
+        const double torque = control(c, state, now, velocity);
+        const double signals[LB_AXIS_SIGNALS] = {torque, velocity, state->reading};
+        for (int i = 0; i < LB_AXIS_SIGNALS; ++i) output[(size_t)i * ticks + n] = signals[i];
+        for (int i = 0; i < c->states; ++i) output[(size_t)(LB_AXIS_SIGNALS + i) * ticks + n] = state->plant[i];
+        for (int i = 0; i < c->substeps; ++i) step(c, now, torque, seconds, state->plant);
+        ++state->tick;
+    }
+    return ticks;
+}

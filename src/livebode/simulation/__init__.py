@@ -1,0 +1,40 @@
+"""The axis on the bench: a simulated tooth-belt drive whose truth is known (Nevaranta 2016)."""
+
+from livebode.simulation.closed_loop import ClosedLoop
+from livebode.simulation.configuration import BeltAxis
+from livebode.simulation.faults import Backlash, DampingGrowth, Fault, LoadChange, SoftSpot, TensionLoss
+from livebode.simulation.fmu import FmuAxis
+from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
+from livebode.simulation.mechanics import Mechanics, Spans
+from livebode.simulation.motion import Motion, Standstill, Strokes
+from livebode.simulation.settings import Drive, Friction, Limits, Sensor
+from livebode.simulation.source import DivergenceError, SimulatedAxis
+from livebode.simulation.truth import Truth
+
+__all__ = [
+    "Backlash",
+    "BeltAxis",
+    "BeltResponse",
+    "ClosedLoop",
+    "DampingGrowth",
+    "DivergenceError",
+    "Drive",
+    "Fault",
+    "FmuAxis",
+    "Friction",
+    "Limits",
+    "LoadChange",
+    "Mechanics",
+    "Motion",
+    "Sampled",
+    "Sensor",
+    "SimulatedAxis",
+    "SoftSpot",
+    "Spans",
+    "Standstill",
+    "StateSpace",
+    "Strokes",
+    "TensionLoss",
+    "Truth",
+    "linear",
+]

@@ -1,0 +1,231 @@
+"""BeltAxis: everything about one simulated run, checked before it starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import ceil, inf, isnan, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+from livebode.simulation.closed_loop import ClosedLoop
+from livebode.simulation.faults import Condition, Fault, SoftSpot, condition_at
+from livebode.simulation.linear import StateSpace, linear
+from livebode.simulation.mechanics import Mechanics, Spans
+from livebode.simulation.motion import Motion, Standstill
+from livebode.simulation.settings import Drive, Friction, Limits, Sensor
+from livebode.simulation.values import count
+
+Floats = NDArray[np.float64]
+SPOTS_MAX = 16
+SUBSTEPS_MAX = 1000
+_OF_MECHANICS = (
+    "motor_inertia_kg_m2",
+    "pulley_inertia_kg_m2",
+    "radius_m",
+    "specific_stiffness_n",
+    "pulley_distance_m",
+    "damping_shape",
+)
+_OF_DRIVE = (
+    "rate_hz",
+    "velocity_ticks",
+    "position_ticks",
+    "delay_ticks",
+    "velocity_gain_n_m_s",
+    "position_gain_per_s",
+    "velocity_feedforward",
+    "torque_n_m_max",
+)
+# The product of the fastest mode (rad/s) and a step of the integration; the order-8 method then errs by 1e-10 or less.
+_STEP_MAX = 0.2
+# Of the largest eigenvalue over 1; rounding alone makes the double one of an open loop this large.
+_UNSTABLE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BeltAxis:
+    """A tooth-belt axis, its drive, its motion and what goes wrong with it.
+
+    Parameters
+    ----------
+    mechanics, friction, drive, sensor, limits
+        The machine.
+    motion
+        `Strokes` or `Standstill`, or anything with their two methods.
+    excitation_n_m
+        One period of the excitation w, N m, repeated from the first tick on; empty for none.
+    faults
+        Any number, all at work together.
+    seconds
+        Length of the run; infinite by default.
+    seed
+        Of the sensor's noise: the same seed, the same samples.
+    substeps
+        Integration steps in a tick; None chooses them from the fastest mode.
+
+    Raises
+    ------
+    InputError
+        If the motion leaves the limits, a rate does not divide, or the loop is unstable at an end or the middle of the
+        motion's way, at a soft spot on it, or at any fault's beginning or end.
+
+    Examples
+    --------
+    >>> axis = BeltAxis(motion=Standstill(position_m=0.8), seconds=10)
+    >>> axis.substeps_chosen
+    1
+    """
+
+    mechanics: Mechanics = field(default_factory=Mechanics)
+    friction: Friction = field(default_factory=Friction)
+    drive: Drive = field(default_factory=Drive)
+    sensor: Sensor = field(default_factory=Sensor)
+    limits: Limits = field(default_factory=Limits)
+    motion: Motion = field(default_factory=Standstill)
+    excitation_n_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    faults: tuple[Fault, ...] = ()
+    seconds: float = inf
+    seed: int = 0
+    substeps: int | None = None
+
+    def __post_init__(self) -> None:
+        excitation = np.array(self.excitation_n_m, dtype=np.float64)
+        excitation.flags.writeable = False
+        object.__setattr__(self, "excitation_n_m", excitation)
+        object.__setattr__(self, "faults", tuple(self.faults))
+        self._check_numbers()
+        low, high = self.limits.stops_m
+        if low <= 0 or high >= self.mechanics.pulley_distance_m:
+            raise InputError(
+                f"the stroke with its overrun goes from {low:g} to {high:g} m; it must lie between the pulleys, "
+                f"0 and pulley_distance_m={self.mechanics.pulley_distance_m}"
+            )
+        self.motion.check(self.limits)
+        self._check_faults()
+        self._check_stability()
+
+    def _check_numbers(self) -> None:
+        if self.excitation_n_m.ndim != 1 or not np.all(np.isfinite(self.excitation_n_m)):
+            raise InputError(
+                f"excitation_n_m has shape {self.excitation_n_m.shape}; give one period of finite numbers, N m"
+            )
+        if isnan(self.seconds) or self.seconds <= 0:
+            raise InputError(f"seconds={self.seconds} is not above 0; leave it out for a run without end")
+        count(self, "seed", 1 << 63)
+        if self.substeps is not None:
+            count(self, "substeps", SUBSTEPS_MAX)
+            if self.substeps < 1:
+                raise InputError(f"substeps={self.substeps} is not at least 1; leave it out to have them chosen")
+
+    def _check_faults(self) -> None:
+        if len(self.spots) > SPOTS_MAX:
+            raise InputError(f"there are {len(self.spots)} soft spots; at most {SPOTS_MAX} are simulated")
+        condition = self.condition(self._moments_s)
+        for name in ("stiffness", "damping", "load_kg"):
+            if (least := float(np.min(getattr(condition, name)))) <= 0:
+                raise InputError(f"the faults together bring {name} to {least:g}; it must stay above 0")
+
+    def _check_stability(self) -> None:
+        for time_s in self._moments_s.tolist():
+            for position_m in self._places_m:
+                radius = self.closed_loop(position_m, time_s).spectral_radius
+                if radius > 1 + _UNSTABLE:
+                    raise InputError(
+                        f"the closed loop is unstable with the cart at {position_m:g} m, {time_s:g} s: an eigenvalue "
+                        f"has size {radius:.6f}, above 1; lower the gains or the delay"
+                    )
+
+    @property
+    def _moments_s(self) -> Floats:
+        return np.array(sorted({0.0, *(moment for fault in self.faults for moment in fault.moments_s)}))
+
+    @property
+    def _places_m(self) -> list[float]:
+        """Ends and middle of the motion, and the soft spots on its way."""
+        position, _ = self.motion.cycle(self.drive.rate_hz)
+        low, high = float(position.min()), float(position.max())
+        inside = {spot.position_m for spot in self.spots if low <= spot.position_m <= high}
+        return sorted({low, (low + high) / 2, high} | inside)
+
+    @property
+    def spots(self) -> tuple[SoftSpot, ...]:
+        return tuple(fault for fault in self.faults if isinstance(fault, SoftSpot))
+
+    @property
+    def samples(self) -> int | None:
+        """Ticks of the run; None without end."""
+        return None if self.seconds == inf else round(self.seconds * self.drive.rate_hz)
+
+    @property
+    def substeps_chosen(self) -> int:
+        """Integration steps in a tick."""
+        if self.substeps is not None:
+            return self.substeps
+        fastest = max(
+            float(np.max(np.abs(np.linalg.eigvals(self.linear(x, t).a))))
+            for x in (self._places_m[0] - self.limits.overrun_m, self._places_m[-1] + self.limits.overrun_m)
+            for t in self._moments_s.tolist()
+        )
+        smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)
+        backlash = bool(np.any(self.condition(self._moments_s).gap_m))
+        # A sign smoothed over less speed bends within less time (measured: 5e-8 of a stroke at worst, docs/axis.md).
+        dry = 2 * ceil(sqrt(0.005 / self.friction.smoothing_m_per_s)) if self.friction.dry else 1
+        return max(smooth, dry, 16 if backlash else 1)
+
+    def condition(self, time_s: Floats) -> Condition:
+        """The machine's parameters at these times, without the soft spots."""
+        return condition_at(self.faults, time_s, self.mechanics.load_kg)
+
+    def weakening(self, position_m: Floats) -> Floats:
+        """Factor of the soft spots on the stiffness with the cart at these positions."""
+        at = self.mechanics.effective(position_m)
+        return np.asarray(np.prod([spot.factor(at) for spot in self.spots], axis=0) * np.ones(np.shape(at)))
+
+    def spans(self, position_m: float, time_s: float = 0.0) -> Spans:
+        """The belt with the cart at `position_m`, under the faults of that time."""
+        condition = self.condition(np.array([time_s]))
+        factor = float(condition.stiffness[0]) * float(self.weakening(np.array(position_m)))
+        return Spans.of(self.mechanics, position_m, factor, float(condition.damping[0]))
+
+    def linear(self, position_m: float, time_s: float = 0.0) -> StateSpace:
+        """The exact linearisation around rest at a cart position, torque to motor velocity, continuous."""
+        load_kg = float(self.condition(np.array([time_s])).load_kg[0])
+        return linear(self.mechanics, self.friction, self.spans(position_m, time_s), load_kg)
+
+    def closed_loop(self, position_m: float, time_s: float = 0.0) -> ClosedLoop:
+        """That linearisation in the drive's loop: Y/W, U/W."""
+        return ClosedLoop(self.linear(position_m, time_s), self.drive, self.sensor)
+
+
+def controller_settings(drive: Drive, sensor: Sensor) -> dict[str, Any]:
+    """What reading and control take, in C and in the twin."""
+    return {name: getattr(drive, name) for name in _OF_DRIVE} | {
+        "integral_step": 1.0 / (drive.velocity_rate_hz * drive.integral_time_s),
+        "encoder_step_rad": sensor.encoder_step_rad,
+        "velocity_differenced": int(sensor.velocity_differenced),
+    }
+
+
+def engine_settings(axis: BeltAxis) -> dict[str, Any]:
+    """What the C simulation and its twin take."""
+    m, f, d = axis.mechanics, axis.friction, axis.drive
+    same = {name: getattr(f, name) for name in f.__dataclass_fields__}
+    same |= {name: getattr(m, name) for name in _OF_MECHANICS}
+    return (
+        controller_settings(d, axis.sensor)
+        | same
+        | {
+            "torque_ripple_n_m": d.torque_ripple_n_m,
+            "torque_ripple_per_turn": d.torque_ripple_per_turn,
+            "states": 2 * m.masses,
+            "frozen": int(m.frozen_position_m is not None),
+            "frozen_position_m": m.frozen_position_m or 0.0,
+            "spots": [(spot.position_m, spot.width_m, spot.loss) for spot in axis.spots],
+            "substeps": axis.substeps_chosen,
+            "position_m_min": axis.limits.stops_m[0],
+            "position_m_max": axis.limits.stops_m[1],
+        }
+    )

@@ -1,0 +1,160 @@
+"""What goes wrong with a machine: over time as a step or a ramp, or at a place of the belt. Any number together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+from livebode.simulation.values import nonnegative, positive
+
+Floats = NDArray[np.float64]
+
+
+@dataclass
+class Condition:
+    """The machine's parameters at some moments, each an array: factors on stiffness and damping, load, play."""
+
+    stiffness: Floats
+    damping: Floats
+    load_kg: Floats
+    gap_m: Floats
+
+    @classmethod
+    def healthy(cls, samples: int, load_kg: float) -> Condition:
+        return cls(np.ones(samples), np.ones(samples), np.full(samples, load_kg), np.zeros(samples))
+
+
+class Fault(Protocol):
+    """To add a fault over time, write a class with these two; simulation, truth and checks take it from there."""
+
+    @property
+    def moments_s(self) -> tuple[float, ...]:
+        """When it begins and when it has come to its end: the stability of the loop is checked there."""
+        ...
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        """Changes the condition at these times in place."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTime:
+    """Begins at `start_s` and grows evenly for `ramp_s`; 0 is a step."""
+
+    start_s: float = 0.0
+    ramp_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        nonnegative(self, "start_s", "ramp_s")
+
+    @property
+    def moments_s(self) -> tuple[float, ...]:
+        return self.start_s, self.start_s + self.ramp_s
+
+    def share(self, time_s: Floats) -> Floats:
+        """How much of it there is, 0 … 1.
+
+        >>> OverTime(start_s=1.0, ramp_s=2.0).share(np.array([0.5, 1.0, 2.0, 9.0]))
+        array([0. , 0. , 0.5, 1. ])
+        """
+        if self.ramp_s == 0:
+            return np.asarray((time_s >= self.start_s).astype(np.float64))
+        return np.clip((time_s - self.start_s) / self.ramp_s, 0.0, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TensionLoss(OverTime):
+    """The belt loses this share of its stiffness, in every span; its damping stays."""
+
+    loss: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _share_below_1(self.loss)
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        condition.stiffness *= 1 - self.loss * self.share(time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadChange(OverTime):
+    """The cart's mass changes by `load_kg`, at the speed that it has."""
+
+    load_kg: float
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        condition.load_kg += self.load_kg * self.share(time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DampingGrowth(OverTime):
+    """The damping of every span grows to `factor` times what it was."""
+
+    factor: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive(self, "factor")
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        condition.damping *= 1 + (self.factor - 1) * self.share(time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Backlash(OverTime):
+    """Play of `gap_m` in all between belt and cart, which is free within it; corners rounded over a twentieth of it."""
+
+    gap_m: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive(self, "gap_m")
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        condition.gap_m += self.gap_m * self.share(time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoftSpot:
+    """A worn place of the belt: with the cart near it the stiffness is less by loss/(1 + ((x − position)/width)²)²."""
+
+    position_m: float
+    width_m: float
+    loss: float
+
+    def __post_init__(self) -> None:
+        positive(self, "position_m", "width_m")
+        _share_below_1(self.loss)
+
+    @property
+    def moments_s(self) -> tuple[float, ...]:
+        return ()
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        """Nothing over time."""
+
+    def factor(self, position_m: Floats) -> Floats:
+        """What is left of the stiffness with the cart at these positions.
+
+        >>> SoftSpot(position_m=1.0, width_m=0.1, loss=0.2).factor(np.array([0.0, 1.0, 1.1])).round(4)
+        array([1.  , 0.8 , 0.95])
+        """
+        bump = 1 / (1 + ((position_m - self.position_m) / self.width_m) ** 2)
+        return np.asarray(1 - self.loss * bump**2)
+
+
+def _share_below_1(loss: float) -> None:
+    if not 0 <= loss < 1:
+        raise InputError(f"loss={loss} is not a share from 0 up to but without 1")
+
+
+def condition_at(faults: tuple[Fault, ...], time_s: Floats, load_kg: float) -> Condition:
+    """The machine under all faults at these times."""
+    condition = Condition.healthy(len(time_s), load_kg)
+    for fault in faults:
+        fault.act(time_s, condition)
+    return condition

@@ -1,0 +1,217 @@
+"""A user's own plant as an FMU (FMI 2 or 3, co-simulation) under the drive's cascade, as a source of Blocks."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.simulation.configuration import controller_settings
+from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
+from livebode.simulation.motion import Motion, Standstill
+from livebode.simulation.settings import Drive, Limits, Sensor
+from livebode.simulation.source import DivergenceError
+from livebode.simulation.twin import Controller, Now
+from livebode.simulation.values import positive
+
+Floats = NDArray[np.float64]
+_NO_FAULT = (1.0, 1.0, 1.0, 0.0)  # the FMU has its own
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FmuAxis:
+    """Drive and motion as in a BeltAxis around a plant of one's own; needs the extra ``fmu`` (fmpy).
+
+    At every tick the FMU's angle and velocity are read, the controllers updated, the torque set, and one step of a
+    tick made. The FMU starts with its own start values, and the motion goes from there. There is no truth beside, and
+    stability is not judged beforehand; a value that is not finite stops the run with a DivergenceError.
+
+    Parameters
+    ----------
+    path
+        The FMU: FMI 2 or 3 with co-simulation for this platform. It is native code with this process's rights.
+    torque, velocity, position
+        Names of its input, N m, and its outputs, rad/s and rad.
+    cart
+        Name of an output for the channel x, m; None takes `radius_m` times the position.
+    radius_m
+        Turns the motion's metres into the motor's angle.
+    drive, sensor, limits, motion, excitation_n_m, seconds, seed
+        As in BeltAxis.
+
+    Raises
+    ------
+    InputError
+        If fmpy is missing, the file is no such FMU, a name is none of its variables, or the motion leaves its limits.
+    """
+
+    path: Path | str
+    torque: str = "torque"
+    velocity: str = "velocity"
+    position: str = "position"
+    cart: str | None = None
+    radius_m: float = 0.019
+    drive: Drive = field(default_factory=Drive)
+    sensor: Sensor = field(default_factory=Sensor)
+    limits: Limits = field(default_factory=Limits)
+    motion: Motion = field(default_factory=Standstill)
+    excitation_n_m: Floats = field(default_factory=lambda: np.zeros(0))
+    seconds: float = inf
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "excitation_n_m", np.array(self.excitation_n_m, dtype=np.float64))
+        positive(self, "radius_m")
+        if not self.seconds > 0:
+            raise InputError(f"seconds={self.seconds} is not above 0; leave it out for a run without end")
+        if self.excitation_n_m.ndim != 1 or not np.all(np.isfinite(self.excitation_n_m)):
+            raise InputError("excitation_n_m is not one period of finite numbers, N m")
+        if self.drive.torque_ripple_n_m:
+            raise InputError(
+                f"torque_ripple_n_m={self.drive.torque_ripple_n_m}: an FMU brings its own ripple; set it to 0"
+            )
+        self.motion.check(self.limits)
+        self._references()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return CHANNELS
+
+    @property
+    def rate_hz(self) -> float:
+        return self.drive.rate_hz
+
+    @property
+    def samples(self) -> int | None:
+        """Samples of the run; None without end."""
+        return None if self.seconds == inf else round(self.seconds * self.rate_hz)
+
+    def blocks(
+        self,
+        channels: Sequence[str] | None = None,
+        block_samples: int = 4096,
+        *,
+        real_time: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> Iterator[Block]:
+        """The samples from the first to the last, from a fresh instance of the FMU."""
+        checked_block_samples(block_samples)
+        return delivered(self._blocks(block_samples), channels, real_time, clock, sleep)
+
+    def _references(self) -> list[int]:
+        """Value references of torque, angle, velocity and, where there is one, the cart."""
+        known = {v.name: v.valueReference for v in _description(self.path).modelVariables}
+        names = [self.torque, self.position, self.velocity, *([] if self.cart is None else [self.cart])]
+        for name in names:
+            if name not in known:
+                raise InputError(missing_channel(name, known))
+        return [known[name] for name in names]
+
+    def _blocks(self, block_samples: int) -> Iterator[Block]:
+        entry, *exits = self._references()
+        plant = _Instance(self.path, entry, exits)
+        try:
+            yield from self._run(plant, block_samples)
+        finally:
+            plant.close()
+
+    def _run(self, plant: _Instance, block_samples: int) -> Iterator[Block]:
+        position, speed = (row / self.radius_m for row in self.motion.cycle(self.rate_hz))
+        position = position - position[0] + plant.read()[0]
+        noise = np.random.default_rng(self.seed)
+        controller = Controller(controller_settings(self.drive, self.sensor), plant.read()[0])
+        start = 0
+        while self.samples is None or start < self.samples:
+            ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
+            number = np.arange(start, start + ticks)
+            w = excitation_at(self.excitation_n_m, number)
+            references = [row[number % row.size] for row in (position, speed)]
+            disturbed = self.sensor.noise_rad_per_s * noise.standard_normal(ticks)
+            rows = np.array([*references, w, disturbed])
+            logged = [self._tick(plant, controller, column, start + i) for i, column in enumerate(rows.T.tolist())]
+            data = np.vstack([w, np.array(logged).T, references])
+            yield Block(data, CHANNELS, self.rate_hz, start=start)
+            start += ticks
+
+    def _tick(
+        self, plant: _Instance, controller: Controller, given: list[float], number: int
+    ) -> tuple[float, float, float, float]:
+        values = plant.read()
+        if not all(isfinite(value) for value in values):
+            raise DivergenceError(number / self.rate_hz, values, "the FMU's outputs, of which one is not finite")
+        now = Now._make([*given, *_NO_FAULT])
+        torque, velocity, reading = controller.tick(values[0], values[1], now)
+        plant.step(torque, number / self.rate_hz, 1 / self.rate_hz)
+        return torque, velocity, reading, values[2] if self.cart is not None else values[0] * self.radius_m
+
+
+class _Instance:
+    """One instance of an FMU: FMI 2 and 3 behind the same three verbs."""
+
+    def __init__(self, path: Path | str, entry: int, exits: list[int]) -> None:
+        fmpy = _fmpy()
+        description = _description(path)
+        self._entry, self._exits = [entry], exits
+        self._folder = fmpy.extract(str(path))
+        try:
+            self._fmu = fmpy.simulation.instantiate_fmu(self._folder, description, "CoSimulation")
+        except Exception as error:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise InputError(f"{path} cannot be started: {error}") from error
+        third = description.fmiVersion.startswith("3")
+        self._set = self._fmu.setFloat64 if third else self._fmu.setReal
+        self._get = self._fmu.getFloat64 if third else self._fmu.getReal
+        if not third:
+            self._fmu.setupExperiment(startTime=0.0)
+        self._fmu.enterInitializationMode()
+        self._fmu.exitInitializationMode()
+
+    def read(self) -> list[float]:
+        """Angle, velocity and, where there is one, the cart."""
+        return [float(value) for value in self._get(self._exits)]
+
+    def step(self, torque: float, time_s: float, tick_s: float) -> None:
+        self._set(self._entry, [torque])
+        self._fmu.doStep(currentCommunicationPoint=time_s, communicationStepSize=tick_s)
+
+    def close(self) -> None:
+        with suppress(Exception):
+            self._fmu.terminate()
+        self._fmu.freeInstance()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _fmpy() -> Any:
+    try:
+        import fmpy
+        import fmpy.simulation
+    except ImportError as error:
+        raise InputError("FMUs need fmpy; install livebode with its extra: pip install 'livebode[fmu]'") from error
+    return fmpy
+
+
+def _description(path: Path | str) -> Any:
+    """The model description of an FMU that can be simulated here; InputError otherwise."""
+    fmpy = _fmpy()
+    try:
+        description = fmpy.read_model_description(str(path))
+        platforms = fmpy.supported_platforms(str(path))
+    except Exception as error:
+        raise InputError(f"{path} is no FMU that can be read: {error}") from error
+    if description.coSimulation is None or not description.fmiVersion.startswith(("2", "3")):
+        raise InputError(
+            f"{path} has FMI {description.fmiVersion} without co-simulation; export it for FMI 2 or 3 with it"
+        )
+    if fmpy.platform not in platforms and fmpy.platform_tuple not in platforms:
+        raise InputError(f"{path} has binaries for {', '.join(platforms)}, not for {fmpy.platform}; export it for here")
+    return description

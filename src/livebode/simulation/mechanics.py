@@ -1,0 +1,161 @@
+"""The belt drive's constants, and its spans at a cart position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError
+from livebode.simulation.values import nonnegative, positive
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mechanics:
+    """A tooth belt around two pulleys that moves a cart (Nevaranta 2016, eqs. (8)–(13); defaults: Table I at 0.8 m).
+
+    The cart at x divides the lower run: l1 = x from the motor's pulley to the cart, l2 = l3 − x from the cart to the
+    free pulley; l3 is the upper run. A span of length l has the stiffness c/l with one specific stiffness c, chosen so
+    that Keff is `stiffness_n_per_m` at the nominal position. The damping of every span is the same fraction of its
+    stiffness, so that together they damp with bs(x) = `damping_n_s_per_m`·√(Keff(x)/Keff(nominal)): a constant
+    quality factor, as in Table I.
+
+    Parameters
+    ----------
+    masses
+        2 for (11), (12); 3 for (8)–(10), with the free pulley.
+    inertia_kg_m2
+        Js: motor and both pulleys.
+    pulley_inertia_kg_m2
+        Jp, one pulley. With two masses it is only part of Js.
+    load_kg
+        mL, the cart.
+    radius_m
+        r of both pulleys.
+    pulley_distance_m
+        l3.
+    stiffness_n_per_m, damping_n_s_per_m
+        Keff and bs with the cart at `nominal_position_m`.
+    frozen_position_m
+        The spans stay those of the cart at this position, wherever it is: a linear machine. None: they follow the cart.
+
+    Raises
+    ------
+    InputError
+        If a constant is not positive, or the position is not between the pulleys.
+
+    Examples
+    --------
+    >>> belt = Mechanics()
+    >>> float(belt.stiffness_at(0.8)), round(belt.specific_stiffness_n)
+    (500000.0, 325234)
+    >>> belt.stiffness_at([0.35, 1.4]).round(-3)
+    array([1012000.,  345000.])
+    """
+
+    masses: Literal[2, 3] = 2
+    inertia_kg_m2: float = 0.0028
+    pulley_inertia_kg_m2: float = 1.8e-4
+    load_kg: float = 6.7
+    radius_m: float = 0.019
+    pulley_distance_m: float = 2.14
+    stiffness_n_per_m: float = 5.0e5
+    damping_n_s_per_m: float = 130.0
+    nominal_position_m: float = 0.8
+    frozen_position_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.masses not in (2, 3):
+            raise InputError(f"masses={self.masses} is not known; choose 2 or 3")
+        positive(self, "inertia_kg_m2", "pulley_inertia_kg_m2", "load_kg", "radius_m", "pulley_distance_m")
+        positive(self, "stiffness_n_per_m")
+        nonnegative(self, "damping_n_s_per_m")
+        for name in ("nominal_position_m", "frozen_position_m"):
+            at = getattr(self, name)
+            if at is not None and not 0 < at < self.pulley_distance_m:
+                raise InputError(f"{name}={at} is not between the pulleys; choose from 0 to {self.pulley_distance_m} m")
+        if not 2 * self.pulley_inertia_kg_m2 < self.inertia_kg_m2:
+            raise InputError(
+                f"two pulleys of pulley_inertia_kg_m2={self.pulley_inertia_kg_m2} leave nothing of "
+                f"inertia_kg_m2={self.inertia_kg_m2} for the motor; choose less than half of it"
+            )
+
+    @property
+    def motor_inertia_kg_m2(self) -> float:
+        """What turns with the motor: Js with two masses, Jm + Jp = Js − Jp with three."""
+        return self.inertia_kg_m2 - (self.pulley_inertia_kg_m2 if self.masses == 3 else 0.0)
+
+    @property
+    def specific_stiffness_n(self) -> float:
+        """c, the stiffness of a span times its length."""
+        return self.stiffness_n_per_m / float(self._shape(self.nominal_position_m))
+
+    @property
+    def damping_shape(self) -> float:
+        """bs(x)/√(1/l1 + 1/(l2 + l3)), N s/√m."""
+        return self.damping_n_s_per_m / sqrt(float(self._shape(self.nominal_position_m)))
+
+    def stiffness_at(self, position_m: ArrayLike) -> Floats:
+        """Keff with the cart at these positions, N/m (13)."""
+        return self.specific_stiffness_n * self._shape(self.effective(position_m))
+
+    def damping_at(self, position_m: ArrayLike) -> Floats:
+        """bs with the cart at these positions, N s/m."""
+        return self.damping_shape * np.sqrt(self._shape(self.effective(position_m)))
+
+    def effective(self, position_m: ArrayLike) -> Floats:
+        """The position that the spans follow."""
+        given = np.asarray(position_m, dtype=np.float64)
+        return given if self.frozen_position_m is None else np.full_like(given, self.frozen_position_m)
+
+    def _shape(self, position_m: ArrayLike) -> Floats:
+        at = np.asarray(position_m, dtype=np.float64)
+        return np.asarray(1 / at + 1 / (2 * self.pulley_distance_m - at))
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Stiffness, N/m, and damping, N s/m, of the three spans at one moment.
+
+    Examples
+    --------
+    >>> spans = Spans.of(Mechanics(), 0.8)
+    >>> round(spans.stiffness_n_per_m, 6), round(spans.damping_n_s_per_m, 9)
+    (500000.0, 130.0)
+    """
+
+    stiffness: tuple[float, float, float]
+    damping: tuple[float, float, float]
+
+    @classmethod
+    def of(
+        cls, mechanics: Mechanics, position_m: float, stiffness_factor: float = 1.0, damping_factor: float = 1.0
+    ) -> Spans:
+        """The spans with the cart at `position_m`, all weakened and damped by the same factors."""
+        at = float(mechanics.effective(position_m))
+        lengths = at, mechanics.pulley_distance_m - at, mechanics.pulley_distance_m
+        shape = 1 / at + 1 / (lengths[1] + lengths[2])
+        c = mechanics.specific_stiffness_n * stiffness_factor
+        b = mechanics.damping_shape * damping_factor / sqrt(shape)
+        one, two, three = (1 / length for length in lengths)
+        return cls((c * one, c * two, c * three), (b * one, b * two, b * three))
+
+    @property
+    def stiffness_n_per_m(self) -> float:
+        """Keff = K1 + K2·K3/(K2 + K3) (13)."""
+        return _joined(self.stiffness)
+
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """bs: (13) of the spans' damping, exact because all spans have the same ratio of damping to stiffness."""
+        return _joined(self.damping)
+
+
+def _joined(span: tuple[float, float, float]) -> float:
+    one, two, three = span
+    return one + (two * three / (two + three) if two + three > 0 else 0.0)

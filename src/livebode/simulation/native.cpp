@@ -1,0 +1,111 @@
+// The simulated axis as a Python class: settings as a dict of numbers, chunks of ticks as arrays.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+extern "C" {
+#include "axis.h"
+}
+
+namespace nb = nanobind;
+
+namespace {
+
+using Rows = nb::ndarray<const double, nb::shape<LB_AXIS_INPUTS, -1>, nb::c_contig, nb::device::cpu>;
+using Out = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Column = std::array<double, LB_AXIS_INPUTS>;
+
+double number(const nb::dict &settings, const char *name) { return nb::cast<double>(settings[name]); }
+int whole(const nb::dict &settings, const char *name) { return nb::cast<int>(settings[name]); }
+
+lb_axis_config config_of(const nb::dict &s) {
+    lb_axis_config c{};
+    c.states = whole(s, "states");
+    c.motor_inertia_kg_m2 = number(s, "motor_inertia_kg_m2");
+    c.pulley_inertia_kg_m2 = number(s, "pulley_inertia_kg_m2");
+    c.radius_m = number(s, "radius_m");
+    c.specific_stiffness_n = number(s, "specific_stiffness_n");
+    c.pulley_distance_m = number(s, "pulley_distance_m");
+    c.damping_shape = number(s, "damping_shape");
+    c.frozen = whole(s, "frozen");
+    c.frozen_position_m = number(s, "frozen_position_m");
+    for (nb::handle spot : nb::cast<nb::list>(s["spots"])) {
+        if (c.spots == LB_AXIS_SPOTS_MAX) throw nb::value_error("too many soft spots");
+        c.spot[c.spots++] = {nb::cast<double>(spot[0]), nb::cast<double>(spot[1]), nb::cast<double>(spot[2])};
+    }
+    c.motor_coulomb_n_m = number(s, "motor_coulomb_n_m");
+    c.motor_viscous_n_m_s = number(s, "motor_viscous_n_m_s");
+    c.motor_stribeck_n_m = number(s, "motor_stribeck_n_m");
+    c.load_coulomb_n = number(s, "load_coulomb_n");
+    c.load_viscous_n_s_per_m = number(s, "load_viscous_n_s_per_m");
+    c.load_stribeck_n = number(s, "load_stribeck_n");
+    c.stribeck_speed_m_per_s = number(s, "stribeck_speed_m_per_s");
+    c.smoothing_m_per_s = number(s, "smoothing_m_per_s");
+    c.torque_ripple_n_m = number(s, "torque_ripple_n_m");
+    c.torque_ripple_per_turn = number(s, "torque_ripple_per_turn");
+    c.rate_hz = number(s, "rate_hz");
+    c.substeps = whole(s, "substeps");
+    c.velocity_ticks = whole(s, "velocity_ticks");
+    c.position_ticks = whole(s, "position_ticks");
+    c.delay_ticks = whole(s, "delay_ticks");
+    c.velocity_gain_n_m_s = number(s, "velocity_gain_n_m_s");
+    c.integral_step = number(s, "integral_step");
+    c.position_gain_per_s = number(s, "position_gain_per_s");
+    c.velocity_feedforward = number(s, "velocity_feedforward");
+    c.torque_n_m_max = number(s, "torque_n_m_max");
+    c.encoder_step_rad = number(s, "encoder_step_rad");
+    c.velocity_differenced = whole(s, "velocity_differenced");
+    c.position_m_min = number(s, "position_m_min");
+    c.position_m_max = number(s, "position_m_max");
+    const bool usable = (c.states == 4 || c.states == 6) && c.substeps >= 1 && c.velocity_ticks >= 1 &&
+                        c.position_ticks >= 1 && c.delay_ticks >= 0 && c.delay_ticks <= LB_AXIS_DELAY_MAX;
+    if (!usable) throw nb::value_error("states, substeps, ticks or delay outside what the simulation takes");
+    return c;
+}
+
+class Engine {
+  public:
+    Engine(const nb::dict &settings, double position_m) : config_(config_of(settings)) {
+        lb_axis_rest(&config_, position_m, &state_);
+    }
+
+    size_t advance(const Rows &input, const Out &output) {
+        const size_t ticks = input.shape(1);
+        const auto rows = static_cast<size_t>(LB_AXIS_SIGNALS + config_.states);
+        if (output.shape(0) != rows || output.shape(1) != ticks)
+            throw nb::value_error("the output needs 3 rows and one for each state, as long as the input");
+        nb::gil_scoped_release release;
+        return lb_axis_advance(&config_, &state_, ticks, input.data(), output.data());
+    }
+
+    std::vector<double> plant() const { return {state_.plant, state_.plant + config_.states}; }
+
+    std::vector<double> derivative(const std::vector<double> &now, double torque, const std::vector<double> &state) {
+        if (now.size() != LB_AXIS_INPUTS || state.size() != static_cast<size_t>(config_.states))
+            throw nb::value_error("wrong number of inputs or states");
+        std::vector<double> slope(state.size());
+        lb_axis_derivative(&config_, now.data(), torque, state.data(), slope.data());
+        return slope;
+    }
+
+  private:
+    lb_axis_config config_;
+    lb_axis_state state_{};
+};
+
+} // namespace
+
+NB_MODULE(_axis, m) {
+    nb::class_<Engine>(m, "Engine")
+        .def(nb::init<const nb::dict &, double>(), nb::arg("settings"), nb::arg("position_m"))
+        .def_prop_ro("plant", &Engine::plant)
+        .def("advance", &Engine::advance, nb::arg("input"), nb::arg("output"))
+        .def("derivative", &Engine::derivative, nb::arg("now"), nb::arg("torque_n_m"), nb::arg("state"));
+}

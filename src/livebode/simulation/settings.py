@@ -1,0 +1,176 @@
+"""Friction, drive, sensor and limits: plain frozen settings; what is off is zero or infinite."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isnan, pi
+
+from livebode.nouns import PID, Cascade, InputError, Loop
+from livebode.simulation.values import count, nonnegative, positive
+
+DELAY_TICKS_MAX = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """Friction of the motor's shaft, N m, and of the cart on its guide, N; all off by default.
+
+    viscous·v + (coulomb + stribeck/(1 + (v/vs)²))·v/√(v² + w²): v is the speed at the belt (of the shaft for the
+    motor's viscous part), vs `stribeck_speed_m_per_s`, w `smoothing_m_per_s`. The Stribeck term is that of Hess and
+    Soom (J. Tribology 112, 1990); the smooth sign, and so the absence of true sticking, keeps the equations analytic.
+    """
+
+    motor_coulomb_n_m: float = 0.0
+    motor_viscous_n_m_s: float = 0.0
+    motor_stribeck_n_m: float = 0.0
+    load_coulomb_n: float = 0.0
+    load_viscous_n_s_per_m: float = 0.0
+    load_stribeck_n: float = 0.0
+    stribeck_speed_m_per_s: float = 0.05
+    smoothing_m_per_s: float = 0.01
+
+    def __post_init__(self) -> None:
+        nonnegative(self, *(name for name in self.__dataclass_fields__ if name.startswith(("motor", "load"))))
+        positive(self, "stribeck_speed_m_per_s", "smoothing_m_per_s")
+
+    @property
+    def dry(self) -> bool:
+        """Whether anything but viscous friction is on."""
+        return any((self.motor_coulomb_n_m, self.motor_stribeck_n_m, self.load_coulomb_n, self.load_stribeck_n))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """The cascade of Nevaranta 2016, Fig. 7, with its rates and holds, and the motor's torque.
+
+    A tick reads the angle and the velocity y, updates what is due of the position and the velocity loop, adds the
+    excitation w and applies the torque u until the next tick; y is logged as read, u and w as applied.
+
+    Parameters
+    ----------
+    rate_hz
+        Ticks per second: the rate of the record.
+    velocity_rate_hz, position_rate_hz
+        Rates of the two controllers; each divides the one above it, and its output stands in between.
+    velocity_gain_n_m_s, integral_time_s
+        Kvc and Ti of the PI velocity controller, backward integrator.
+    position_gain_per_s, velocity_feedforward
+        Kpc of the P position controller, and what share of the reference velocity it adds.
+    delay_ticks
+        Ticks between reading and the velocity controller's output acting; the excitation is added after it.
+    torque_n_m_max
+        The torque u is limited to ±this, and while it is the integrator stands still; infinite by default.
+    torque_ripple_n_m, torque_ripple_per_turn
+        Amplitude·sin(periods·φ) added to the torque behind the logged u.
+    """
+
+    rate_hz: float = 4000.0
+    velocity_rate_hz: float = 4000.0
+    position_rate_hz: float = 2000.0
+    velocity_gain_n_m_s: float = 0.2308
+    integral_time_s: float = 0.2
+    position_gain_per_s: float = 1.0
+    velocity_feedforward: float = 1.0
+    delay_ticks: int = 0
+    torque_n_m_max: float = inf
+    torque_ripple_n_m: float = 0.0
+    torque_ripple_per_turn: float = 24.0
+
+    def __post_init__(self) -> None:
+        positive(self, "rate_hz", "velocity_rate_hz", "position_rate_hz", "integral_time_s", "torque_ripple_per_turn")
+        nonnegative(self, "velocity_gain_n_m_s", "position_gain_per_s", "velocity_feedforward", "torque_ripple_n_m")
+        count(self, "delay_ticks", DELAY_TICKS_MAX)
+        if isnan(self.torque_n_m_max) or self.torque_n_m_max <= 0:
+            raise InputError(f"torque_n_m_max={self.torque_n_m_max} is not above 0; leave it out for no limit")
+        _divides("velocity_rate_hz", self.velocity_rate_hz, "rate_hz", self.rate_hz)
+        _divides("position_rate_hz", self.position_rate_hz, "velocity_rate_hz", self.velocity_rate_hz)
+
+    @property
+    def velocity_ticks(self) -> int:
+        """Ticks during which one output of the velocity controller stands."""
+        return round(self.rate_hz / self.velocity_rate_hz)
+
+    @property
+    def position_ticks(self) -> int:
+        """Ticks during which one output of the position controller stands."""
+        return round(self.rate_hz / self.position_rate_hz)
+
+    def loop(self) -> Loop:
+        """What an estimator has to know about this drive.
+
+        >>> Drive().loop().feedback_at(100.0).round(4)
+        np.complex128(0.2309-0.0022j)
+        """
+        velocity = PID(
+            gain=self.velocity_gain_n_m_s,
+            integral_time_s=self.integral_time_s,
+            rate_hz=self.velocity_rate_hz,
+            held_ticks=self.velocity_ticks,
+            delay_ticks=self.delay_ticks,
+        )
+        ratio = round(self.velocity_rate_hz / self.position_rate_hz)
+        return Loop(
+            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, held_ticks=ratio))
+        )
+
+
+def _divides(slow_name: str, slow_hz: float, fast_name: str, fast_hz: float) -> None:
+    ratio = round(fast_hz / slow_hz)
+    if ratio < 1 or abs(fast_hz / slow_hz - ratio) > 1e-9 * ratio:
+        near = ", ".join(f"{fast_hz / n:g}" for n in sorted({max(ratio, 1), ratio + 1}))
+        raise InputError(f"{slow_name}={slow_hz:g} does not divide {fast_name}={fast_hz:g}; choose for example {near}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """How angle and velocity are read; exact by default.
+
+    Parameters
+    ----------
+    noise_rad_per_s
+        Standard deviation of white Gaussian noise on the read velocity.
+    encoder_counts_per_turn
+        The angle is rounded to these; the velocity carries the rounding's differences times the rate. 0: exact.
+    velocity_differenced
+        The velocity is the difference of the last two angles times the rate, with its lag of half a tick; else the
+        velocity at the tick itself.
+    """
+
+    noise_rad_per_s: float = 0.0
+    encoder_counts_per_turn: int = 0
+    velocity_differenced: bool = False
+
+    def __post_init__(self) -> None:
+        nonnegative(self, "noise_rad_per_s")
+        count(self, "encoder_counts_per_turn", 1 << 32)
+
+    @property
+    def encoder_step_rad(self) -> float:
+        return 2 * pi / self.encoder_counts_per_turn if self.encoder_counts_per_turn else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What the machine bears: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor.
+
+    The motion keeps to them whole; the cart itself may overrun the stroke by `overrun_m` before the run is stopped.
+    """
+
+    position_m_min: float = 0.2
+    position_m_max: float = 1.8
+    overrun_m: float = 0.05
+    speed_m_per_s_max: float = 5.9
+    acceleration_m_per_s2_max: float = 50.0
+
+    def __post_init__(self) -> None:
+        positive(self, "position_m_min", "position_m_max", "speed_m_per_s_max", "acceleration_m_per_s2_max")
+        nonnegative(self, "overrun_m")
+        if not self.position_m_min < self.position_m_max:
+            raise InputError(
+                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; swap them"
+            )
+
+    @property
+    def stops_m(self) -> tuple[float, float]:
+        """Where the run is stopped."""
+        return self.position_m_min - self.overrun_m, self.position_m_max + self.overrun_m

@@ -1,0 +1,131 @@
+"""SimulatedAxis: a BeltAxis as a source of Blocks, with its truth beside."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block, Channel, InputError
+from livebode.simulation._axis import Engine
+from livebode.simulation.configuration import BeltAxis, engine_settings
+from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
+from livebode.simulation.faults import Condition
+from livebode.simulation.truth import Truth
+
+Floats = NDArray[np.float64]
+
+
+class DivergenceError(ArithmeticError):
+    """The simulated machine left what can be: the time and the state stand in the message and as attributes."""
+
+    def __init__(self, time_s: float, state: Sequence[float], why: str) -> None:
+        self.time_s, self.state = time_s, tuple(state)
+        numbers = ", ".join(f"{value:.6g}" for value in self.state)
+        super().__init__(f"the simulation stopped at {time_s:.6f} s with the state ({numbers}): {why}")
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedAxis:
+    """A machine on the bench. Every iteration starts it anew at rest at the motion's start; sample 0 is the first tick.
+
+    Channels: w and u (N m, as applied), velocity and position of the motor as the drive reads them, the cart's
+    position x, and the references of the motor. How the samples are cut into Blocks changes none of them.
+
+    Examples
+    --------
+    >>> axis = SimulatedAxis(BeltAxis(excitation_n_m=np.sin(2 * np.pi * np.arange(100) / 100), seconds=0.5))
+    >>> [len(block) for block in axis.blocks(["u", "velocity"], block_samples=1500)]
+    [1500, 500]
+    >>> block, truth = axis.run()
+    >>> len(block), float(truth.stiffness_n_per_m[0])
+    (2000, 500000.0)
+    """
+
+    axis: BeltAxis
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return CHANNELS
+
+    @property
+    def rate_hz(self) -> float:
+        return self.axis.drive.rate_hz
+
+    @property
+    def samples(self) -> int | None:
+        """Samples of the run; None without end."""
+        return self.axis.samples
+
+    def blocks(
+        self,
+        channels: Sequence[str] | None = None,
+        block_samples: int = 4096,
+        *,
+        real_time: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> Iterator[Block]:
+        """The samples from the first to the last, as fast as it can, or with `real_time` none before its time.
+
+        Raises
+        ------
+        InputError
+            At once for a missing channel or a block size that is no whole number of at least 1.
+        DivergenceError
+            While iterating, when the state is not finite or the cart leaves its limits.
+        """
+        return delivered((block for block, _ in self.pairs(block_samples)), channels, real_time, clock, sleep)
+
+    def pairs(self, block_samples: int = 4096) -> Iterator[tuple[Block, Truth]]:
+        """Blocks of all channels, each with the truth of its samples."""
+        checked_block_samples(block_samples)
+        return self._pairs(block_samples)
+
+    def run(self) -> tuple[Block, Truth]:
+        """The whole run as one Block, with its truth; InputError for one without end."""
+        if self.samples is None:
+            raise InputError("seconds=inf: a run without end does not fit into one block; give seconds, or take blocks")
+        return next(self.pairs(max(1, self.samples)))
+
+    def _pairs(self, block_samples: int) -> Iterator[tuple[Block, Truth]]:
+        axis = self.axis
+        position, speed = (row / axis.mechanics.radius_m for row in axis.motion.cycle(self.rate_hz))
+        engine = Engine(engine_settings(axis), float(position[0]) * axis.mechanics.radius_m)
+        noise = np.random.default_rng(axis.seed)
+        start = 0
+        while self.samples is None or start < self.samples:
+            ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
+            number = np.arange(start, start + ticks)
+            condition = axis.condition(number / self.rate_hz)
+            w = excitation_at(axis.excitation_n_m, number)
+            references = [row[number % row.size] for row in (position, speed)]
+            inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition)])
+            output = self._advanced(engine, inputs, start)
+            data = np.vstack([w, output[:3], output[-2], inputs[:2]])
+            yield Block(data, CHANNELS, self.rate_hz, start=start), Truth(axis, start, output[3:], condition)
+            start += ticks
+
+    def _noise(self, generator: np.random.Generator, ticks: int) -> Floats:
+        sigma = self.axis.sensor.noise_rad_per_s
+        return sigma * generator.standard_normal(ticks) if sigma else np.zeros(ticks)
+
+    def _advanced(self, engine: Engine, inputs: Floats, start: int) -> Floats:
+        ticks = inputs.shape[1]
+        output = np.empty((3 + len(engine.plant), ticks))
+        done = engine.advance(inputs, output)
+        if done < ticks:
+            low, high = self.axis.limits.stops_m
+            why = (
+                "angle and speed of each pulley, position and speed of the cart, "
+                f"of which one is not finite or the cart is outside {low:g} … {high:g} m"
+            )
+            raise DivergenceError((start + done) / self.rate_hz, engine.plant, why)
+        return output
+
+
+def _rows(condition: Condition) -> list[Floats]:
+    return [condition.stiffness, condition.damping, condition.load_kg, condition.gap_m]

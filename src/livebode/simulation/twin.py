@@ -1,0 +1,191 @@
+"""The simulated axis in plain Python: the readable definition that tests hold simulation/axis.c against, bit by bit.
+
+Plant and Controller take and give numbers; the plant may be another one with the same `read` and `step` (an FMU).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import copysign, floor, isfinite, sin, sqrt
+from typing import Any, NamedTuple
+
+from scipy.integrate import DOP853
+
+# Nonzero coefficients of each stage after the first, and of the step (Hairer, Nørsett, Wanner, section II.10).
+STAGES = [[(j, float(w)) for j, w in enumerate(row) if w != 0] for row in (*DOP853.A[1:], DOP853.B)]
+
+Settings = Mapping[str, Any]
+
+
+class Now(NamedTuple):
+    """What one tick is given: references, excitation, noise, and the machine's condition."""
+
+    position_reference: float
+    velocity_reference: float
+    w: float
+    noise: float
+    stiffness: float
+    damping: float
+    load_kg: float
+    gap_m: float
+
+
+def friction(coulomb: float, stribeck: float, s: Settings, speed: float) -> float:
+    """Dry friction at a speed at the belt: (coulomb + stribeck/(1 + (v/vs)²))·v/√(v² + w²)."""
+    if coulomb == 0 and stribeck == 0:
+        return 0.0
+    ratio, width = speed / s["stribeck_speed_m_per_s"], s["smoothing_m_per_s"]
+    return float((coulomb + stribeck / (1 + ratio * ratio)) * (speed / sqrt(speed * speed + width * width)))
+
+
+def play(gap: float, elongation: float, rate: float) -> tuple[float, float]:
+    """Elongation beyond a play, and its rate: a dead zone whose corners a quartic rounds over a twentieth of it."""
+    if gap == 0:
+        return elongation, rate
+    rounding, beyond = 0.05 * gap, abs(elongation) - 0.5 * gap
+    into = beyond + rounding
+    if into <= 0:
+        return 0.0, 0.0
+    if beyond >= rounding:
+        return copysign(beyond, elongation), rate
+    square, unit = into * into, 16 * (rounding * rounding * rounding)
+    slope = (3 * square * (3 * rounding - beyond) - square * into) / unit
+    return copysign(square * into * (3 * rounding - beyond) / unit, elongation), rate * slope
+
+
+def weakening(s: Settings, at: float) -> float:
+    """Factor of the soft spots on the stiffness."""
+    factor = 1.0
+    for position, width, loss in s["spots"]:
+        u = (at - position) / width
+        bump = 1 / (1 + u * u)
+        factor *= 1 - loss * (bump * bump)
+    return factor
+
+
+class Plant:
+    """The belt drive's motion; state as in the truth: angle and speed of each pulley, then of the cart."""
+
+    def __init__(self, settings: Settings, position_m: float) -> None:
+        self.settings = settings
+        self.state = [0.0] * settings["states"]
+        for i in range(0, settings["states"] - 2, 2):
+            self.state[i] = position_m / settings["radius_m"]
+        self.state[-2] = position_m
+
+    def read(self) -> tuple[float, float, float]:
+        """Angle and velocity of the motor, and the cart's position."""
+        return self.state[0], self.state[1], self.state[-2]
+
+    def step(self, torque: float, now: Now) -> None:
+        """One tick under a constant torque: steps of the order-8 method."""
+        seconds = 1 / (self.settings["rate_hz"] * self.settings["substeps"])
+        for _ in range(self.settings["substeps"]):
+            start, at, slopes = self.state, self.state, []
+            for stage in STAGES:
+                slopes.append(self.derivative(now, torque, at))
+                sums = [0.0] * len(start)
+                for j, weight in stage:
+                    sums = [total + weight * slope for total, slope in zip(sums, slopes[j])]
+                at = [value + seconds * total for value, total in zip(start, sums)]
+            self.state = at
+
+    def derivative(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
+        """Time derivative of the state: (11), (12) or (8)–(10), with friction and torque ripple."""
+        s, omega, v = self.settings, state[1], state[-1]
+        torque = torque - s["motor_viscous_n_m_s"] * omega
+        torque -= friction(s["motor_coulomb_n_m"], s["motor_stribeck_n_m"], s, s["radius_m"] * omega)
+        if s["torque_ripple_n_m"] != 0:
+            torque += s["torque_ripple_n_m"] * sin(s["torque_ripple_per_turn"] * state[0])
+        d = (self._two_masses if len(state) == 4 else self._three_masses)(now, torque, state)
+        resisting = s["load_viscous_n_s_per_m"] * v + friction(s["load_coulomb_n"], s["load_stribeck_n"], s, v)
+        d[-1] = (d[-1] - resisting) / now.load_kg
+        return d
+
+    def _at(self, x: float) -> float:
+        return float(self.settings["frozen_position_m"] if self.settings["frozen"] else x)
+
+    def _two_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
+        s, r, at = self.settings, self.settings["radius_m"], self._at(state[2])
+        shape = 1 / at + 1 / (2 * s["pulley_distance_m"] - at)
+        k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at) * shape
+        b = s["damping_shape"] * now.damping * sqrt(shape)
+        slack, rate = play(now.gap_m, r * state[0] - state[2], r * state[1] - state[3])
+        force = k * slack + b * rate
+        return [state[1], (torque - r * force) / s["motor_inertia_kg_m2"], state[3], force]
+
+    def _three_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
+        s, r, at, l3 = self.settings, self.settings["radius_m"], self._at(state[4]), self.settings["pulley_distance_m"]
+        s1, s2, s3 = 1 / at, 1 / (l3 - at), 1 / l3
+        shape = s1 + 1 / (2 * l3 - at)
+        k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at)
+        b = s["damping_shape"] * now.damping / sqrt(shape)
+        x, v = self._held(now, s1, s2, state)
+        f1 = s1 * (k * (r * state[0] - x) + b * (r * state[1] - v))
+        f2 = s2 * (k * (x - r * state[2]) + b * (v - r * state[3]))
+        f3 = s3 * (k * (r * (state[2] - state[0])) + b * (r * (state[3] - state[1])))
+        first = (torque - r * f1 + r * f3) / s["motor_inertia_kg_m2"]
+        second = r * (f2 - f3) / s["pulley_inertia_kg_m2"]
+        return [state[1], first, state[3], second, state[5], f1 - f2]
+
+    def _held(self, now: Now, s1: float, s2: float, state: Sequence[float]) -> tuple[float, float]:
+        """The belt where it holds the cart: the cart itself, or within the play where the spans would have it."""
+        if now.gap_m == 0:
+            return state[4], state[5]
+        r = self.settings["radius_m"]
+        free = (s1 * (r * state[0]) + s2 * (r * state[2])) / (s1 + s2)
+        free_rate = (s1 * (r * state[1]) + s2 * (r * state[3])) / (s1 + s2)
+        slack, rate = play(now.gap_m, free - state[4], free_rate - state[5])
+        return free - slack, free_rate - rate
+
+
+class Controller:
+    """What the drive reads and what it makes of it (Nevaranta 2016, Fig. 7)."""
+
+    def __init__(self, settings: Settings, angle: float) -> None:
+        self.settings = settings
+        self.integral: float = 0.0
+        self.held: float = 0.0
+        self.control: float = 0.0
+        self.delayed = [0.0] * settings["delay_ticks"]
+        self.limited = False
+        self.angle, self.reading, self.tick_number = angle, self._rounded(angle), 0
+
+    def tick(self, angle: float, velocity: float, now: Now) -> tuple[float, float, float]:
+        """Torque, velocity and angle as logged at this tick."""
+        velocity = self._read(angle, velocity) + now.noise
+        torque = self._update(velocity, now) + now.w
+        most = self.settings["torque_n_m_max"]
+        self.limited = abs(torque) > most
+        self.tick_number += 1
+        return (copysign(most, torque) if self.limited else torque), velocity, self.reading
+
+    def _rounded(self, angle: float) -> float:
+        step = self.settings["encoder_step_rad"]
+        return floor(angle / step + 0.5) * step if step > 0 and isfinite(angle) else angle
+
+    def _read(self, angle: float, velocity: float) -> float:
+        reading, rate = self._rounded(angle), self.settings["rate_hz"]
+        if self.settings["velocity_differenced"]:
+            velocity = (reading - self.reading) * rate
+        else:
+            velocity = velocity + ((reading - angle) - (self.reading - self.angle)) * rate
+        self.reading, self.angle = reading, angle
+        return velocity
+
+    def _update(self, velocity: float, now: Now) -> float:
+        s, n = self.settings, self.tick_number
+        if n % s["position_ticks"] == 0:
+            self.held = s["position_gain_per_s"] * (now.position_reference - self.reading) + (
+                s["velocity_feedforward"] * now.velocity_reference
+            )
+        if n % s["velocity_ticks"] == 0:
+            error = self.held - velocity
+            if not self.limited:
+                self.integral += error * s["integral_step"]
+            self.control = s["velocity_gain_n_m_s"] * (error + self.integral)
+        if not self.delayed:
+            return self.control
+        slot = n % len(self.delayed)
+        torque, self.delayed[slot] = self.delayed[slot], self.control
+        return torque

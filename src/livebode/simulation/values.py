@@ -1,0 +1,30 @@
+"""Checks of single settings, each with its sentence."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from livebode.nouns import InputError
+
+
+def positive(owner: object, *names: str) -> None:
+    """InputError unless each of these attributes is finite and above 0."""
+    for name in names:
+        value = getattr(owner, name)
+        if not (isfinite(value) and value > 0):
+            raise InputError(f"{name}={value} is not a finite number above 0")
+
+
+def nonnegative(owner: object, *names: str) -> None:
+    """InputError unless each of these attributes is finite and not below 0."""
+    for name in names:
+        value = getattr(owner, name)
+        if not (isfinite(value) and value >= 0):
+            raise InputError(f"{name}={value} is not a finite number of at least 0")
+
+
+def count(owner: object, name: str, most: int) -> None:
+    """InputError unless the attribute is a whole number from 0 to `most`."""
+    value = getattr(owner, name)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+        raise InputError(f"{name}={value} is not a whole number from 0 to {most}")
