@@ -37,6 +37,7 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 
 bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
+	$(BIN)/python -m bench --job
 
 fuzz: $(BUILT)   ## a long campaign of damaged files against the readers
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py

@@ -3,7 +3,6 @@
 
 static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 
-
 /* The differences and the delay line of one channel's next samples. */
 static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
 {

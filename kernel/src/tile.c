@@ -288,15 +288,16 @@ LB_INLINE void run(const lb_tile *t, int backwards)
 static void fold(const lb_tile *t, size_t channel)
 {
     const real *restrict here = t->line + channel * t->line_step;
-    const real *image = here + t->image;
+    const real *restrict image = here + t->image;
     real *restrict even = t->delta + (channel * 3 + 1) * LB_TILE;
-    for (size_t i = 0; i < t->length; ++i) {
-        const real x = *(image - i);
-        even[i] = here[i] + x;
-        even[LB_TILE + i] = here[i] - x;
+    real *restrict odd = even + LB_TILE;
+    const ptrdiff_t length = (ptrdiff_t)t->length;
+    for (ptrdiff_t i = 0; i < length; ++i) {
+        even[i] = here[i] + image[-i];
+        odd[i] = here[i] - image[-i];
     }
     if (t->middle) { /* it counts once */
-        even[0] = even[LB_TILE] = here[0];
+        even[0] = odd[0] = here[0];
     }
 }
 

@@ -4,7 +4,6 @@ The names below are the public face; everything is importable from here and load
 """
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
         Responses,
     )
     from livebode.sources import Log, open_log
-
-__version__ = version("livebode")
 
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
@@ -80,6 +77,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # slower to import than the whole of this package
+
+        return version("livebode")
     if name not in _MODULE:
         raise AttributeError(f"module 'livebode' has no attribute {name!r}")
     return getattr(import_module(f"livebode.{_MODULE[name]}"), name)

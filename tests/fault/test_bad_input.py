@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,10 @@ def log(tmp_path: Path) -> Path:
         ((*JOINT, "--lines", "fifty", "--window", 100), ("'fifty'", "20:140:20")),
         ((*JOINT, "--lines", "50,50", "--window", 100), ("bin 5 (50 Hz)", "more than once")),
         ((*JOINT, "--lines", "50", "--window", 5000), ("2000 samples", "window of 5000")),
+        ((*JOINT, "--lines", "50", "--window", 10**12), ("2000 samples", f"window of {10**12}")),
+        ((*JOINT, "--lines", "k=4", "--window", 99), ("repeats every 100 samples, not every 99", "--window 100")),
+        ((*JOINT, "--lines", "10,30", "--window", 100), ("no power at 10 Hz or any other",)),
+        (("--excitation", "t", "--input", "u", "--output", "y"), ("straight line",)),
         ((*JOINT, "--lines", "50", "--window", "long"), ("'long'", "auto")),
         ((*JOINT, "--lines", "50", "--window", 2), ("window=2",)),
         ((*JOINT, "--lines", "auto", "--window", 30), ("every 20 samples", "multiple of 20")),
@@ -57,7 +62,7 @@ def log(tmp_path: Path) -> Path:
         ((*JOINT, *GRID, "--estimator", "indirect"), ("indirect", "controllers")),
         ((*JOINT, *GRID, "--quantity", "open loop", "--estimator", "direct"), ("loop's feedback",)),
         ((*JOINT, *GRID, "--forgetting", 2), ("tracking.forgetting = 2", "less than or equal to 1")),
-        ((*JOINT, *GRID, "--difference", "z"), ("there is no channel 'z'",)),
+        ((*JOINT, *GRID, "--difference", "z"), ("'z', which is none of the signals in use",)),
         ((*JOINT, *GRID, "--time", "clock"), ("'clock'",)),
     ],
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
@@ -129,6 +134,10 @@ def test_files_that_are_not_what_they_seem(log: Path, tmp_path: Path) -> None:
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=1\nrate_hz=0",
          ("loop.velocity.rate_hz = 0", "greater than 0")),
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop]\nexcitation_at='output'", ("controllers",)),
+        ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=nan\nrate_hz=1000",
+         ("loop.velocity.gain = nan", "finite")),
+        ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=1\nrate_hz=500",
+         ("loop.velocity runs at 500 Hz", "1000 Hz", "held_ticks")),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("log")
@@ -177,8 +186,6 @@ def test_a_disk_that_takes_no_more(log: Path, tmp_path: Path, limit: int) -> Non
                str(tmp_path / "run")]  # fmt: skip
 
     def limited() -> None:
-        import signal
-
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
@@ -189,6 +196,53 @@ def test_a_disk_that_takes_no_more(log: Path, tmp_path: Path, limit: int) -> Non
     assert done.returncode == 2, done.stderr
     assert "could not be written" in done.stderr
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_gaps_everywhere_leave_nothing_to_show(tmp_path: Path) -> None:
+    columns = signals()
+    columns["y"][::60] = np.nan
+    sentence = refused(tmp_path, write_parquet(tmp_path / "log.parquet", columns), *JOINT, *GRID)
+    assert "no stretch of 100 samples" in sentence
+    assert "34 samples that are not finite" in sentence
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
+    # Ended where the pictures are drawn: everything but the last step is written by then.
+    log = write_parquet(tmp_path / "log.parquet", signals())
+    before = sorted(tmp_path.rglob("*"))
+    code = (
+        "import os, sys; import livebode.report as r; from livebode.cli import main\n"
+        f"r.save_pictures = lambda *a, **k: os.kill(os.getpid(), {int(number)})\n"
+        f"sys.argv = ['livebode', 'run', {str(log)!r}, *{[*JOINT, *GRID]!r}, '--out', {str(tmp_path / 'run')!r}]\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 128 + number, done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("PYTHONIOENCODING=ascii {livebode} inspect {log} --excitation w --output y", ""),
+        ("PYTHONIOENCODING=ascii {livebode} run --help", ""),
+        ("{livebode} inspect {log} | head -1", ""),
+        ("! {livebode} inspect {log} >/dev/full", "could not be written"),
+        (
+            "! {livebode} run {log} --output y --input u --excitation w --out {out} --json >/dev/full",
+            "could not be written",
+        ),
+    ],
+)
+def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: str) -> None:
+    livebode_path = Path(sys.executable).with_name("livebode")
+    line = command.format(livebode=livebode_path, log=log, out=tmp_path / "run")
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", line], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert says in done.stderr
 
 
 def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:

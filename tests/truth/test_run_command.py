@@ -46,6 +46,8 @@ def test_the_run_directory_holds_what_the_tracker_gives(log: Path, tmp_path: Pat
         column = np.reshape(table[name], shape)
         assert np.array_equal(column, np.tile(getattr(expected, name), (3, 1)).T, equal_nan=True), name
     assert np.array_equal(np.reshape(table["frequency_hz"], shape), np.tile(LINES.frequency_hz, (shape[0], 1)))
+    assert np.isnan(table["re"][0])
+    assert np.isnan(table["im"][0])
     assert np.median(np.abs(expected.value[-1])) == pytest.approx(2, abs=0.01)
 
 

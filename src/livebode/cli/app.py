@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
+import signal
 import sys
 import traceback
 
@@ -11,6 +14,8 @@ import typer
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.run_command import run_command
 from livebode.nouns import InputError
+
+_ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 app = typer.Typer(
     help="The Bode plot of a machine while the machine works.",
@@ -35,19 +40,49 @@ def _version(
 
 def main() -> None:
     """Run the command line and exit with its code."""
+    _prepare_process()
     try:
         app()
-    except InputError as error:
-        _stop(f"livebode: {error}", 2)
+        sys.stdout.flush()
     except KeyboardInterrupt:
         _stop("livebode: stopped; nothing was left", 130)
     except BrokenPipeError:
-        # Who read our output has gone; Python would complain once more when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
-    except Exception:
-        traceback.print_exc()
-        _stop("livebode: this is a fault in livebode, not yours; please report it with the lines above", 1)
+        # Who read our output has gone; what was to be done is done.
+        _discard_output()
+    except Exception as error:
+        _stop(*_explained(error))
+
+
+def _explained(error: Exception) -> tuple[str, int]:
+    """A sentence, and whose fault it is."""
+    if isinstance(error, InputError):
+        return f"livebode: {error}", 2
+    if isinstance(error, MemoryError):
+        return "livebode: there is not enough memory; take a shorter window, fewer lines or a longer hop", 2
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        _discard_output()
+        return f"livebode: the output could not be written: {error.strerror}", 2
+    traceback.print_exception(error)
+    return "livebode: this is a fault in livebode, not yours; please report it with the lines above", 1
+
+
+def _prepare_process() -> None:
+    for number in _ENDING:
+        signal.signal(number, _end)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that lacks a letter shows another one, rather than nothing and an error.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _end(number: int, _frame: object) -> None:
+    # As an exception, so that what is half written is removed on the way out.
+    raise SystemExit(128 + number)
+
+
+def _discard_output() -> None:
+    # Python would complain once more when it flushes at exit.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _stop(sentence: str, code: int) -> None:

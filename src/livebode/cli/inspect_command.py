@@ -10,12 +10,18 @@ from rich.console import Console
 from rich.table import Table
 
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.nouns import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
     from livebode.session.inspection import Inspection
 
 _LINES_SHOWN = 24
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError  # the entry point knows what to do; Rich would end with 1
 
 
 def inspect_command(
@@ -29,11 +35,13 @@ def inspect_command(
     """List channels, rate, gaps and samples that are not finite; for an excitation its period, lines and SNR."""
     from livebode.session.inspection import inspect  # with its statistics half a second to import
 
+    if output is not None and excitation is None:
+        raise InputError("--output is for the signal-to-noise ratio of an excitation; name it with --excitation too")
     found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output)
     if as_json:
         print(to_json(found.plain()))
         return
-    console = Console(highlight=False, markup=False)  # names and units may hold brackets
+    console = _Console(highlight=False, markup=False)  # names and units may hold brackets
     _show_recording(found, console)
     if found.excitation is not None:
         _show_excitation(found, console)
@@ -44,7 +52,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
     console.print(
         f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
     )
-    gaps = f"{found.gaps} gaps ({found.missing} samples missing)" if found.gaps else "no gaps"
+    gaps = f"{found.gaps} gap{'s' * (found.gaps > 1)} ({found.missing} samples missing)" if found.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"

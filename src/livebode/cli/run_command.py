@@ -107,11 +107,11 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
 
     title = f"{axis.source.log.name}: {axis.signals.output}"
 
-    def draw(responses: Responses, into: Path) -> None:
+    def draw(responses: Responses, into: Path, schedule: str) -> None:
         from livebode.report import save_pictures
 
         names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-        save_pictures(responses, into, title=title, schedule_name=axis.signals.schedule or "", names=names)
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names)
 
     console = Console(stderr=True)
     columns = (
@@ -146,9 +146,13 @@ def _show(outcome: Outcome) -> None:
     )
     counts, speed, found = (outcome.summary[part] for part in ("counts", "speed", "found"))
     invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
-    gaps = f", {counts['gaps']} gaps" if counts["gaps"] else ""
+    gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     print(
-        f"{counts['responses']} responses at {len(found['frequency_hz'])} lines{invalid}, "
-        f"from {counts['samples']} samples{gaps}: {speed['recorded_s']:.1f} s of machine in {speed['run_s']:.2f} s\n"
-        f"{outcome.directory}/"
+        f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
+        f"from {counts['samples']} samples{gaps}: "
+        f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
     )
+
+
+def _many(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import isqrt
 from typing import Literal
 
 from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
-from livebode.nouns import InputError, Lines, Loop, Quantity, missing_channel
+from livebode.nouns import InputError, Lines, Loop, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = ("plant", "open loop", "closed loop", "sensitivity")
 
@@ -84,7 +85,9 @@ class Settings:
         for option in ("differenced", "spikes"):
             for name in getattr(self, option):
                 if name not in known:
-                    raise InputError(f"{option}: {missing_channel(name, known)}")
+                    raise InputError(
+                        f"{option} names {name!r}, which is none of the signals in use: {', '.join(known)}"
+                    )
         if self.hann and self.noise == "quiet":
             raise InputError("a Hann window spreads the lines over the quiet bins; take the noise from periods")
         self._check_loop()
@@ -119,6 +122,17 @@ class Settings:
         """Signals that go through the DFT, the output first."""
         return self.method.roles
 
+    @property
+    def identity(self) -> str:
+        """All that a tracker's state depends on: two with the same one may take each other's snapshots.
+
+        Not the controllers, which only turn what was measured into the plant.
+        """
+        logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
+        names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
+        options = ("noise", "differenced", "hann", "spikes")
+        return repr((*(getattr(self, name) for name in names + options), logged))
+
     def channel(self, role: Role) -> str | None:
         """Channel name of a signal."""
         return {"output": self.output, "input": self.input, "excitation": self.excitation}[role]
@@ -131,7 +145,8 @@ def default_hop(window: int) -> int:
     (20, 125, 89)
     """
     wanted = max(1.0, window / 20)
-    divisors = [d for d in range(1, window + 1) if window % d == 0]
+    small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
+    divisors = small + [window // d for d in small]
     nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))
     # A prime window has no divisor near; a longer last step in each period is then the lesser evil.
     return nearest if max(nearest / wanted, wanted / nearest) <= 4 else round(wanted)

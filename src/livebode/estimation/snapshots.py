@@ -1,4 +1,4 @@
-"""State of a Tracker as bytes: named arrays, and a fingerprint of the settings that they belong to."""
+"""State of a Tracker as bytes: named arrays, and a fingerprint of what they belong to."""
 
 from __future__ import annotations
 
@@ -15,31 +15,30 @@ from livebode.nouns import InputError
 Arrays = dict[str, NDArray[np.generic]]
 
 
-def fingerprint(settings: object) -> bytes:
-    """Of everything in the settings that the state depends on."""
-    return hashlib.sha256(repr(settings).encode()).digest()
-
-
-def pack(parts: dict[str, Arrays], settings: object) -> bytes:
-    """Arrays of named parts as bytes, exact."""
+def pack(parts: dict[str, Arrays], owner: str) -> bytes:
+    """Arrays of named parts as bytes, exact; `owner` says all that their meaning depends on."""
     flat: dict[str, Any] = {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, settings=np.frombuffer(fingerprint(settings), dtype=np.uint8), **flat)
+    np.savez(buffer, allow_pickle=False, owner=_fingerprint(owner), **flat)
     return buffer.getvalue()
 
 
-def unpack(data: bytes, settings: object) -> dict[str, Arrays]:
+def unpack(data: bytes, owner: str) -> dict[str, Arrays]:
     """The parts again; InputError where the bytes are damaged or belong to other settings."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             flat = {name: stored[name] for name in stored.files}
-        owner = flat.pop("settings").tobytes()
+        stored_owner = flat.pop("owner")
     except (ValueError, OSError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"the snapshot of {len(data)} bytes is damaged ({error}); start afresh") from None
-    if owner != fingerprint(settings):
+    if not np.array_equal(stored_owner, _fingerprint(owner)):
         raise InputError("the snapshot belongs to a tracker with other settings; restore it into one with the same")
     parts: dict[str, Arrays] = {}
     for path, array in flat.items():
         part, name = path.split("/", 1)
         parts.setdefault(part, {})[name] = array
     return parts
+
+
+def _fingerprint(owner: str) -> NDArray[np.uint8]:
+    return np.frombuffer(hashlib.sha256(owner.encode()).digest(), dtype=np.uint8)

@@ -87,7 +87,7 @@ class Tracker:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many samples came, were missing, were not finite and were left out as spikes."""
+        """How many samples came, were missing, and were left out for each reason."""
         return self._watch.counts
 
     def excitation_power(self) -> Floats:
@@ -110,7 +110,7 @@ class Tracker:
         return values[seen].mean(axis=0) if seen.any() else np.full(values.shape[1], np.nan)
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call: gaps, samples that are not finite, spikes."""
+        """Events since the last call: gaps and samples that were left out."""
         return self._watch.drain()
 
     def process(self, block: Block) -> Responses:
@@ -143,7 +143,7 @@ class Tracker:
 
     def snapshot(self) -> bytes:
         """Everything that the next sample's result depends on, exact; see `restore`."""
-        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self.settings)
+        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self.settings.identity)
 
     def restore(self, snapshot: bytes) -> None:
         """Go on from a snapshot of a Tracker with the same settings.
@@ -153,7 +153,7 @@ class Tracker:
         InputError
             If the snapshot is damaged or belongs to other settings; the Tracker is then as it was.
         """
-        for name, state in snapshots.unpack(snapshot, self.settings).items():
+        for name, state in snapshots.unpack(snapshot, self.settings.identity).items():
             self._parts[name].load(state)
 
     def _responses(self, rows: Rows, moment: Floats, unit: str) -> Responses:
@@ -179,7 +179,7 @@ class Tracker:
         several = np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
-            value=np.where(valid, value, np.nan),
+            value=np.where(valid, value, complex(np.nan, np.nan)),
             sigma=np.where(valid, sigma, np.nan),
             dof=dof,
             coherence=np.where(valid & several, moments.coherence, np.nan),

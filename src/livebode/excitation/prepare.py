@@ -22,6 +22,7 @@ _BAND_RATIO, _BAND_BINS = 2 ** (1 / 6), 4
 _WHITEN_FLOOR = 1e-6
 # Noise passes ten times its median power in one bin of a thousand (exponential distribution: 2^-10).
 _STANDS_OUT = 10.0
+_STRAIGHT = 1e-12  # of the largest sample: what double precision leaves of a ramp
 
 
 def checked(samples: ArrayLike, name: str) -> Floats:
@@ -46,6 +47,11 @@ def checked(samples: ArrayLike, name: str) -> Floats:
         raise InputError(f"the {name} has no finite sample among {x.size}; choose another channel")
     if np.ptp(known) == 0:
         raise InputError(f"the {name} is constant at {known[0]:g}; choose the channel that carries the excitation")
+    # A time column is a ramp but for rounding, and rounding repeats.
+    n = np.flatnonzero(np.isfinite(x))
+    rest = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))
+    if np.ptp(rest) <= _STRAIGHT * np.max(np.abs(known)):
+        raise InputError(f"the {name} is a straight line; choose the channel that carries the excitation")
     return x
 
 

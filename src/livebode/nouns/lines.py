@@ -15,6 +15,8 @@ from livebode.nouns.errors import GridError, InputError
 # whole number of periods to a millionth, and the leakage is below every other error.
 _ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
+WINDOW_MAX = 1 << 24
+"""Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +138,9 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
 
 
 def check_window(window: int, rate_hz: float) -> None:
-    if isinstance(window, bool) or not isinstance(window, (int, np.integer)) or window < 3:
-        raise GridError(f"{window=} is not a whole number of at least 3 samples")
+    """GridError or InputError where no grid can be made of these."""
+    if isinstance(window, bool) or not isinstance(window, (int, np.integer)) or not 3 <= window <= WINDOW_MAX:
+        raise GridError(f"{window=} is not a whole number of samples from 3 to {WINDOW_MAX}")
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise InputError(f"{rate_hz=} is not a positive number of samples per second")
 

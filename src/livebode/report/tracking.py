@@ -53,7 +53,7 @@ def tracking_figure(responses: Responses, *, title: str = "", schedule_name: str
         figure = new_figure(12.0 if schedule else 9.5, 7.0 if mapped else 5.6)
         left = 0.78 / figure.get_size_inches()[0]
         said = words.facts(responses, int(use.any(axis=1).sum())) + (
-            " · grey: not valid" if mapped and use.any() else ""
+            " · grey: nothing valid there" if mapped and use.any() else ""
         )
         heading(figure, look, title or "Tracking", said, left)
         if not use.any():

@@ -12,12 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
 
+_SAME_RATE = 1e-6
 Ticks = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class SourceSection(_Section):
@@ -95,8 +96,16 @@ class LoopSection(_Section):
     position: PIDSection | None = None
     position_pd: PositionPDSection | None = None
 
-    def build(self) -> Loop:
-        """The Loop that this describes; InputError where the parts do not make one."""
+    def build(self, rate_hz: float) -> Loop:
+        """The Loop that this describes, recorded at `rate_hz`; InputError where the parts do not make one."""
+        for name in ("velocity", "position", "position_pd"):
+            part: _ControllerSection | None = getattr(self, name)
+            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > _SAME_RATE:
+                raise InputError(
+                    f"loop.{name} runs at {part.rate_hz:g} Hz and holds {part.held_ticks} ticks, which makes "
+                    f"{part.rate_hz * part.held_ticks:g} Hz, but the recording has {rate_hz:g} Hz; held_ticks is the "
+                    "recording's rate over the controller's"
+                )
         return Loop(
             feedback=self._feedback(),
             entry=self._entry(),
@@ -153,8 +162,12 @@ class Axis(_Section):
         """
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{str(path)!r} cannot be read: {error}") from None
+        except FileNotFoundError:
+            raise InputError(f"there is no file {path}; check the name") from None
+        except OSError as error:
+            raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise InputError(f"{str(path)!r} is not text; give a configuration in TOML, or a recording") from None
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
         axis = cls.of(data, str(path))

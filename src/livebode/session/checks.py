@@ -7,20 +7,30 @@ import numpy as np
 from livebode.estimation import Settings, Tracker
 from livebode.nouns import Block, InputError
 
+# A DFT leaves 1e-30 of a signal's power at a line where there is none.
+_POWERLESS_SHARE = 1e-20
 # Excitation this far below the strongest line is rounding or distortion, and no one's design.
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
+_LAGS = 8  # samples around the window among which the true period is looked for
+_ROUNDING = 1e-12
+PERIODS_COMPARED = 4
 
 
 class ChannelCheck:
-    """Whether each signal varies and is finite somewhere, over all blocks of a run."""
+    """Whether each signal varies and is finite somewhere, and how strong the reference is, over all blocks of a run."""
 
-    def __init__(self, names: tuple[str, ...]) -> None:
+    def __init__(self, names: tuple[str, ...], reference: str) -> None:
         self._unvaried = dict.fromkeys(names, np.nan)
+        self._reference = reference
+        self._moments = np.zeros(3)
 
     def take(self, block: Block) -> None:
         """Look at the signals that have been constant up to here."""
+        x = block[self._reference]
+        x = x[np.isfinite(x)]
+        self._moments += x.size, x.sum(), np.dot(x, x)
         for name, value in list(self._unvaried.items()):
             finite = block[name][np.isfinite(block[name])]
             if not finite.size:
@@ -29,6 +39,12 @@ class ChannelCheck:
                 self._unvaried[name] = value = finite[0]
             if np.any(finite != value):
                 del self._unvaried[name]
+
+    @property
+    def variance(self) -> float:
+        """Of the reference, over all its finite samples."""
+        count, total, squares = self._moments
+        return float(max(squares / count - (total / count) ** 2, 0.0)) if count else 0.0
 
     def finish(self) -> None:
         """InputError where a signal held no number, or always the same one."""
@@ -40,17 +56,18 @@ class ChannelCheck:
             raise InputError(f"channel {name!r} is constant at {value:g}; choose one that carries the signal")
 
 
-def check_length(samples: int | None, settings: Settings) -> None:
+def check_length(samples: int | None, window: int) -> None:
     """InputError where the recording is known to be shorter than the window."""
-    window = settings.lines.window
     if samples is not None and samples < window:
         raise InputError(
             f"the recording has {samples} samples, less than the window of {window}; take a shorter window or more data"
         )
 
 
-def check_excitation(tracker: Tracker) -> None:
+def check_excitation(tracker: Tracker, variance: float) -> None:
     """InputError where a line has no excitation, or the excitation does not repeat from window to window.
+
+    `variance` is that of the reference over the whole recording.
 
     The input of a direct estimate carries the machine's motion and noise and is not asked to repeat; sigma tells.
     """
@@ -59,6 +76,11 @@ def check_excitation(tracker: Tracker) -> None:
     power = tracker.excitation_power()
     if np.isnan(power).all():
         return
+    if 2 * power.max() <= _POWERLESS_SHARE * variance * settings.lines.window**2:
+        raise InputError(
+            f"{name!r} has no power at {f[0]:g} Hz or any other of these lines; take --lines auto, or "
+            "`livebode inspect` to see what it holds"
+        )
     with np.errstate(divide="ignore"):
         level_db = 10 * np.log10(power / power.max()) if power.max() > 0 else np.full(power.shape, -np.inf)
     if np.any(level_db < _POWERLESS_DB):
@@ -75,4 +97,40 @@ def check_excitation(tracker: Tracker) -> None:
         raise InputError(
             f"{name!r} does not repeat every {settings.lines.window} samples at {f[worst]:g} Hz "
             f"({100 * repeats[worst]:.0f} % of its power does); leave out that line, or take --window auto"
+        )
+
+
+def check_period(samples: np.ndarray, settings: Settings) -> None:
+    """InputError where the beginning of an excitation repeats after another number of samples than the window.
+
+    Over a window that is a sample off, every estimate is wrong by more than its bounds say, and looks healthy.
+    """
+    window = settings.lines.window
+    lags = range(max(1, window - _LAGS), window + _LAGS + 1)
+    if samples.size < window + _LAGS + window // 2:
+        return
+    differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
+    best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
+    if differences[window] > _ROUNDING and differences[best] < differences[window] / 2:
+        raise InputError(
+            f"{settings.excitation!r} repeats every {best} samples, not every {window}; take --window {best} or auto"
+        )
+
+
+def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
+    """Mean square of x(n + lag) − x(n) over that of x, over as many samples for every lag up to `ahead`."""
+    n = samples.size - ahead
+    rest = samples[lag : lag + n] - samples[:n]
+    rest = rest[np.isfinite(rest)]
+    power = float(np.nanvar(samples))
+    return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
+
+
+def check_some_valid(responses: int, valid: int, counts: dict[str, int], window: int) -> None:
+    """InputError where no response of the whole run is valid."""
+    if responses and not valid:
+        raise InputError(
+            f"none of {responses} responses is valid: no stretch of {window} samples has excitation and none of "
+            f"the {counts['gaps']} gaps and {counts['non-finite']} samples that are not finite; take a shorter "
+            "window, or look at the recording with `livebode inspect`"
         )

@@ -7,6 +7,7 @@ import numpy as np
 from livebode.estimation import Settings
 from livebode.nouns import InputError, Lines
 from livebode.session.axis import Axis
+from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.sources import Log
 
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
@@ -15,14 +16,14 @@ _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; InputError where they do not fit it or each other."""
     signals, tracking = axis.signals, axis.tracking
-    return Settings(
+    settings = Settings(
         lines=_lines(axis, log),
         output=signals.output,
         input=signals.input,
         excitation=signals.excitation,
         schedule=signals.schedule,
         estimator=tracking.estimator,
-        loop=axis.loop.build(),
+        loop=axis.loop.build(log.rate_hz),
         quantity=tracking.quantity,
         hop=tracking.hop,
         average=tracking.average,
@@ -32,10 +33,15 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         hann=tracking.hann,
         spikes=tuple(tracking.spikes),
     )
+    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
+        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
+    return settings
 
 
 def _lines(axis: Axis, log: Log) -> Lines:
     frequencies, window = axis.lines.frequencies, axis.lines.window
+    if window != "auto":
+        check_length(log.samples, window)
     if frequencies != "auto" and window != "auto":
         return Lines.parse(frequencies, log.rate_hz, window)
     reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
@@ -60,14 +66,14 @@ def _lines(axis: Axis, log: Log) -> Lines:
     )
 
 
-def beginning(log: Log, channel: str) -> np.ndarray:
-    """The first samples of a channel, at most half an hour at 2 kHz, with NaN where samples are missing."""
+def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
+    """The first samples of a channel, with NaN where some are missing."""
     parts: list[np.ndarray] = []
     size = 0
     for block in log.blocks([channel]):
         missing = block.start - size
         parts += [np.full(missing, np.nan), block[channel]]
         size = block.stop
-        if size >= _LOOKED_AT:
+        if size >= samples:
             break
-    return np.concatenate(parts) if parts else np.zeros(0)
+    return np.concatenate(parts)[:samples] if parts else np.zeros(0)

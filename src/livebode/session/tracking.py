@@ -17,13 +17,13 @@ from livebode.kernel import instruction_set
 from livebode.nouns import Block, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
-from livebode.session.checks import ChannelCheck, check_excitation, check_length
+from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
 from livebode.sources import Log, open_log
 
 Progress = Callable[[int, int | None], None]
-Draw = Callable[[Responses, Path], None]
+Draw = Callable[[Responses, Path, str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     progress
         Called after each block with samples done and in all (None where not known).
     draw
-        Called with the thinned responses and the directory before it is put in place, to add pictures.
+        Called with the thinned responses, the directory before it is put in place, and the scheduling signal's name
+        with its unit, to add pictures.
 
     Raises
     ------
@@ -59,7 +60,7 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     started = time.perf_counter()
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     settings = make_settings(axis, log)
-    check_length(log.samples, settings)
+    check_length(log.samples, settings.lines.window)
     tracker, overview = Tracker(settings), Overview()
     with RunDirectory(directory, force=force) as out:
         counts, tracked_s = _track(log, tracker, overview, out, progress)
@@ -67,7 +68,7 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
         summary = _summary(axis, log, tracker, responses) | {"counts": counts}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         out.write_summary(summary)
-        draw(responses, out.partial)
+        draw(responses, out.partial, _schedule_label(log, settings.schedule))
     return Outcome(directory, summary, responses)
 
 
@@ -75,9 +76,9 @@ def _track(
     log: Log, tracker: Tracker, overview: Overview, out: RunDirectory, progress: Progress
 ) -> tuple[dict[str, int], float]:
     """Counts of samples and responses, and seconds spent in the tracker."""
-    settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(2, dtype=int)
+    settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
     channels = [name for role in settings.roles if (name := settings.channel(role))]
-    check = ChannelCheck(tuple(channels))
+    check = ChannelCheck(tuple(channels), settings.channel(settings.method.reference) or "")
     wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
     block: Block | None = None
     for block in log.blocks(wanted):
@@ -85,7 +86,7 @@ def _track(
         before = time.perf_counter()
         responses = tracker.process(block)
         tracked_s += time.perf_counter() - before
-        totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1))
+        totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
         overview.add(responses)
         out.write(responses)
         for event in tracker.drain_events():
@@ -94,10 +95,16 @@ def _track(
     if block is None:
         raise InputError(f"{str(log.path)!r} holds no samples")
     check.finish()
-    check_length(block.stop, settings)
-    check_excitation(tracker)
-    responses_count, invalid = (int(n) for n in totals)
-    return tracker.counts | {"responses": responses_count, "invalid_responses": invalid}, tracked_s
+    check_length(block.stop, settings.lines.window)
+    check_excitation(tracker, check.variance)
+    total, invalid, valid = (int(n) for n in totals)
+    check_some_valid(total, valid, tracker.counts, settings.lines.window)
+    return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
+
+
+def _schedule_label(log: Log, name: str | None) -> str:
+    unit = next((channel.unit for channel in log.channels if channel.name == name), "")
+    return f"{name} in {unit}" if name and unit else name or ""
 
 
 def _summary(axis: Axis, log: Log, tracker: Tracker, responses: Responses) -> dict[str, Any]:

@@ -1,0 +1,78 @@
+"""`python -m bench`: the kernel beside what a user would pick instead, all in one run.
+
+With --long the error over 1e9 samples, with --accuracy that of the named variants, with --job the whole job.
+"""
+
+import argparse
+import json
+import os
+import platform
+import time
+from pathlib import Path
+from typing import Any
+
+from bench import native_build
+from bench.accuracy import accuracy
+from bench.long import long_run
+from livebode.kernel import instruction_sets
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def speed(seconds: float, sets: list[str]) -> dict[str, Any]:
+    from bench import blocks, push, rls, targets
+
+    native_build.build()
+    found: dict[str, Any] = {}
+    for name in sets:
+        os.environ["LIVEBODE_INSTRUCTION_SET"] = name
+        print(f"running with {name} …", flush=True)
+        records = blocks.measure(seconds) + push.measure(seconds) + rls.measure(seconds)
+        lines = targets.judge(records, name)
+        targets.show_times(records)
+        targets.show(lines, name)
+        found[name] = {"records": records, "judged": lines}
+    os.environ.pop("LIVEBODE_INSTRUCTION_SET", None)
+    missed = [line for run in found.values() for line in run["judged"] if line["reached"] is False]
+    print(f"\n{len(missed)} cells short of their target")
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("--long", action="store_true", help="the error over 1e9 samples, instead of speed")
+    parser.add_argument("--samples", type=float, default=1e9, help="of the long run")
+    parser.add_argument("--accuracy", action="store_true", help="the error of the named variants, instead of speed")
+    parser.add_argument("--job", action="store_true", help="the whole job `livebode run`, instead of the kernel")
+    parser.add_argument("--seconds", type=float, default=0.5, help="per contender and cell")
+    parser.add_argument("--sets", nargs="+", default=list(instruction_sets()[1:]) or list(instruction_sets()))
+    options = parser.parse_args()
+    result: dict[str, Any]
+    if options.long:
+        name, result = "long", dict(long_run(int(options.samples)))
+    elif options.accuracy:
+        name, result = "accuracy", dict(accuracy())
+    elif options.job:
+        from bench import job
+
+        name, result = "job", dict(job.measure())
+        job.report(result)
+    else:
+        name, result = "kernel", speed(options.seconds, options.sets)
+    RESULTS.mkdir(exist_ok=True)
+    machine = {"machine": platform.machine(), "processor": processor(), "python": platform.python_version()}
+    path = RESULTS / f"{name}.json"
+    path.write_text(json.dumps({"when": time.time(), **machine, "result": result}, indent=1), encoding="utf-8")
+    print(f"written to {path}")
+
+
+def processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        return platform.processor()
+    return next((line.split(":", 1)[1].strip() for line in text.splitlines() if line.startswith("model name")), "")
+
+
+if __name__ == "__main__":
+    main()
