@@ -87,6 +87,10 @@ def test_variance_against_the_cramer_rao_bound(window: int, estimator: str) -> N
     for periods in (4, 6, PERIODS):
         share = np.mean(errors(window, found, periods) ** 2, axis=0) / (bound / periods)
         # 1,000 runs give the variance of a line to 3.2 %; the mean of the six lines away to 1.3 %.
+        print(
+            f"N={window} {estimator}, {periods} periods: variance {share[away].mean():.3f} of the bound away from the "
+            f"resonance (largest line {share[away].max():.3f}), {share.mean():.3f} over all lines"
+        )
         assert share[away].mean() <= 1.10
         assert share.mean() <= 1.15
 

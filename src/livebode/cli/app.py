@@ -42,8 +42,10 @@ def main() -> None:
     """Run the command line and exit with its code."""
     _prepare_process()
     try:
-        app()
-        sys.stdout.flush()
+        try:
+            app()
+        finally:  # it ends by SystemExit, and what is still to be written may fail
+            sys.stdout.flush()
     except KeyboardInterrupt:
         _stop("livebode: stopped; nothing was left", 130)
     except BrokenPipeError:
