@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from livebode.cli.options import Json
@@ -32,7 +31,7 @@ def demo_command(
     console = Console(stderr=True, highlight=False)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
-    columns = (TextColumn("{task.completed:5.1f} s"), BarColumn(), TextColumn("{task.description}"))
+    columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
         task = bar.add_task("", total=seconds)
 
@@ -63,5 +62,6 @@ def _numbers(responses: Responses) -> str:
     if not len(responses) or not responses.valid[-1].any():
         return "waiting for the first whole window"
     newest = responses[-1]
-    levels = (f"{f:.0f} Hz {db:+.1f}" for f, db in zip(newest.lines.frequency_hz, np.round(newest.magnitude_db, 1)))
-    return f"cart at {newest.schedule:.2f} m   {'   '.join(levels)} dB"
+    f = newest.lines.frequency_hz
+    levels = " ".join(f"{db:+.1f}" for db in newest.magnitude_db)
+    return f"cart at {newest.schedule:.2f} m, dB at {f[0]:.0f} … {f[-1]:.0f} Hz: {levels}"
