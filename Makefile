@@ -19,8 +19,8 @@ $(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
-demo: $(BUILT)   ## run the main job on a recording that it synthesises itself
-	$(BIN)/python examples/demo.py
+demo: $(BUILT)   ## track a simulated machine, live
+	$(BIN)/livebode demo
 
 test: $(BUILT) lint  ## lint, types, import contract and every test
 	$(BIN)/python -m pytest -n auto

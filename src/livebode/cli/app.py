@@ -11,6 +11,7 @@ import traceback
 
 import typer
 
+from livebode.cli.demo_command import demo_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.run_command import run_command
 from livebode.nouns import InputError
@@ -25,6 +26,7 @@ app = typer.Typer(
 )
 app.command("run")(run_command)
 app.command("inspect")(inspect_command)
+app.command("demo")(demo_command)
 
 
 @app.callback(invoke_without_command=True)

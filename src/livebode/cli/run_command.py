@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
-from livebode.nouns import InputError, Responses
+from livebode.cli.pictures import drawing, show
+from livebode.nouns import InputError
 from livebode.records import to_json
 from livebode.session import Axis, Outcome, run
 
@@ -76,7 +75,7 @@ def run_command(
     if as_json:
         print(to_json({"directory": str(outcome.directory)} | outcome.summary))
     else:
-        _show(outcome)
+        show(outcome)
 
 
 def _axis(target: Path, given: dict[str, dict[str, Any]]) -> Axis:
@@ -105,14 +104,8 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    title = f"{axis.source.log.name}: {axis.signals.output}"
-
-    def draw(responses: Responses, into: Path, schedule: str) -> None:
-        from livebode.report import save_pictures
-
-        names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names)
-
+    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
+    draw = drawing(f"{axis.source.log.name}: {axis.signals.output}", names)
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -127,32 +120,3 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
             bar.update(task, completed=done, total=total)
 
         return run(axis, directory, force=force, progress=progress, draw=draw)
-
-
-def _show(outcome: Outcome) -> None:
-    from shutil import get_terminal_size
-
-    from livebode.report import terminal_bode
-
-    size = get_terminal_size((100, 30))
-    print(
-        terminal_bode(
-            outcome.responses,
-            width=min(size.columns, 140),
-            height=max(16, min(size.lines - 4, 36)),
-            colour=sys.stdout.isatty() and "NO_COLOR" not in os.environ,
-            unicode="utf" in (sys.stdout.encoding or "").lower(),
-        )
-    )
-    counts, speed, found = (outcome.summary[part] for part in ("counts", "speed", "found"))
-    invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
-    gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
-    print(
-        f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
-        f"from {counts['samples']} samples{gaps}: "
-        f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
-    )
-
-
-def _many(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

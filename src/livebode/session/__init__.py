@@ -1,6 +1,6 @@
 """From a source to the record: what one run of livebode does."""
 
 from livebode.session.axis import Axis
-from livebode.session.tracking import Outcome, run
+from livebode.session.tracking import Draw, Outcome, run
 
-__all__ = ["Axis", "Outcome", "run"]
+__all__ = ["Axis", "Draw", "Outcome", "run"]

@@ -4,26 +4,40 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from livebode.estimation import Tracker
+from livebode.estimation import Settings, Tracker
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, InputError, Responses
+from livebode.nouns import Block, Channel, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
-from livebode.sources import Log, open_log
+from livebode.sources import open_log
 
 Progress = Callable[[int, int | None], None]
+Watch = Callable[[Responses], None]
 Draw = Callable[[Responses, Path, str], None]
+
+
+class Source(Protocol):
+    """What a run takes its samples from: a recording or a simulated machine."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def samples(self) -> int | None: ...
+
+    @property
+    def blocks(self) -> Callable[..., Iterator[Block]]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,23 +71,51 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     InputError
         For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
     """
-    started = time.perf_counter()
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     settings = make_settings(axis, log)
     check_length(log.samples, settings.lines.window)
+    found = {"format": log.format, "rate_from": log.rate_origin}
+    about = {"configuration": axis.model_dump(mode="json"), "found": found}
+    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw)
+
+
+def record(
+    source: Source,
+    settings: Settings,
+    directory: Path,
+    *,
+    about: dict[str, Any],
+    force: bool,
+    progress: Progress,
+    draw: Draw,
+    watch: Watch | None = None,
+    **delivery: Any,
+) -> Outcome:
+    """Track a source and leave a run directory; `about` is what run.json says of it besides.
+
+    `watch` is called with each new batch of responses; `delivery` goes to the source's `blocks`.
+    """
+    started = time.perf_counter()
     tracker, overview = Tracker(settings), Overview()
     with RunDirectory(directory, force=force) as out:
-        counts, tracked_s = _track(log, tracker, overview, out, progress)
+
+        def publish(responses: Responses) -> None:
+            overview.add(responses)
+            out.write(responses)
+            if watch is not None:
+                watch(responses)
+
+        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
         responses = overview.responses()
-        summary = _summary(axis, log, tracker, responses) | {"counts": counts}
+        summary = _summary(about, tracker, responses) | {"counts": counts}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(log, settings.schedule))
+        draw(responses, out.partial, _schedule_label(source, settings.schedule))
     return Outcome(directory, summary, responses)
 
 
 def _track(
-    log: Log, tracker: Tracker, overview: Overview, out: RunDirectory, progress: Progress
+    source: Source, tracker: Tracker, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
 ) -> tuple[dict[str, int], float]:
     """Counts of samples and responses, and seconds spent in the tracker."""
     settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
@@ -81,19 +123,18 @@ def _track(
     check = ChannelCheck(tuple(channels), settings.channel(settings.method.reference) or "")
     wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
     block: Block | None = None
-    for block in log.blocks(wanted):
+    for block in source.blocks(wanted, **delivery):
         check.take(block)
         before = time.perf_counter()
         responses = tracker.process(block)
         tracked_s += time.perf_counter() - before
         totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
-        overview.add(responses)
-        out.write(responses)
+        publish(responses)
         for event in tracker.drain_events():
             out.write_event(event)
-        progress(tracker.counts["samples"], log.samples)
+        progress(tracker.counts["samples"], source.samples)
     if block is None:
-        raise InputError(f"{str(log.path)!r} holds no samples")
+        raise InputError("the recording holds no samples")
     check.finish()
     check_length(block.stop, settings.lines.window)
     check_excitation(tracker, check.variance)
@@ -102,31 +143,27 @@ def _track(
     return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
 
 
-def _schedule_label(log: Log, name: str | None) -> str:
-    unit = next((channel.unit for channel in log.channels if channel.name == name), "")
+def _schedule_label(source: Source, name: str | None) -> str:
+    unit = next((channel.unit for channel in source.channels if channel.name == name), "")
     return f"{name} in {unit}" if name and unit else name or ""
 
 
-def _summary(axis: Axis, log: Log, tracker: Tracker, responses: Responses) -> dict[str, Any]:
+def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> dict[str, Any]:
     settings, lines = tracker.settings, tracker.settings.lines
-    return {
-        "configuration": axis.model_dump(mode="json"),
-        "found": {
-            "format": log.format,
-            "rate_hz": log.rate_hz,
-            "rate_from": log.rate_origin,
-            "window": lines.window,
-            "frequency_hz": lines.frequency_hz.tolist(),
-            "hop": settings.step,
-            "unit": responses.unit,
-        },
-        "versions": {
-            "livebode": version("livebode"),
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-            "instruction_set": instruction_set(),
-        },
+    found = {
+        "rate_hz": lines.rate_hz,
+        "window": lines.window,
+        "frequency_hz": lines.frequency_hz.tolist(),
+        "hop": settings.step,
+        "unit": responses.unit,
     }
+    versions = {
+        "livebode": version("livebode"),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "instruction_set": instruction_set(),
+    }
+    return about | {"found": about.get("found", {}) | found, "versions": versions}
 
 
 def _speed(tracker: Tracker, tracked_s: float, whole_s: float) -> dict[str, float]:

@@ -1,0 +1,67 @@
+"""`livebode demo`: the main job for a newcomer, without hardware."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.cli.pictures import drawing, show
+from livebode.nouns import Responses
+from livebode.records import to_json
+
+
+def demo_command(
+    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 20.0,
+    fast: Annotated[bool, typer.Option("--fast", help="As fast as it can, not at the machine's pace.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the noise; the same seed gives the same run.")] = 1,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; an earlier demo there is replaced.")] = Path(
+        "runs/demo"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    from livebode.session.demo import demo  # with the simulation
+
+    console = Console(stderr=True, highlight=False)
+    if not as_json:
+        print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
+    columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
+    with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
+        task = bar.add_task("", total=seconds)
+
+        def watch(responses: Responses) -> None:
+            bar.update(task, description=_numbers(responses))
+
+        def progress(done: int, total: int | None) -> None:
+            bar.update(task, completed=seconds * done / (total or done))
+
+        outcome, found = demo(
+            out,
+            seconds=seconds,
+            seed=seed,
+            real_time=not fast,
+            progress=progress,
+            watch=watch,
+            draw=drawing("simulated belt axis", ("u", "velocity")),
+        )
+    if as_json:
+        print(to_json({"directory": str(outcome.directory), "finding": found} | outcome.summary))
+        return
+    show(outcome)
+    print(f"\n{found}")
+
+
+def _numbers(responses: Responses) -> str:
+    """The newest response in a line: where the cart is, and the magnitude at each line."""
+    if not len(responses) or not responses.valid[-1].any():
+        return "waiting for the first whole window"
+    newest = responses[-1]
+    f = newest.lines.frequency_hz
+    levels = " ".join(f"{db:+.1f}" for db in newest.magnitude_db)
+    return f"cart at {newest.schedule:.2f} m, dB at {f[0]:.0f} … {f[-1]:.0f} Hz: {levels}"
