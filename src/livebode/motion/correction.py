@@ -33,7 +33,7 @@ class MotionCorrection:
     measured positions; its signals go through the same windows; what the motion did to the model is taken off the
     machine:
 
-        Ĝ = (Y/U)·G_frozen(x_centre)/(Y_model/U_model)
+        Ĝ = Y/U + G_frozen(x_centre) − Y_model/U_model
 
     with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ, `passes` times. Only
     w, u, y, x, the radius and (driven by the excitation) the loop's description are used.
@@ -42,12 +42,15 @@ class MotionCorrection:
     of the controllers to noise, is in Y_model as in Y, and U_model is U. Driven by "excitation", the described loop is
     simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
 
+    To first order the same is (Y/U)·G_frozen/(Y_model/U_model) (`quotient`); at a line near the antiresonance, where
+    the model's window sees much less than it has at its centre, that multiplies the noise.
+
     Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
     its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same.
 
     Bias: where the machine is not two masses, only what it shares with them is corrected. Dry friction at standstill,
     and a window within 0.5 s of a start or a gap, are not; nor is an acceleration's onset where friction lets go.
-    `sigma` is the Tracker's, scaled with the correction; with noise = "periods" it still counts the motion as noise.
+    `sigma` is the Tracker's (of a quotient, scaled with it); with noise = "periods" it counts the motion as noise.
 
     Parameters
     ----------
@@ -59,6 +62,8 @@ class MotionCorrection:
         Responses are fitted together over this many samples; by default 4 s. A stroke is a good choice.
     driven_by
         "torque" or "excitation".
+    quotient
+        Correct by a quotient instead of a difference.
     passes
         How often model and correction are repeated.
     stiffness_splines, damping_splines
@@ -91,6 +96,7 @@ class MotionCorrection:
         radius_m: float,
         chunk_samples: int | None = None,
         driven_by: Literal["torque", "excitation"] = "torque",
+        quotient: bool = False,
         passes: int = 3,
         stiffness_splines: int = 8,
         damping_splines: int = 4,
@@ -103,6 +109,7 @@ class MotionCorrection:
         self.model: MovingModel | None = None
         """The fit of the newest chunk; None before the first."""
         self._drive = drive_of(settings.loop, lines.rate_hz) if driven_by == "excitation" else None
+        self._quotient = quotient
         self._passes, self._splines, self._radius_m = passes, (stiffness_splines, damping_splines), radius_m
         self._chunk = round(4 * lines.rate_hz) if chunk_samples is None else chunk_samples
         if self._chunk < 2 * lines.window:
@@ -175,18 +182,18 @@ class MotionCorrection:
         usable = tracked.valid.all(axis=1) & np.isfinite(tracked.schedule)
         steady = usable & steady_rows(tracked.sample, signals, self.settings.lines.window)
         fitted = steady if np.count_nonzero(steady) >= _ROWS_MIN else usable
-        factor = np.ones_like(tracked.value)
         if np.count_nonzero(fitted) >= _ROWS_MIN:
-            self.model, factor = self._fitted(tracked, fitted, signals)
+            self.model, value = self._fitted(tracked, fitted, signals)
         elif self.model is not None:
-            factor = self._factor(self.model, tracked, signals)
+            value = self._moved(self.model, tracked, signals)
         else:
-            factor[:] = np.nan
-        valid = tracked.valid & np.isfinite(factor)
+            value = np.full_like(tracked.value, np.nan)
+        valid = tracked.valid & np.isfinite(value)
+        scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         return replace(
             tracked,
-            value=np.where(valid, tracked.value * factor, complex(np.nan, np.nan)),
-            sigma=np.where(valid, tracked.sigma * np.abs(factor), np.nan),
+            value=np.where(valid, value, complex(np.nan, np.nan)),
+            sigma=np.where(valid, tracked.sigma * scale, np.nan),
             valid=valid,
         )
 
@@ -198,14 +205,13 @@ class MotionCorrection:
         fit = Fit(lines.z, lines.rate_hz, self._radius_m, *splines)
         # The error of a response is n/|U|: white noise on y over the torque at the line.
         weight = self._torque(signals, tracked.sample[used])
-        value = tracked.value[used]
-        model = fit.start(Rows(value, weight, at))
-        factor = np.ones_like(tracked.value)
+        value = tracked.value
+        model = fit.start(Rows(value[used], weight, at))
         for _ in range(self._passes):
-            model = fit.refine(Rows(value * factor[used], weight, at), model)
-            factor = self._factor(model, tracked, signals)
-            factor[used] = np.where(np.isfinite(factor[used]), factor[used], 1.0)
-        return model, factor
+            model = fit.refine(Rows(value[used], weight, at), model)
+            value = self._moved(model, tracked, signals)
+            value[used] = np.where(np.isfinite(value[used]), value[used], tracked.value[used])
+        return model, value
 
     def _torque(self, signals: Block, sample: NDArray[np.int64]) -> Floats:
         """|U| at the lines over the windows that end at these samples, (rows, lines)."""
@@ -214,8 +220,8 @@ class MotionCorrection:
         wave = np.exp(-2j * np.pi * np.outer(np.arange(window), lines.bins) / window)
         return np.asarray(np.abs(np.lib.stride_tricks.sliding_window_view(signals["u"], window)[first] @ wave))
 
-    def _factor(self, model: MovingModel, tracked: Responses, signals: Block) -> NDArray[np.complex128]:
-        """G_frozen over the model's tracked response, for each row; NaN where the model has no whole window."""
+    def _moved(self, model: MovingModel, tracked: Responses, signals: Block) -> NDArray[np.complex128]:
+        """The tracked responses, moved as the model's had to be to its frozen one; NaN where it has no whole window."""
         lines, s = self.settings.lines, self.settings
         if self._drive is None:
             u, y = signals["u"], by_torque(model, lines.rate_hz, signals["u"], signals["x"])
@@ -230,7 +236,9 @@ class MotionCorrection:
         at = np.where(np.isfinite(tracked.schedule), tracked.schedule, model.low_m)
         frozen = two_masses.sampled(model.parameters(at), lines.z, lines.rate_hz)
         with np.errstate(invalid="ignore"):  # NaN where a window is not whole
-            return np.asarray(frozen / seen.value[place])
+            if self._quotient:
+                return np.asarray(tracked.value * (frozen / seen.value[place]))
+            return np.asarray(tracked.value + (frozen - seen.value[place]))
 
 
 def _channels(*names: str) -> tuple[Channel, ...]:
