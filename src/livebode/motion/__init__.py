@@ -1,0 +1,6 @@
+"""Responses of an axis in motion, corrected by a model that moves as the axis did."""
+
+from livebode.motion.correction import MotionCorrection
+from livebode.motion.model import Curve, MovingModel
+
+__all__ = ["Curve", "MotionCorrection", "MovingModel"]

@@ -1,0 +1,125 @@
+"""One MovingModel for all responses along the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.motion import two_masses
+from livebode.motion.least_squares import minimise
+from livebode.motion.model import Curve, MovingModel, basis
+from livebode.motion.windows import scan
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_SCANNED_ROWS = 24
+_SMOOTH = 1e-3  # of a third difference of the splines' weights, against the weight of all responses
+
+
+class Rows(NamedTuple):
+    """Responses (rows, lines), one over their standard deviations up to a factor, and positions (rows,)."""
+
+    value: Complex
+    weight: Floats
+    position_m: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """How a MovingModel is fitted.
+
+    Parameters
+    ----------
+    z, rate_hz
+        e^(jωT) at the lines, and the loop's rate.
+    radius_m
+        r.
+    stiffness_splines, damping_splines
+        How freely ln Keff(x) and ln bs(x) move: 1 for a constant, else 4 or more B-splines. No shape is assumed.
+    """
+
+    z: Complex
+    rate_hz: float
+    radius_m: float
+    stiffness_splines: int
+    damping_splines: int
+
+    def start(self, rows: Rows) -> MovingModel:
+        """From a scan of ten stiffnesses at up to 24 places: medians of the masses, curves through the rest."""
+        chosen = np.unique(np.linspace(0, len(rows.value) - 1, _SCANNED_ROWS).round().astype(int))
+        order = np.argsort(rows.position_m, kind="stable")[chosen]
+        found, cost = scan(rows.value[order], rows.weight[order], self.z, self.rate_hz)
+        good = np.isfinite(cost) & (cost <= 10 * np.median(cost))
+        if np.count_nonzero(good) < 1:
+            raise InputError("no two masses fit these responses; check the lines, the signals and the loop")
+        found, at = found[good], rows.position_m[order][good]
+        low, high = float(rows.position_m.min()), float(rows.position_m.max())
+        found[:, :2] = np.median(found[:, :2], axis=0)
+        weights = []
+        for which, splines in ((2, self.stiffness_splines), (3, self.damping_splines)):
+            shape = basis(at, low, high, splines)
+            smooth = _third_differences(splines)
+            matrix = shape.T @ shape + 1e-2 * smooth + 1e-9 * np.eye(splines)
+            weights.append(np.linalg.solve(matrix, shape.T @ found[:, which]))
+        return self._model(np.concatenate([found[0, :2], *weights]), low, high)
+
+    def refine(self, rows: Rows, model: MovingModel) -> MovingModel:
+        """Weighted least squares over all rows, from a model on."""
+        low, high = model.low_m, model.high_m
+        design = self._design(rows.position_m, low, high)
+        pull = _SMOOTH * self._smoothness(rows)
+
+        def normal(unknowns: Floats) -> tuple[Floats, Floats, Floats]:
+            parameters = np.einsum("rpu,u->rp", design, unknowns[0])
+            residual = (rows.weight * (two_masses.sampled(parameters, self.z, self.rate_hz) - rows.value)).ravel()
+            slope = rows.weight[..., np.newaxis] * two_masses.slopes(parameters, self.z, self.rate_hz)
+            left = np.einsum("rlp,rpu->rlu", slope, design).reshape(residual.size, -1)
+            matrix = (left.conj().T @ left).real + pull
+            gradient = (left.conj().T @ residual).real + pull @ unknowns[0]
+            cost = np.sum(np.abs(residual) ** 2) + unknowns[0] @ pull @ unknowns[0]
+            return np.atleast_1d(cost), gradient[np.newaxis], matrix[np.newaxis]
+
+        unknowns, _ = minimise(normal, self._unknowns(model)[np.newaxis])
+        return self._model(unknowns[0], low, high)
+
+    def _design(self, position_m: Floats, low: float, high: float) -> Floats:
+        """From the unknowns to the four logarithms of each row, shape (rows, 4, unknowns)."""
+        stiffness = basis(position_m, low, high, self.stiffness_splines)
+        damping = basis(position_m, low, high, self.damping_splines)
+        design = np.zeros((position_m.size, 4, 2 + self.stiffness_splines + self.damping_splines))
+        design[:, 0, 0] = design[:, 1, 1] = 1.0
+        design[:, 2, 2 : 2 + self.stiffness_splines] = stiffness
+        design[:, 3, 2 + self.stiffness_splines :] = damping
+        return design
+
+    def _smoothness(self, rows: Rows) -> Floats:
+        n, k = 2 + self.stiffness_splines + self.damping_splines, 2 + self.stiffness_splines
+        penalty = np.zeros((n, n))
+        penalty[2:k, 2:k] = _third_differences(self.stiffness_splines)
+        penalty[k:, k:] = _third_differences(self.damping_splines)
+        return penalty * float(np.sum(np.abs(rows.weight * rows.value) ** 2)) / n
+
+    def _unknowns(self, model: MovingModel) -> Floats:
+        arm = 2 * np.log(self.radius_m)
+        masses = np.log(model.inertia_kg_m2), np.log(model.load_kg) + arm
+        return np.concatenate([masses, model.log_stiffness.weights + arm, model.log_damping.weights + arm])
+
+    def _model(self, unknowns: Floats, low: float, high: float) -> MovingModel:
+        arm, k = 2 * np.log(self.radius_m), 2 + self.stiffness_splines
+        return MovingModel(
+            inertia_kg_m2=float(np.exp(unknowns[0])),
+            load_kg=float(np.exp(unknowns[1] - arm)),
+            radius_m=self.radius_m,
+            log_stiffness=Curve(low, high, unknowns[2:k] - arm),
+            log_damping=Curve(low, high, unknowns[k:] - arm),
+        )
+
+
+def _third_differences(splines: int) -> Floats:
+    differences = np.diff(np.eye(splines), n=3, axis=0)
+    return np.asarray(differences.T @ differences)

@@ -1,0 +1,87 @@
+"""MovingModel: two masses whose stiffness and damping follow a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+
+Floats = NDArray[np.float64]
+
+_DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A smooth function of the position: a cubic spline with evenly spaced knots, constant outside of its range.
+
+    Parameters
+    ----------
+    low, high
+        Range of positions, m.
+    weights
+        One for each B-spline, shape (splines,), at least four; a single one is a constant.
+    """
+
+    low: float
+    high: float
+    weights: Floats
+
+    def __call__(self, position_m: ArrayLike) -> Floats:
+        at = np.asarray(position_m, dtype=np.float64)
+        return np.asarray((basis(at.ravel(), self.low, self.high, len(self.weights)) @ self.weights).reshape(at.shape))
+
+
+def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
+    """Value of every B-spline at these positions, shape (positions, splines); one of them alone is 1."""
+    if splines == 1:
+        return np.ones((position_m.size, 1))
+    inner = np.linspace(low, high, splines - _DEGREE + 1)
+    knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
+    return np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+
+
+@dataclass(frozen=True, eq=False)
+class MovingModel:
+    """What was fitted: two masses (11), (12) with Keff(x) and bs(x).
+
+    Attributes
+    ----------
+    inertia_kg_m2, load_kg, radius_m
+        Js, mL, r.
+    low_m, high_m
+        The positions that the fit has seen.
+    """
+
+    inertia_kg_m2: float
+    load_kg: float
+    radius_m: float
+    log_stiffness: Curve
+    log_damping: Curve
+
+    @property
+    def low_m(self) -> float:
+        return self.log_stiffness.low
+
+    @property
+    def high_m(self) -> float:
+        return self.log_stiffness.high
+
+    def stiffness_at(self, position_m: ArrayLike) -> Floats:
+        """Keff, N/m; outside of the range that the fit has seen as at its end."""
+        return np.asarray(np.exp(self.log_stiffness(position_m)))
+
+    def damping_at(self, position_m: ArrayLike) -> Floats:
+        """bs, N s/m; likewise."""
+        return np.asarray(np.exp(self.log_damping(position_m)))
+
+    def parameters(self, position_m: ArrayLike) -> Floats:
+        """Logarithms in the order of `two_masses`, shape (..., 4)."""
+        at, arm = np.asarray(position_m, dtype=np.float64), 2 * np.log(self.radius_m)
+        js, load = np.log(self.inertia_kg_m2), np.log(self.load_kg) + arm
+        constant = np.ones(at.shape)
+        return np.stack(
+            [js * constant, load * constant, self.log_stiffness(at) + arm, self.log_damping(at) + arm], axis=-1
+        )

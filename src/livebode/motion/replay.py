@@ -1,0 +1,79 @@
+"""A MovingModel driven as the machine was, along its measured positions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.motion.model import MovingModel
+from livebode.nouns import InputError
+from livebode.simulation._axis import Engine
+from livebode.simulation.configuration import BeltAxis, engine_settings
+from livebode.simulation.mechanics import Mechanics
+from livebode.simulation.motion import Standstill
+from livebode.simulation.settings import Drive
+
+Floats = NDArray[np.float64]
+
+_STATES = 4
+_PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
+_ANYWHERE_M = 1e12
+
+
+def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats) -> Floats:
+    """Velocity of the model under the measured torque u, N m, from rest: rad/s, shape (samples,).
+
+    Whatever made the torque (excitation, motion, the controllers' answer to noise) moves the model as it moved the
+    machine. What is not in u or not in the model, such as friction, makes it drift away slowly; see `without_drift`.
+    """
+    drive = Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
+                  position_gain_per_s=0.0)  # fmt: skip
+    return _run(model, drive, u, position_m)[1]
+
+
+def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
+    """u, N m, and velocity, rad/s, of the model's loop under w alone, from rest, shape (samples,) each.
+
+    The motion itself is left out: what remains is linear and varies in time. A transient that the reference's
+    acceleration leaves behind is not in it.
+    """
+    return _run(model, drive, w, position_m)
+
+
+def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
+    """The model's velocity, with its slow difference from the measured one added: two boxcars of a window each.
+
+    A boxcar of N samples is blind to every line, and two in a row, centred, hand on a constant and a ramp unchanged.
+    At the ends the last value is repeated.
+    """
+    slow = measured - model
+    for early in (window // 2, (window - 1) // 2):
+        padded = np.pad(slow, (early + 1, window - 1 - early), mode="edge")
+        total = np.cumsum(padded - padded.mean())
+        slow = (total[window:] - total[:-window]) / window + padded.mean()
+    return np.asarray(model + slow)
+
+
+def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
+    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
+    most = float(stiffness.max()), float(damping.max())
+    mechanics = Mechanics(
+        inertia_kg_m2=model.inertia_kg_m2,
+        pulley_inertia_kg_m2=model.inertia_kg_m2 / 4,  # part of Js with two masses
+        load_kg=model.load_kg,
+        radius_m=model.radius_m,
+        stiffness_n_per_m=most[0],
+        damping_n_s_per_m=most[1],
+        nominal_position_m=_PLACE_M,
+        frozen_position_m=_PLACE_M,
+    )
+    axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=_PLACE_M))
+    wide = {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
+    engine = Engine(engine_settings(axis) | wide, _PLACE_M)
+    inputs = np.zeros((8, w.size))
+    inputs[0], inputs[2] = _PLACE_M / model.radius_m, w
+    inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
+    output = np.empty((3 + _STATES, w.size))
+    if engine.advance(inputs, output) < w.size:
+        raise InputError("the fitted model does not stay in its loop; check the loop's description and the radius")
+    return output[0], output[1]

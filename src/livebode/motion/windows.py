@@ -1,0 +1,64 @@
+"""Two masses fitted to each response alone, started by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.motion import two_masses
+from livebode.motion.least_squares import minimise
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_SCANNED = 10
+_QUALITY = 10.0  # of the scanned resonances; Table I has it
+
+
+def fit_windows(value: Complex, weight: Floats, z: Complex, rate_hz: float, start: Floats) -> tuple[Floats, Floats]:
+    """Weighted least squares for each row of `value`: logarithms of the four parameters, (rows, 4), and cost (rows,).
+
+    `weight` (rows, lines) is one over the standard deviation, up to a factor; start (rows, 4).
+    """
+
+    def normal(parameters: Floats) -> tuple[Floats, Floats, Floats]:
+        residual = weight * (two_masses.sampled(parameters, z, rate_hz) - value)
+        slope = weight[..., np.newaxis] * two_masses.slopes(parameters, z, rate_hz)
+        left = np.concatenate([slope.real, slope.imag], axis=-2)
+        right = np.concatenate([residual.real, residual.imag], axis=-1)
+        transposed = left.swapaxes(-1, -2)
+        return np.sum(right**2, axis=-1), (transposed @ right[..., np.newaxis])[..., 0], transposed @ left
+
+    return minimise(normal, start)
+
+
+def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Floats, Floats]:
+    """The same without a start: ten resonances from half the lowest to twice the highest line, the best of ten fits.
+
+    A fit that starts with a stiffness twice off ends in a false minimum, so each of the ten is tried. For a given
+    resonance the response is linear in 1/(Js + m) and 1/Js − 1/(Js + m), which gives its two inertias.
+    """
+    f_hz = np.abs(np.angle(z)) * rate_hz / (2 * np.pi)
+    found = [
+        fit_windows(value, weight, z, rate_hz, _with_resonance(omega, value, weight, z, rate_hz))
+        for omega in 2 * np.pi * np.geomspace(f_hz.min() / 2, f_hz.max() * 2, _SCANNED)
+    ]
+    cost = np.array([c for _, c in found])
+    best = np.argmin(cost, axis=0)
+    rows = np.arange(len(value))
+    return np.array([p for p, _ in found])[best, rows], cost[best, rows]
+
+
+def _with_resonance(omega: float, value: Complex, weight: Floats, z: Complex, rate_hz: float) -> Floats:
+    unit = np.log([2.0, 2.0, omega**2, omega / _QUALITY])  # reduced inertia 1: α = 1/4, β = 1/4
+    rigid = 1 / (rate_hz * (z - 1))
+    parts = np.stack([rigid, 4 * two_masses.sampled(unit, z, rate_hz) - rigid], axis=-1)
+    left = weight[..., np.newaxis] * parts
+    left, right = np.concatenate([left.real, left.imag], axis=-2), weight * value
+    right = np.concatenate([right.real, right.imag], axis=-1)
+    solved = np.linalg.solve(left.swapaxes(-1, -2) @ left, (left.swapaxes(-1, -2) @ right[..., np.newaxis]))[..., 0]
+    alpha = np.maximum(solved[:, 0], 1e-3 * np.abs(solved).max(axis=1) + 1e-300)
+    beta = np.maximum(solved[:, 1], 1e-3 * alpha)
+    js, load = 1 / (alpha + beta), beta / (alpha * (alpha + beta))
+    reduced = js * load * alpha
+    return np.asarray(np.log(np.stack([js, load, reduced * omega**2, reduced * omega / _QUALITY], axis=-1)))
