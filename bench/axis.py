@@ -17,7 +17,8 @@ EXCITATION = multisine(Lines.parse("20:140:20", rate_hz=4000, window=400))
 CASES = {
     "two masses": {},
     "two masses, friction 15 N, noise": {
-        "friction": Friction(load_coulomb_n=15.0), "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 20)
+        "friction": Friction(load_coulomb_n=15.0),
+        "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 20),
     },
     "three masses": {"mechanics": Mechanics(masses=3)},
     "three masses, friction 15 N, noise": {
