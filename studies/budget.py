@@ -119,14 +119,14 @@ def draw(result: Result) -> Figure:
             place = np.digitize(parts["position_m"], edges_m)
             seen = [i for i in range(1, len(edges_m)) if np.any(place == i)]
             middle = [(edges_m[i - 1] + edges_m[i]) / 2 for i in seen]
-            for colour, name in zip((LIGHT.ink, *LIGHT.traces), ("total", *PARTS)):
+            for colour, name in zip((LIGHT.ink, *LIGHT.traces[:4], LIGHT.traces[6]), ("total", *PARTS)):
                 values = [rms(parts[name][place == i]) for i in seen]
                 axes.semilogy(middle, values, color=colour, linewidth=1.3, label=name)
             axes.set_title(f"dated at the {way}", size=10, loc="left")
             axes.set_xlabel("cart position, m")
             axes.yaxis.set_major_formatter("{x:g}")
         panels[0].set_ylabel("error of |G|, rms, dB")
-        panels[0].legend(loc="upper center", ncols=1)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=3)
     return figure
 
 
