@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 EDGES_M = np.linspace(0.25, 1.6, 28)  # a frozen machine stands for each of these 5 cm
 BACKWARD = Strokes(start_m=1.6, end_m=0.25, speed_m_per_s=STROKE.speed_m_per_s, dwell_s=STROKE.dwell_s)
 PARTS = ("noise", "motion, odd in speed", "motion, even in speed", "transient of the acceleration", "linearisation")
-PAPER = "The paper names noise and lag as the errors of a moving axis and leaves open how much each is."
+PAPER = "N trades noise against lag. The budget is ours."
 
 
 def errors(recording: Recording, truth: Local, **options: object) -> tuple[Floats, Floats]:

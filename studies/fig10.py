@@ -40,8 +40,8 @@ THREE_SIGMA = 2.43  # the c at which a bound of a complex number promises 99.7 %
 PROMISES = {1.0: -expm1(-1.0), 2.0: -expm1(-4.0), THREE_SIGMA: -expm1(-(THREE_SIGMA**2))}
 BAND_HZ = (10.0, 150.0)
 PAPER = (
-    "At standstill at 0.8 m the online estimates with their 3σ bars and the offline response by chirp and (2) both "
-    "lie on (14); the coherence is near 1 except around the antiresonance."
+    "At standstill at 0.8 m: online estimates with 3σ bars, and an offline response by chirp and (2) with coherence; "
+    "both against (14)."
 )
 
 

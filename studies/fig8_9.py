@@ -72,10 +72,7 @@ WAYS: list[tuple[str, Way | None, float | None]] = [
     ("the same with Hann", hann, 0.23),
     ("with the reference model", None, 0.15),
 ]
-PAPER = (
-    "The tracked |G| follows the local response (14) at every line as the cart moves, with noise of 0.1 rad/s; "
-    "the paper shows it and gives no number."
-)
+PAPER = "|G| tracked along the stroke, line by line, with noise of 0.1 rad/s, against (14) at each position."
 
 
 # Parts of the stroke, each of the windows wholly within it.
