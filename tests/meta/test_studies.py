@@ -1,0 +1,90 @@
+"""A short version of each study runs, draws and writes; its verdicts say what was measured."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.simulation import Mechanics
+from studies import STUDIES
+from studies.__main__ import main, write
+from studies.common import Local, Result, Study, Verdict, error_db, lines, rms, stroke, track, within_stroke
+from studies.page import write_page
+
+ROOT = Path(__file__).parents[2]
+FROZEN = Mechanics(frozen_position_m=0.8)
+NAMES = [study.name for study in STUDIES]
+
+
+@cache
+def short(name: str) -> tuple[Study, Result]:
+    study = next(study for study in STUDIES if study.name == name)
+    return study, study.measure(True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_short_version_runs_draws_and_writes(name: str, tmp_path: Path) -> None:
+    study, result = short(name)
+    write(study, result, tmp_path)
+    assert (tmp_path / f"{name}.png").stat().st_size > 20_000
+    numbers = json.loads((tmp_path / f"{name}.json").read_text())
+    for table in numbers["tables"]:
+        assert table["rows"]
+        for row in table["rows"]:
+            assert len(row) == len(table["header"])
+            assert all(isinstance(cell, str) or math.isfinite(cell) for cell in row), row
+    write_page(STUDIES, tmp_path, tmp_path / "page.md")
+    page = (tmp_path / "page.md").read_text()
+    assert study.title in page
+    assert study.paper in page
+    for verdict in result.verdicts:
+        assert verdict.value is None or math.isfinite(verdict.value)
+        assert f"**{verdict.word}** {verdict.claim}" in page
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_committed_page_is_that_of_the_committed_numbers(name: str, tmp_path: Path) -> None:
+    assert (ROOT / "docs" / "images" / "studies" / f"{name}.png").exists()
+    write_page(STUDIES, ROOT / "docs" / "images" / "studies", tmp_path / "page.md")
+    assert (tmp_path / "page.md").read_text() == (ROOT / "docs" / "studies.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("value", "at_least", "word"),
+    [
+        (1.0, False, "reached"),
+        (1.1, False, "SHORT"),
+        (1.0, True, "reached"),
+        (0.9, True, "SHORT"),
+        (None, False, "open"),
+    ],
+)
+def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float | None, at_least: bool, word: str) -> None:
+    verdict = Verdict("claim", value, 1.0, at_least, why="the reason")
+    assert verdict.word == word
+    assert str(verdict).startswith(word)
+    assert ("the reason" in str(verdict)) == (word != "reached")
+    assert Verdict("claim", math.nan, 1.0).word == "SHORT"
+
+
+def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fig99"]) == 2
+    assert "fig8_9" in capsys.readouterr().err
+
+
+def test_the_error_of_a_frozen_machine_long_after_the_start_is_none() -> None:
+    """The measure of error itself: a linear machine far from accelerations has no error but its noise."""
+    truth = Local()
+    direct = stroke(sigma=0.0).axis.linear(0.777).sampled(4000.0).response(lines().frequency_hz)
+    assert np.allclose(truth(np.array([0.777]))[0], direct, rtol=1e-6)
+    recording = stroke(sigma=0.0, mechanics=FROZEN)
+    found = within_stroke(track(recording.block), recording)
+    assert found.first[0] >= recording.first
+    assert found.sample[-1] <= recording.last
+    errors = error_db(found, Local(FROZEN)(found.schedule))
+    assert rms(errors[(found.schedule > 1.0) & (found.schedule < 1.5)]) < 0.01
