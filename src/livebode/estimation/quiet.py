@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.estimation.bounds import power
 from livebode.nouns import InputError, Lines
 
 NEIGHBOURS = 4
@@ -43,4 +44,4 @@ class QuietNoise:
         """
         left, right = ratio[:, self._left], ratio[:, self._right]
         rest = numerator - (left + (right - left) * self._share) * denominator
-        return np.asarray((rest.real**2 + rest.imag**2)[:, self._nearest].mean(axis=2))
+        return np.asarray(power(rest)[:, self._nearest].mean(axis=2))

@@ -71,12 +71,12 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     InputError
         For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
     """
+    started = time.perf_counter()
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     settings = make_settings(axis, log)
-    check_length(log.samples, settings.lines.window)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw)
+    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started)
 
 
 def record(
@@ -89,13 +89,15 @@ def record(
     progress: Progress,
     draw: Draw,
     watch: Watch | None = None,
+    started: float | None = None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses; `delivery` goes to the source's `blocks`.
+    `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
+    that is to count in the speed; `delivery` goes to the source's `blocks`.
     """
-    started = time.perf_counter()
+    started = time.perf_counter() if started is None else started
     _keep_freed_memory()
     tracker, overview = Tracker(settings), Overview()
     with RunDirectory(directory, force=force) as out:
