@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from livebode import Block, Lines, Responses, Settings, Tracker, multisine
+from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Strokes
 
 Floats = NDArray[np.float64]
@@ -19,8 +20,8 @@ Complex = NDArray[np.complex128]
 RATE_HZ = 4000.0
 WINDOW = 400  # 100 ms: the paper's N = 100 at 1 ms
 SIGMA = 0.1  # rad/s on the velocity, as in the paper
-# Long enough at rest for the loop to be in its periodic state (to 3e-4) before it moves.
-STROKE = Strokes(start_m=0.25, end_m=1.6, speed_m_per_s=0.38, dwell_s=3.0)
+STROKE = Strokes(start_m=0.25, end_m=1.6, speed_m_per_s=0.38, dwell_s=0.5)
+RUN_IN_S = 10.0  # the loop is then in its periodic state to 1e-8
 
 
 def lines(window: int = WINDOW, rate_hz: float = RATE_HZ) -> Lines:
@@ -45,17 +46,27 @@ class Recording:
 def stroke(sigma: float = SIGMA, seed: int = 0, motion: Strokes = STROKE, **options: Any) -> Recording:
     """One stroke of the paper's simulation; `options` are those of the axis."""
     ticks = len(motion.cycle(RATE_HZ)[0]) // 2
-    options = {"mechanics": Mechanics(), "excitation_n_m": EXCITATION} | options
+    options = {"mechanics": Mechanics(), "excitation_n_m": EXCITATION, "run_in_s": RUN_IN_S} | options
     axis = BeltAxis(motion=motion, sensor=Sensor(noise_rad_per_s=sigma), seconds=ticks / RATE_HZ, seed=seed, **options)
     block, _ = SimulatedAxis(axis).run()
     moving = np.flatnonzero(block["velocity_reference"])
     return Recording(axis, block, int(moving[0]), int(moving[-1]))
 
 
-def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
+def settings(rate_hz: float = RATE_HZ, window: int = WINDOW, **options: Any) -> Settings:
     """The joint estimate at 20:20:140 Hz, plotted over the cart's position."""
     signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
-    return Tracker(Settings(**({"lines": lines(window, block.rate_hz)} | signals | options))).process(block)
+    return Settings(**({"lines": lines(window, rate_hz)} | signals | options))
+
+
+def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
+    return Tracker(settings(block.rate_hz, window, **options)).process(block)
+
+
+def corrected(axis: BeltAxis, block: Block, chunk: int, told: Settings, **options: Any) -> Responses:
+    """The same through a MotionCorrection that fits `chunk` samples at a time."""
+    correction = MotionCorrection(told, radius_m=axis.mechanics.radius_m, chunk_samples=chunk, **options)
+    return Responses.join([correction.process(block), correction.finish()])
 
 
 def within_stroke(found: Responses, recording: Recording) -> Responses:
