@@ -22,7 +22,7 @@ from studies.common import (
     Study,
     Table,
     Verdict,
-    corrected,
+    correct,
     decibels,
     error_db,
     lines,
@@ -70,7 +70,7 @@ def by_model(recording: Recording, driven_by: str = "torque", **options: object)
     """The stroke as one chunk: two masses that move as the axis did are fitted, and their motion's error taken off."""
     block = recording.block
     told = settings(block.rate_hz, loop=recording.axis.drive.loop(), **options)
-    found = corrected(recording.axis, block, len(block), told, driven_by=driven_by)
+    found = correct(recording.axis, block, len(block), told, driven_by=driven_by)
     found = within_stroke(found, recording)
     return found, found.schedule
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import f as fisher
 
-from livebode import Lines, multisine
+from livebode import Block, Lines, multisine
 from livebode.simulation import BeltAxis, Friction, Mechanics, Motion, Sensor, SimulatedAxis, Standstill, Strokes
 from studies.common import RATE_HZ, SIGMA, Complex, Floats, Result, Study, Table, Verdict, decibels, rms
 from studies.drawing import LIGHT, figure_of
@@ -152,13 +152,13 @@ def levels(case: Case, realisations: int) -> Levels:
     lines = odd_multisine_lines()
     seeds: list[int | None] = [None] if case.schroeder else list(range(realisations))
     periods = [period_of(lines, seed) for seed in seeds]
-    each = [rest(case, period, lines, seed or 0) for period, seed in zip(periods, seeds)]
+    each = [rest(record(case, period, seed or 0), lines) for period, seed in zip(periods, seeds)]
     crest = np.mean([np.max(np.abs(period)) / RMS_N_M for period in periods])
     return Levels(lines, *(np.array(part) for part in zip(*each)), crest=float(crest))
 
 
-def rest(case: Case, period: Floats, lines: Lines, seed: int) -> tuple[Complex, Complex, Floats, Complex, Complex]:
-    """Of one realisation: Ĝ, mean and variance of Y − Ĝ·U at all bins, and the means of Y and U at the excited ones."""
+def record(case: Case, period: Floats, seed: int) -> Block:
+    """Whole periods."""
     axis = BeltAxis(
         mechanics=case.mechanics,
         friction=case.friction,
@@ -170,9 +170,12 @@ def rest(case: Case, period: Floats, lines: Lines, seed: int) -> tuple[Complex, 
         seed=seed,
     )
     block, _ = SimulatedAxis(axis).run()
-    y, u = (
-        np.fft.rfft(block[name][LEAD:].reshape(PERIODS, PERIOD), axis=1) * (2 / PERIOD) for name in ("velocity", "u")
-    )
+    return block.cut(LEAD, len(block))
+
+
+def rest(block: Block, lines: Lines) -> tuple[Complex, Complex, Floats, Complex, Complex]:
+    """Of one realisation: Ĝ, mean and variance of Y − Ĝ·U at all bins, and the means of Y and U at the excited ones."""
+    y, u = (np.fft.rfft(block[name].reshape(-1, PERIOD), axis=1) * (2 / PERIOD) for name in ("velocity", "u"))
     at = np.asarray(lines.bins)
     every = np.arange(at[0], at[-1] + 1)
     response = y[:, at].mean(axis=0) / u[:, at].mean(axis=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.peers import kalman, least_squares, rls, sliding_welch
+from studies.peers import kalman, least_squares, moving, rls, sliding_welch
 from studies.peers.compiled import LANGUAGE
 from studies.peers.estimates import Peer
 from studies.peers.tracked import by, track
@@ -12,6 +12,7 @@ from studies.peers.tracked import by, track
 _DATED = "how late it is"
 _ARX = f"the band, a rate, an order, a memory, {_DATED}"
 _LINES = "the lines and their window"
+_POSITION = "that there are two masses, how long a stroke is, the cart's position as a signal"
 
 PEERS = (
     Peer("RLS, textbook", rls.textbook, "an order, a memory", LANGUAGE),
@@ -34,6 +35,8 @@ PEERS = (
         f"{_LINES}, {_DATED}",
         "C",
     ),
+    Peer("livebode, corrected", moving.corrected, f"{_LINES}, {_POSITION}", "C, NumPy"),
+    Peer("livebode, moving model", moving.model, f"{_LINES}, {_POSITION}, the radius", "C, NumPy"),
 )
 TEXTBOOK, TUNED, FILTER = "RLS, textbook", "RLS, tuned", "EKF, two masses, tuned"
 OURS = "livebode"
