@@ -16,10 +16,6 @@ from studies.common import (
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     error_db,
     lines,
     rms,
@@ -29,6 +25,7 @@ from studies.common import (
 )
 from studies.drawing import LIGHT, figure_of
 from studies.fig10 import standing
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

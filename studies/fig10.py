@@ -12,24 +12,9 @@ from scipy.signal import chirp
 from examples.loop_costs import LOOPS
 from livebode import Block, Response, welch
 from livebode.simulation import BeltAxis, BeltResponse, Mechanics, Sensor, SimulatedAxis, Standstill
-from studies.common import (
-    EXCITATION,
-    RATE_HZ,
-    RUN_IN_S,
-    SIGMA,
-    WINDOW,
-    Complex,
-    Floats,
-    Result,
-    Study,
-    Table,
-    Verdict,
-    decibels,
-    lines,
-    rms,
-    track,
-)
+from studies.common import EXCITATION, RATE_HZ, RUN_IN_S, SIGMA, WINDOW, Complex, Floats, decibels, lines, rms, track
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,10 +18,6 @@ from studies.common import (
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     correct,
     decibels,
     error_db,
@@ -33,6 +29,7 @@ from studies.common import (
     within_stroke,
 )
 from studies.drawing import LIGHT, figure_of, spread
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

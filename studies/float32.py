@@ -15,10 +15,6 @@ from studies.common import (
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     decibels,
     error_db,
     lines,
@@ -28,6 +24,7 @@ from studies.common import (
     within_stroke,
 )
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

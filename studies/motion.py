@@ -16,8 +16,9 @@ from livebode.excitation import multisine
 from livebode.motion.windows import fit_windows
 from livebode.nouns import Block, Responses
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
-from studies.common import RATE_HZ, WINDOW, Result, Study, Table, Verdict, correct, lines
+from studies.common import RATE_HZ, WINDOW, correct, lines
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

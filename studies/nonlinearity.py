@@ -17,8 +17,9 @@ from scipy.stats import f as fisher
 
 from livebode import Block, Lines, multisine
 from livebode.simulation import BeltAxis, Friction, Mechanics, Motion, Sensor, SimulatedAxis, Standstill, Strokes
-from studies.common import RATE_HZ, SIGMA, Complex, Floats, Result, Study, Table, Verdict, decibels, rms
+from studies.common import RATE_HZ, SIGMA, Complex, Floats, decibels, rms
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
