@@ -187,7 +187,8 @@ def rest(block: Block, lines: Lines) -> tuple[Complex, Complex, Floats, Complex,
 
 def measure(short: bool = False) -> Result:
     realisations = 2 if short else 12
-    found = {case: levels(case, realisations) for case in CASES}
+    judged_or_shown = (EXACT, LINEAR, SMOOTH, STANDING, SCHROEDER, SLOW)
+    found = {case: levels(case, realisations) for case in (judged_or_shown if short else CASES)}
     truth = BeltAxis().linear(POSITION_M).sampled(RATE_HZ).response(odd_multisine_lines().frequency_hz)
     best = found[STANDING].response.mean(axis=0)
     rows, of_bands = [], []
@@ -226,6 +227,10 @@ def judged(found: dict[Case, Levels]) -> list[Verdict]:
     verdicts.append(Verdict(claim, ratio, least, at_least=True, why="the friction is not seen"))
     quiet_odd = rms(np.abs(found[STANDING].mean[:, found[STANDING].odd]))
     apart = abs(float(decibels(np.array(found[STANDING].spread() / quiet_odd))))
+    here, there = whole[SCHROEDER]["odd"], standing["odd"]
+    why = "with the phases of one signal, what falls on each line does not average"
+    claim = f"{SCHROEDER.name}, standstill: odd level against that of random phases, dB apart"
+    verdicts.append(Verdict(claim, abs(here - there), 3.0, why=why))
     claim = "friction: spread of the excited lines over the phases against the level at the quiet odd ones, dB apart"
     verdicts.append(Verdict(claim, apart, 3.0, why="what the quiet lines show is not what the excited ones suffer"))
     return verdicts

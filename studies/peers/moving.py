@@ -47,7 +47,7 @@ def _parameters(fitted: MovingModel, position_m: np.ndarray) -> np.ndarray:
 
 def _strokes(recording: Recording) -> Iterator[tuple[Responses, MovingModel]]:
     """The responses of each stroke, with its model."""
-    block, stroke = recording.block, _samples(recording)
+    block, stroke = recording.block, recording.stroke_samples
     correction = MotionCorrection(SETTINGS, radius_m=two_mass.RADIUS_M, chunk_samples=stroke)
     begin = 0
     for end in range(stroke + LINES.window, len(block), stroke):
@@ -57,9 +57,5 @@ def _strokes(recording: Recording) -> Iterator[tuple[Responses, MovingModel]]:
     yield correction.finish(), correction.model
 
 
-def _samples(recording: Recording) -> int:
-    return len(recording.case.strokes.cycle(RATE_HZ)[0]) // 2
-
-
 def _waits(recording: Recording) -> float:
-    return float(_samples(recording) + LINES.window)
+    return float(recording.stroke_samples + LINES.window)

@@ -60,6 +60,11 @@ class Recording:
     truth: Truth
     judged: np.ndarray  # numbers of the newest samples at which everybody is asked
 
+    @property
+    def stroke_samples(self) -> int:
+        """One way, with the rest before it."""
+        return len(self.case.strokes.cycle(RATE_HZ)[0]) // 2
+
     @cached_property
     def true_stiffness(self) -> np.ndarray:
         return self.truth.stiffness_n_per_m

@@ -14,6 +14,7 @@ from livebode.simulation import Mechanics
 from studies import STUDIES
 from studies.__main__ import main, write
 from studies.common import Local, error_db, lines, rms, stroke, track, within_stroke
+from studies.fig8_9 import held_from
 from studies.page import write_page
 from studies.result import Result, Study, Verdict
 
@@ -75,6 +76,14 @@ def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float, at_least
 def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fig99"]) == 2
     assert "fig8_9" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("errors", "words"),
+    [([9, 9, 9, 1, 9, 1, 1], "from 0.4 s on"), ([1] * 7, "everywhere"), ([1] * 6 + [9], "nowhere")],
+)
+def test_targets_hold_from_where_none_is_missed_later(errors: list[float], words: str) -> None:
+    assert held_from([(errors, 2.0), ([9.0] * 7, None), ([1.0] * 7, 2.0)]) == words
 
 
 def test_the_error_of_a_frozen_machine_long_after_the_start_is_none() -> None:

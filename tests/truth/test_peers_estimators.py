@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from livebode import multisine
 from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Standstill
-from studies.peers import kalman, least_squares, moving, rls, sliding_welch, starts, two_mass
+from studies.peers import kalman, least_squares, moving, rls, sliding_welch, smoother, starts, two_mass
 from studies.peers.arx import Order, Prepared, rows
 from studies.peers.recording import HOP, LINES, MAIN, RATE_HZ, Recording, record
 from studies.peers.score import score
@@ -170,6 +170,28 @@ def test_the_moving_model_and_what_it_corrects_are_the_machine_without_noise() -
         assert found.magnitude_db < 0.02
         assert found.stiffness_percent < 0.1
         assert found.inertia_percent < 0.02
+
+
+def test_the_smoother_goes_back_as_rauch_tung_and_striebel_wrote_it() -> None:
+    block, tick_s = starts.beginning(0), 1 / RATE_HZ
+    u, y, count = block["u"], block["velocity"], 300
+    covariances = np.empty((len(y), 9, 9))
+    told = kalman.START, kalman.DOUBT, kalman.WANDER, 0.1, tick_s
+    states = kalman.filtered(u, y, *told, covariances)
+    found = smoother.backwards(u, states, covariances, 0, count - 1, kalman.WANDER, tick_s)
+    assert np.array_equal(found[-1], states[count - 1])
+    later = states[count - 1]
+    for n in range(count - 2, -1, -1):
+        new, slope = kalman.moved(states[n], u[n], tick_s)
+        step = np.eye(9)
+        step[:3, :8], step[3, 8] = slope, tick_s
+        foretold = step @ states[n]
+        foretold[:3] = new
+        after = step @ covariances[n] @ step.T + np.diag(kalman.WANDER**2 * tick_s)
+        size = np.sqrt(np.diag(after))
+        inverse = np.linalg.inv(after / np.outer(size, size)) / np.outer(size, size)
+        later = states[n] + covariances[n] @ step.T @ inverse @ (later - foretold)
+        assert np.allclose(found[n], later, rtol=1e-6, atol=1e-9)
 
 
 def test_a_row_that_was_not_estimated_is_refused(quiet: Recording) -> None:
