@@ -2,79 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode import Block, Responses
+from livebode import Responses
 from livebode.motion import MotionCorrection
 from livebode.simulation import Mechanics
 from studies.common import (
     RATE_HZ,
     STROKE,
-    WINDOW,
     Floats,
     Local,
     Recording,
-    correct,
     decibels,
     error_db,
     lines,
     rms,
     settings,
     stroke,
-    track,
-    within_stroke,
 )
 from studies.drawing import LIGHT, figure_of, spread
 from studies.result import Result, Study, Table, Verdict
+from studies.ways import Way, by_model, by_model_under_w, centre, hann, newest, newest_at_1_ms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Found = tuple[Responses, Floats]  # and the position that each is dated at
-Way = Callable[[Recording], Found]
-
-
-def newest_at_1_ms(recording: Recording) -> Found:
-    """The paper's way: every fourth sample, N = 100, dated at the newest sample."""
-    block = recording.block
-    slow = Block(block.data[:, ::4], block.channels, block.rate_hz / 4)
-    found = track(slow, WINDOW // 4, hop=5)
-    shown = (found.first * 4 >= recording.first) & (found.sample * 4 <= recording.last)
-    found = found[int(np.flatnonzero(shown)[0]) : int(np.flatnonzero(shown)[-1]) + 1]
-    return found, slow["x"][found.sample]
-
-
-def newest(recording: Recording) -> Found:
-    found = within_stroke(track(recording.block), recording)
-    return found, recording.block["x"][found.sample]
-
-
-def centre(recording: Recording, **options: object) -> Found:
-    found = within_stroke(track(recording.block, **options), recording)
-    return found, found.schedule
-
-
-def hann(recording: Recording) -> Found:
-    return centre(recording, hann=True)
-
-
-def by_model(recording: Recording, driven_by: str = "torque", **options: object) -> Found:
-    """The stroke as one chunk: two masses that move as the axis did are fitted, and their motion's error taken off."""
-    block = recording.block
-    told = settings(block.rate_hz, loop=recording.axis.drive.loop(), **options)
-    found = correct(recording.axis, block, len(block), told, driven_by=driven_by)
-    found = within_stroke(found, recording)
-    return found, found.schedule
-
-
-def by_model_under_w(recording: Recording) -> Found:
-    return by_model(recording, "excitation")
-
 
 # Name, what it does, and the target in dB.
 WAYS: list[tuple[str, Way, float | None]] = [

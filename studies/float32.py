@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode import Block
-from studies import fig8_9
+from studies import ways
 from studies.common import (
     STROKE,
     WINDOW,
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 SIGNALS = ("w", "u", "velocity")
 OFFSETS = (0.0, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # N m and rad/s, on all three at once
 WAYS = {
-    "window's centre": fig8_9.centre,
-    "the same with Hann": lambda recording, **o: fig8_9.centre(recording, hann=True, **o),
-    "the same differenced": lambda recording, **o: fig8_9.centre(recording, differenced=SIGNALS, **o),
-    "with the reference model": fig8_9.by_model,
+    "window's centre": ways.centre,
+    "the same with Hann": lambda recording, **o: ways.centre(recording, hann=True, **o),
+    "the same differenced": lambda recording, **o: ways.centre(recording, differenced=SIGNALS, **o),
+    "with the reference model": ways.by_model,
 }
 # A torque that is not the machine's moves the reference model away in float64, too; further up there is nothing to see.
 OF_MODEL_MAX = 100.0
@@ -62,7 +62,7 @@ class Apart:
     error64_db: float
 
     @classmethod
-    def of(cls, way: fig8_9.Way, recording: Recording, truth: Local) -> Apart:
+    def of(cls, way: ways.Way, recording: Recording, truth: Local) -> Apart:
         (single, at), (double, _) = way(recording, dtype="float32"), way(recording)
         errors = (float(rms(error_db(found, truth(at)))) for found in (single, double))
         return cls(decibels(single.value / double.value), at, *errors)
@@ -85,14 +85,14 @@ def promised(recording: Recording) -> float:
 def measure(short: bool = False) -> Result:
     truth, records = Local(), [stroke(seed=seed) for seed in range(1 if short else 4)]
     offsets = OFFSETS[:4:3] if short else OFFSETS
-    ways = dict(list(WAYS.items())[: 2 if short else None])
+    chosen = dict(list(WAYS.items())[: 2 if short else None])
     found = {
         name: {
             by: [Apart.of(way, offset(record, by), truth) for record in records]
             for by in offsets
-            if way is not fig8_9.by_model or by <= OF_MODEL_MAX
+            if way is not ways.by_model or by <= OF_MODEL_MAX
         }
-        for name, way in ways.items()
+        for name, way in chosen.items()
     }
     rows = []
     for name, each in found.items():

@@ -1,41 +1,39 @@
-"""Noise, even and odd distortion: an odd random-phase multisine with quiet lines, and Schroeder's beside it.
-
-The odd-odd multisine with random quiet lines and its robust method (many phase realisations, several periods each) are
-those of Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012, chapter 4.
-Feedback carries every distortion into u, and so into y again; to first order Y − Ĝ·U takes that out, with Ĝ the joint
-estimate at the excited lines (on feedback and quiet lines: Pintelon, Louarroudi and Lataire, Detecting and Quantifying
-the Nonlinear and Time-Variant Effects in FRF Measurements Using Periodic Excitations).
-"""
+"""Noise, even and odd distortion of the axis with friction off and on, at standstill and slowly; Schroeder beside."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import f as fisher
 
-from livebode import Block, Lines, multisine
+from livebode import Block
 from livebode.simulation import BeltAxis, Friction, Mechanics, Motion, Sensor, SimulatedAxis, Standstill, Strokes
-from studies.common import RATE_HZ, SIGMA, Complex, Floats, decibels, rms
+from studies.common import RATE_HZ, SIGMA, Floats, decibels, rms
 from studies.drawing import LIGHT, figure_of
+from studies.levels import (
+    CHANCE,
+    HIGHEST_HZ,
+    LOWEST_HZ,
+    PERIOD,
+    PERIODS,
+    RMS_N_M,
+    Levels,
+    odd_multisine_lines,
+    period_of,
+    rest,
+)
 from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PERIOD = 4000  # samples: lines 1 Hz apart
-PERIODS = 8  # of each phase realisation
-HIGHEST_HZ = 160
-GROUP = 4  # odd lines of which one, at random, is quiet
-RMS_N_M = 1.87  # of the whole: that of seven lines of 1 N m
-BANDS_HZ = ((3, 20), (20, 40), (40, 60), (60, 80), (80, HIGHEST_HZ))
+BANDS_HZ = ((LOWEST_HZ, 20), (20, 40), (40, 60), (60, 80), (80, HIGHEST_HZ))
 POSITION_M = 0.8
 LEAD = PERIOD  # samples of each record before the first period, for a motion's start to ring out
 FRICTION = Friction(load_coulomb_n=15.0, load_stribeck_n=10.0)
 FROZEN = Mechanics(frozen_position_m=POSITION_M)
-CHANCE = 1e-3  # of a verdict about noise to be missed for no reason
 PAPER = (
     "Schroeder phases keep the peaks low; being fixed, they serve the detection of nonlinearity less well than random "
     "ones. Friction near standstill is named as a weakness. The levels are ours."
@@ -81,74 +79,6 @@ CASES = (
 )
 
 
-def odd_multisine_lines(seed: int = 0) -> Lines:
-    """Odd lines, less one of every GROUP at random; quiet are those and the even ones between."""
-    odd = np.arange(BANDS_HZ[0][0], HIGHEST_HZ, 2)
-    generator = np.random.default_rng(seed)
-    # The outermost stay excited, so that Ĝ is never extrapolated.
-    left_out = {int(generator.choice(group)) for group in np.array_split(odd[1:-1], len(odd) // GROUP)}
-    bins = tuple(int(k) for k in odd if k not in left_out)
-    return Lines(bins, PERIOD, RATE_HZ, tuple(k for k in range(bins[0], bins[-1]) if k not in bins))
-
-
-def period_of(lines: Lines, seed: int | None) -> Floats:
-    """One period of equal lines; None for Schroeder phases."""
-    phases: Any = "schroeder" if seed is None else np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
-    return multisine(lines, RMS_N_M * np.sqrt(2 / len(lines)), phases)
-
-
-@dataclass(frozen=True)
-class Levels:
-    """Amplitudes at the bins 1 Hz apart, from several phase realisations of one case.
-
-    `response` (realisations, excited) is Ĝ; of the rest Y − Ĝ·U `mean` (realisations, bins) is over the periods, and
-    `noise` (realisations, bins) the variance of a single period; `y`, `u` (realisations, excited) are their means.
-    """
-
-    lines: Lines
-    response: Complex
-    mean: Complex
-    noise: Floats
-    y: Complex
-    u: Complex
-    crest: float
-
-    @property
-    def bins(self) -> Floats:
-        return np.arange(self.lines.bins[0], self.lines.bins[-1] + 1)
-
-    @property
-    def even(self) -> Any:
-        return self.bins % 2 == 0
-
-    @property
-    def odd(self) -> Any:
-        """The quiet ones."""
-        return ~self.even & ~np.isin(self.bins, self.lines.bins)
-
-    def within(self, band_hz: tuple[float, float]) -> dict[str, float]:
-        """Noise of the mean over the periods, and both distortions, in dB of the response's output in the band."""
-        inside = (self.bins >= band_hz[0]) & (self.bins < band_hz[1])
-        f = self.lines.frequency_hz
-        output = rms(np.abs(self.y[:, (f >= band_hz[0]) & (f < band_hz[1])]))
-        return {
-            "noise": float(decibels(np.sqrt(np.mean(self.noise[:, inside]) / PERIODS) / output)),
-            "even": float(decibels(rms(np.abs(self.mean[:, inside & self.even])) / output)),
-            "odd": float(decibels(rms(np.abs(self.mean[:, inside & self.odd])) / output)),
-        }
-
-    def above_noise(self, which: Any) -> tuple[float, float]:
-        """Power of the mean rest at these bins over that of noise alone, and what chance does not exceed."""
-        ratio = PERIODS * np.mean(np.abs(self.mean[:, which]) ** 2) / np.mean(self.noise[:, which])
-        values = 2 * self.mean[:, which].size
-        return float(ratio), float(fisher.isf(CHANCE, values, values * (PERIODS - 1)))
-
-    def spread(self) -> float:
-        """Rms of the output at the excited lines that changes with the phases."""
-        off = (self.response - self.response.mean(axis=0)) * self.u
-        return float(rms(np.abs(off)) * np.sqrt(len(off) / (len(off) - 1)))
-
-
 def levels(case: Case, realisations: int) -> Levels:
     lines = odd_multisine_lines()
     seeds: list[int | None] = [None] if case.schroeder else list(range(realisations))
@@ -174,17 +104,6 @@ def record(case: Case, period: Floats, seed: int) -> Block:
     return block.cut(LEAD, len(block))
 
 
-def rest(block: Block, lines: Lines) -> tuple[Complex, Complex, Floats, Complex, Complex]:
-    """Of one realisation: Ĝ, mean and variance of Y − Ĝ·U at all bins, and the means of Y and U at the excited ones."""
-    y, u = (np.fft.rfft(block[name].reshape(-1, PERIOD), axis=1) * (2 / PERIOD) for name in ("velocity", "u"))
-    at = np.asarray(lines.bins)
-    every = np.arange(at[0], at[-1] + 1)
-    response = y[:, at].mean(axis=0) / u[:, at].mean(axis=0)
-    between = np.interp(every, at, response.real) + 1j * np.interp(every, at, response.imag)
-    left = y[:, every] - between * u[:, every]
-    return response, left.mean(axis=0), left.var(axis=0, ddof=1), y[:, at].mean(axis=0), u[:, at].mean(axis=0)
-
-
 def measure(short: bool = False) -> Result:
     realisations = 2 if short else 12
     judged_or_shown = (EXACT, LINEAR, SMOOTH, STANDING, SCHROEDER, SLOW)
@@ -193,7 +112,7 @@ def measure(short: bool = False) -> Result:
     best = found[STANDING].response.mean(axis=0)
     rows, of_bands = [], []
     for case, each in found.items():
-        whole = each.within((BANDS_HZ[0][0], HIGHEST_HZ))
+        whole = each.within((LOWEST_HZ, HIGHEST_HZ))
         off, apart = (float(rms(decibels(each.response / against))) for against in (truth, best))
         rows.append((case.name, each.crest, *whole.values(), off, apart if case in (STANDING, SCHROEDER) else ""))
         if case in (SMOOTH, STANDING, SCHROEDER, SLOW):
@@ -209,7 +128,7 @@ def measure(short: bool = False) -> Result:
 
 
 def judged(found: dict[Case, Levels]) -> list[Verdict]:
-    whole = {case: each.within((BANDS_HZ[0][0], HIGHEST_HZ)) for case, each in found.items()}
+    whole = {case: each.within((LOWEST_HZ, HIGHEST_HZ)) for case, each in found.items()}
     verdicts = [
         Verdict(f"{EXACT.name}: {kind}, dB", whole[EXACT][kind], -200.0, why="the periodic state is not reached")
         for kind in ("even", "odd")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from livebode import Block
-from studies.nonlinearity import GROUP, PERIOD, RATE_HZ, RMS_N_M, odd_multisine_lines, period_of, rest
+from studies.common import RATE_HZ
+from studies.levels import GROUP, PERIOD, RMS_N_M, odd_multisine_lines, period_of, rest
 
 LINES = odd_multisine_lines()
 EVERY = np.arange(LINES.bins[0], LINES.bins[-1] + 1)
