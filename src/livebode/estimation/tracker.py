@@ -70,6 +70,7 @@ class Tracker:
             self._named(settings.differenced),
             np.array([settings.loop.advance_ticks(role) for role in self._roles]),
             SpikeGate(self._named(settings.spikes), lines.window) if settings.spikes else None,
+            settings.dtype,
         )
         self._places = lines.window // settings.step
         self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)

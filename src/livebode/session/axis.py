@@ -57,6 +57,7 @@ class TrackingSection(_Section):
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []
+    dtype: Literal["float64", "float32"] = "float64"
 
 
 class _ControllerSection(_Section):

@@ -32,6 +32,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         differenced=tuple(tracking.differenced),
         hann=tracking.hann,
         spikes=tuple(tracking.spikes),
+        dtype=tracking.dtype,
     )
     if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
         check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
