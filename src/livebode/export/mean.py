@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +12,30 @@ from numpy.typing import NDArray
 from livebode.nouns import InputError, Lines, Response, Responses
 
 Floats = NDArray[np.float64]
+Weights = Literal["sigma", "equal"]
+
+DOF_MIN = 4.0
+"""Fewest degrees of freedom behind a sigma that weights: with d of them 1/sigma² scatters by 1/√(d − 2) of itself."""
 
 
-def mean(parts: Iterable[Responses]) -> Response:
-    """The mean of all valid responses, line by line, weighted by 1/sigma².
+def mean(parts: Iterable[Responses], *, weights: Weights = "sigma") -> Response:
+    """The mean of the valid responses, line by line, weighted by 1/sigma² or all alike.
+
+    With 1/sigma² only responses whose sigma has at least `DOF_MIN` degrees of freedom go in: a sigma from one or
+    two periods is at times far too small, and its weight would decide the mean. Even so weights that are estimates
+    cost: where the noise does not change, equal weights have the smaller error, and bounds that hold more nearly
+    what they promise. Where it changes, sigma lags behind by its memory; windows that have just become noisy keep
+    the weight of quiet ones, and the mean's sigma is far too small. Equal weights suffer less. docs/export.md has
+    the figures.
 
     Windows that overlap share noise, so its sigma is not 1/√(Σ 1/σᵢ²). Of two windows of N samples that start d samples
-    apart, the errors of white noise correlate as max(0, 1 − d/N). With weights wᵢ = 1/σᵢ² that gives
+    apart, the errors of white noise correlate as max(0, 1 − d/N). With weights wᵢ that gives
 
         sigma² = Σᵢⱼ wᵢ·σᵢ·wⱼ·σⱼ·max(0, 1 − dᵢⱼ/N) / (Σᵢ wᵢ)²,
 
-    and since that correlation is how two boxes overlap, the sum is Σₜ C(t)²/N with C(t) the sum of 1/σᵢ over the
-    windows that hold sample t. A Hann window correlates less, so its sigma is too high. Noise that rings longer
-    than a window (at a lightly damped resonance) correlates more, and its sigma is too low.
+    and since that correlation is how two boxes overlap, the sum is Σₜ C(t)²/N with C(t) the sum of wᵢ·σᵢ over the
+    windows that hold sample t. The errors of a Hann window correlate less, so that sigma is too high then;
+    next to a lightly damped resonance it is too high as those of the responses are.
 
     It is a mean over everything that the machine did. Where the response changes (an axis in motion, a belt that
     loosens), it is biased for each moment, and `sigma`, which speaks of noise alone, does not show it.
@@ -32,27 +44,31 @@ def mean(parts: Iterable[Responses]) -> Response:
     ----------
     parts
         Responses in order, such as `Run.batches()`; they are read once, and no more of them kept than a window holds.
+    weights
+        "sigma" for 1/sigma², "equal" for all alike.
 
     Returns
     -------
     Response
         `dof` is the mean of those of the responses that went in, a careful choice: their sigmas stem from more periods
         together. `coherence` is NaN, it does not follow from those of single windows. `time_s` and `schedule` are
-        means, `first` and `sample` the extent. A line is valid where a response with known sigma is.
+        means, `first` and `sample` the extent. A line is valid where a response went in.
 
     Raises
     ------
     InputError
-        If the responses are themselves averages over periods, or none is valid with a known sigma.
+        If the responses are themselves averages over periods, or none is valid with a known sigma (of `DOF_MIN`,
+        where it weights).
     """
     sums: _Sums | None = None
     for part in parts:
-        sums = sums or _Sums(part)
+        sums = sums or _Sums(part, weights)
         sums.add(part)
     if sums is None or not sums.rows:
+        wanted = f"sigma of {DOF_MIN:g} degrees of freedom" if weights == "sigma" else "known sigma"
         raise InputError(
-            "no response has a valid line whose sigma is known, so none can be weighted; sigma needs two periods, "
-            "take a longer recording, or one response with --at TIME"
+            f"no response has a valid line and a {wanted}, so none can be weighted; track more periods, or with a "
+            "longer memory (--forgetting), or take one response with --at TIME"
         )
     return sums.response()
 
@@ -60,8 +76,8 @@ def mean(parts: Iterable[Responses]) -> Response:
 class _Sums:
     """Weighted sums over responses, each of shape (lines,)."""
 
-    def __init__(self, like: Responses) -> None:
-        self.like, n = like, len(like.lines)
+    def __init__(self, like: Responses, weights: Weights) -> None:
+        self.like, self.weights, n = like, weights, len(like.lines)
         self.weight, self.weighted = np.zeros(n), np.zeros(n, dtype=np.complex128)
         self.overlap = _Overlap(like.lines)
         self.rows, self.moment, self.dof = 0, 0.0, 0.0
@@ -73,14 +89,16 @@ class _Sums:
         # sigma of a simulation without noise may be 0; no double is better than its rounding.
         sigma = np.maximum(part.sigma, np.finfo(float).eps * np.abs(part.value))
         used: NDArray[np.bool_] = part.valid & np.isfinite(part.value) & np.isfinite(sigma) & (sigma > 0)
+        if self.weights == "sigma":
+            used = used & (part.dof >= DOF_MIN)[:, np.newaxis]
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
             return
-        used, part = used[rows], _rows(part, rows)
-        root = np.divide(1.0, sigma[rows], out=np.zeros_like(part.sigma), where=used)
-        self.weight += (root**2).sum(axis=0)
-        self.weighted += np.where(used, part.value * root**2, 0).sum(axis=0)
-        self.overlap.add(part.first, root)
+        used, sigma, part = used[rows], np.where(used, sigma, 1.0)[rows], _rows(part, rows)
+        weight = np.where(used, sigma**-2.0 if self.weights == "sigma" else 1.0, 0.0)
+        self.weight += weight.sum(axis=0)
+        self.weighted += np.where(used, part.value * weight, 0).sum(axis=0)
+        self.overlap.add(part.first, weight * sigma)
         self.rows += len(part)
         self.moment += part.time_s.sum()
         self.dof += part.dof.sum()
@@ -113,18 +131,18 @@ class _Sums:
 
 
 class _Overlap:
-    """Σₜ C(t)²/N, C(t) the sum of the roots of the windows that hold sample t, while windows go by in order."""
+    """Σₜ C(t)²/N, C(t) the sum of wσ of the windows that hold sample t, as windows go by in order."""
 
     def __init__(self, lines: Lines) -> None:
         self._window = lines.window
         self._first = np.empty(0, dtype=np.int64)
-        self._root = np.empty((0, len(lines)))
+        self._scatter = np.empty((0, len(lines)))
         self._done: int | None = None
         self._sum = np.zeros(len(lines))
 
-    def add(self, first: NDArray[np.int64], root: Floats) -> None:
+    def add(self, first: NDArray[np.int64], scatter: Floats) -> None:
         self._first = np.concatenate([self._first, first])
-        self._root = np.concatenate([self._root, root])
+        self._scatter = np.concatenate([self._scatter, scatter])
         self._advance(int(self._first[-1]))  # no window to come begins before that
 
     def total(self) -> Floats:
@@ -135,11 +153,11 @@ class _Overlap:
         start = int(self._first[0]) if self._done is None else self._done
         edges = np.concatenate([self._first, self._first + self._window]).clip(start, until)
         order = np.argsort(edges, kind="stable")
-        covering = np.cumsum(np.concatenate([self._root, -self._root])[order], axis=0)[:-1]
+        covering = np.cumsum(np.concatenate([self._scatter, -self._scatter])[order], axis=0)[:-1]
         self._sum += (covering**2 * np.diff(edges[order])[:, np.newaxis]).sum(axis=0) / self._window
         self._done = until
         open_still = self._first + self._window > until
-        self._first, self._root = self._first[open_still], self._root[open_still]
+        self._first, self._scatter = self._first[open_still], self._scatter[open_still]
 
 
 def _refuse_averages(part: Responses) -> None:
