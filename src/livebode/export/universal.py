@@ -51,7 +51,11 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
                 left_out += 1
                 continue
             functions += 1
-            pyuff.UFF(scratch).write_sets(_dataset(response, functions, about or {}), mode="overwrite")
+            try:
+                pyuff.UFF(scratch).write_sets(_dataset(response, functions, about or {}), mode="overwrite")
+            except Exception as error:
+                # It says of a full disk only that there was an error.
+                raise (error.__context__ if isinstance(error.__context__, OSError) else error) from None
             file.write(Path(scratch).read_bytes())
     if not functions:
         raise InputError(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from livebode.nouns import InputError, Responses
 
-VALUES_MAX = 1 << 24
+VALUES_MAX = 1 << 23
 """Most values (responses times lines) that a format takes which is not written in parts: some 2 GB of memory."""
 
 
