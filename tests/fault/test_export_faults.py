@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pyarrow as pa
@@ -106,6 +107,20 @@ def test_a_disk_that_takes_no_more_of_one_function(tmp_path: Path) -> None:
             save(tmp_path / "a.uff", lambda partial: write_uff(partial, [made(1, lines)]))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_end_of_the_program_is_no_fault_within_pyuff(tmp_path: Path) -> None:
+    def ended(frame: FrameType, _event: str, _argument: object) -> None:
+        if frame.f_code.co_name == "_opt_fields":
+            raise SystemExit(143)
+
+    sys.setprofile(ended)
+    try:
+        with pytest.raises(SystemExit):
+            save(tmp_path / "a.uff", lambda partial: write_uff(partial, [made(3, LINES)]))
+    finally:
+        sys.setprofile(None)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -54,14 +54,20 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
             try:
                 pyuff.UFF(scratch).write_sets(_dataset(response, functions, about or {}), mode="overwrite")
             except Exception as error:
-                # It says of a full disk only that there was an error.
-                raise (error.__context__ if isinstance(error.__context__, OSError) else error) from None
+                raise _cause(error) from None
             file.write(Path(scratch).read_bytes())
     if not functions:
         raise InputError(
             f"no response has {_LINES_MIN} valid lines, which UFF 58 needs; csv and mat take a response with fewer"
         )
     return Written(functions, left_out)
+
+
+def _cause(error: BaseException) -> BaseException:
+    """What went wrong first: pyuff turns a full disk and even the end of the program into an error of its own."""
+    while error.__context__ is not None:
+        error = error.__context__
+    return error
 
 
 def _dataset(response: Response, number: int, about: Mapping[str, Any]) -> dict[str, Any]:
