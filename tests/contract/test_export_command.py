@@ -63,7 +63,6 @@ def test_one_response_and_the_mean(run: Path, tmp_path: Path) -> None:
     for options, expected in (
         (("--at", "1.0"), at(batches(), 1.0)),
         (("--mean",), mean(batches())),
-        (("--mean", "--equal"), mean(batches(), weights="equal")),
     ):
         path = tmp_path / "below" / f"{len(options)}{options[0]}.csv"
         assert livebode("export", run, "--to", "csv", *options, "--out", path).code == 0

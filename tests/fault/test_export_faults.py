@@ -40,7 +40,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "xarray"), "xarray is no file; in Python it is to_xarray"),
         (("--to", "control"), "control is no file; in Python it is mean(Run"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
-        (("--to", "csv", "--equal"), "--equal is for the mean; give --mean too"),
         (("--to", "csv", "--at", "nan"), "nan is not a moment"),
         (("--to", "csv", "--at", "99"), "no valid response stands within half a window (0.05 s) of 99 s; the nearest"),
         (("--to", "csv", "--parameters"), "has no parameters.parquet"),
@@ -141,7 +140,7 @@ def test_nothing_to_export(tmp_path: Path) -> None:
     invalid = made(5, LINES, hole=1.0)
     with pytest.raises(InputError, match="no response has a valid line"):
         at([invalid], 0.0)
-    with pytest.raises(InputError, match="none can be weighted; track more periods"):
+    with pytest.raises(InputError, match="no response has a valid line and a known sigma; track more periods"):
         mean([invalid])
     invalid.valid[:, 0], invalid.value[:, 0] = True, 1.0
     with pytest.raises(InputError, match="no response has 2 valid lines"):
@@ -166,4 +165,4 @@ def test_a_run_without_noise_has_a_mean() -> None:
     responses.sigma[:], responses.value[:], responses.dof[:] = 0.0, 2 - 1j, 9.0
     found = mean([responses])
     np.testing.assert_allclose(found.value, 2 - 1j, rtol=1e-14)
-    assert (found.sigma > 0).all()
+    assert (found.sigma == 0).all()

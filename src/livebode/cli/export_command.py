@@ -25,10 +25,7 @@ def export_command(
     at: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Only the response nearest to this moment.")
     ] = None,
-    mean: Annotated[
-        bool, typer.Option("--mean", help="Only the mean of the valid responses, weighted by 1/sigma².")
-    ] = False,
-    equal: Annotated[bool, typer.Option("--equal", help="Weight the mean's responses all alike.")] = False,
+    mean: Annotated[bool, typer.Option("--mean", help="Only the mean of the valid responses.")] = False,
     parameters: Annotated[
         bool, typer.Option("--parameters", help="The fitted parameters instead of the responses; csv or mat.")
     ] = False,
@@ -37,8 +34,6 @@ def export_command(
     """Write what a run measured in a format that other programs read."""
     from livebode import export
 
-    if equal and not mean:
-        raise InputError("--equal is for the mean; give --mean too")
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
     record = Run.open(run)
     name = record.path.resolve()
@@ -51,7 +46,7 @@ def export_command(
     if at is not None:
         parts = iter([export.only(export.at(record.batches(), at))])
     elif mean:
-        parts = iter([export.only(export.mean(record.batches(), weights="equal" if equal else "sigma"))])
+        parts = iter([export.only(export.mean(record.batches()))])
     else:
         parts = record.batches()
     written = export.save(path, lambda partial: export.FORMATS[to](partial, parts, record.summary), force=force)

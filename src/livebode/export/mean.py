@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,30 +11,23 @@ from numpy.typing import NDArray
 from livebode.nouns import InputError, Lines, Response, Responses
 
 Floats = NDArray[np.float64]
-Weights = Literal["sigma", "equal"]
-
-DOF_MIN = 4.0
-"""Fewest degrees of freedom behind a sigma that weights: with d of them 1/sigma² scatters by 1/√(d − 2) of itself."""
 
 
-def mean(parts: Iterable[Responses], *, weights: Weights = "sigma") -> Response:
-    """The mean of the valid responses, line by line, weighted by 1/sigma² or all alike.
+def mean(parts: Iterable[Responses]) -> Response:
+    """The mean of the valid responses with a known sigma, line by line, all alike.
 
-    With 1/sigma² only responses whose sigma has at least `DOF_MIN` degrees of freedom go in: a sigma from one or
-    two periods is at times far too small, and its weight would decide the mean. Even so weights that are estimates
-    cost: where the noise does not change, equal weights have the smaller error, and bounds that hold more nearly
-    what they promise. Where it changes, sigma lags behind by its memory; windows that have just become noisy keep
-    the weight of quiet ones, and the mean's sigma is far too small. Equal weights suffer less. docs/export.md has
-    the figures.
+    They are not weighted by 1/sigma²: sigma is an estimate that scatters and lags behind, so that windows which have
+    just become noisy would keep the weight of quiet ones, and the mean's sigma would be far too small.
 
-    Windows that overlap share noise, so its sigma is not 1/√(Σ 1/σᵢ²). Of two windows of N samples that start d samples
-    apart, the errors of white noise correlate as max(0, 1 − d/N). With weights wᵢ that gives
+    Windows that overlap share noise, so its sigma is not sigma/√n. Of two windows of N samples that start d samples
+    apart, the errors of white noise correlate as max(0, 1 − d/N). For n responses that gives
 
-        sigma² = Σᵢⱼ wᵢ·σᵢ·wⱼ·σⱼ·max(0, 1 − dᵢⱼ/N) / (Σᵢ wᵢ)²,
+        sigma² = Σᵢⱼ σᵢ·σⱼ·max(0, 1 − dᵢⱼ/N) / n²,
 
-    and since that correlation is how two boxes overlap, the sum is Σₜ C(t)²/N with C(t) the sum of wᵢ·σᵢ over the
+    and since that correlation is how two boxes overlap, the sum is Σₜ C(t)²/N with C(t) the sum of σᵢ over the
     windows that hold sample t. The errors of a Hann window correlate less, so that sigma is too high then;
-    next to a lightly damped resonance it is too high as those of the responses are.
+    next to a lightly damped resonance it is too high as those of the responses are. Where the noise grew it is
+    somewhat too low (docs/export.md has the figures).
 
     It is a mean over everything that the machine did. Where the response changes (an axis in motion, a belt that
     loosens), it is biased for each moment, and `sigma`, which speaks of noise alone, does not show it.
@@ -44,8 +36,6 @@ def mean(parts: Iterable[Responses], *, weights: Weights = "sigma") -> Response:
     ----------
     parts
         Responses in order, such as `Run.batches()`; they are read once, and no more of them kept than a window holds.
-    weights
-        "sigma" for 1/sigma², "equal" for all alike.
 
     Returns
     -------
@@ -57,28 +47,25 @@ def mean(parts: Iterable[Responses], *, weights: Weights = "sigma") -> Response:
     Raises
     ------
     InputError
-        If the responses are themselves averages over periods, or none is valid with a known sigma (of `DOF_MIN`,
-        where it weights).
+        If the responses are themselves averages over periods, or none is valid with a known sigma.
     """
     sums: _Sums | None = None
     for part in parts:
-        sums = sums or _Sums(part, weights)
+        sums = sums or _Sums(part)
         sums.add(part)
     if sums is None or not sums.rows:
-        wanted = f"sigma of {DOF_MIN:g} degrees of freedom" if weights == "sigma" else "known sigma"
         raise InputError(
-            f"no response has a valid line and a {wanted}, so none can be weighted; track more periods, or with a "
-            "longer memory (--forgetting), or take one response with --at TIME"
+            "no response has a valid line and a known sigma; track more periods, or take one response with --at TIME"
         )
     return sums.response()
 
 
 class _Sums:
-    """Weighted sums over responses, each of shape (lines,)."""
+    """Sums over responses, each of shape (lines,)."""
 
-    def __init__(self, like: Responses, weights: Weights) -> None:
-        self.like, self.weights, n = like, weights, len(like.lines)
-        self.weight, self.weighted = np.zeros(n), np.zeros(n, dtype=np.complex128)
+    def __init__(self, like: Responses) -> None:
+        self.like, n = like, len(like.lines)
+        self.count, self.value = np.zeros(n), np.zeros(n, dtype=np.complex128)
         self.overlap = _Overlap(like.lines)
         self.rows, self.moment, self.dof = 0, 0.0, 0.0
         self.schedule, self.scheduled = 0.0, 0
@@ -86,19 +73,14 @@ class _Sums:
 
     def add(self, part: Responses) -> None:
         _refuse_averages(part)
-        # sigma of a simulation without noise may be 0; no double is better than its rounding.
-        sigma = np.maximum(part.sigma, np.finfo(float).eps * np.abs(part.value))
-        used: NDArray[np.bool_] = part.valid & np.isfinite(part.value) & np.isfinite(sigma) & (sigma > 0)
-        if self.weights == "sigma":
-            used = used & (part.dof >= DOF_MIN)[:, np.newaxis]
+        used: NDArray[np.bool_] = part.valid & np.isfinite(part.value) & np.isfinite(part.sigma)
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
             return
-        used, sigma, part = used[rows], np.where(used, sigma, 1.0)[rows], _rows(part, rows)
-        weight = np.where(used, sigma**-2.0 if self.weights == "sigma" else 1.0, 0.0)
-        self.weight += weight.sum(axis=0)
-        self.weighted += np.where(used, part.value * weight, 0).sum(axis=0)
-        self.overlap.add(part.first, weight * sigma)
+        used, part = used[rows], _rows(part, rows)
+        self.count += used.sum(axis=0)
+        self.value += np.where(used, part.value, 0).sum(axis=0)
+        self.overlap.add(part.first, np.where(used, part.sigma, 0.0))
         self.rows += len(part)
         self.moment += part.time_s.sum()
         self.dof += part.dof.sum()
@@ -109,11 +91,11 @@ class _Sums:
         self.sample = int(part.sample[-1])
 
     def response(self) -> Response:
-        valid = self.weight > 0
+        valid = self.count > 0
         nothing = np.full(len(valid), np.nan)
         value, sigma = nothing.astype(np.complex128), nothing.copy()
-        value[valid] = self.weighted[valid] / self.weight[valid]
-        sigma[valid] = np.sqrt(self.overlap.total()[valid]) / self.weight[valid]
+        value[valid] = self.value[valid] / self.count[valid]
+        sigma[valid] = np.sqrt(self.overlap.total()[valid]) / self.count[valid]
         return Response(
             lines=self.like.lines,
             value=value,
@@ -131,7 +113,7 @@ class _Sums:
 
 
 class _Overlap:
-    """Σₜ C(t)²/N, C(t) the sum of wσ of the windows that hold sample t, as windows go by in order."""
+    """Σₜ C(t)²/N, C(t) the sum of σ of the windows that hold sample t, as windows go by in order."""
 
     def __init__(self, lines: Lines) -> None:
         self._window = lines.window
