@@ -68,6 +68,24 @@ class Fit:
             weights.append(np.linalg.solve(matrix, shape.T @ found[:, which]))
         return self._model(np.concatenate([found[0, :2], *weights]), low, high)
 
+    def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
+        """A model from before, over another range of positions."""
+        at, arm = np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)), 2 * np.log(self.radius_m)
+        weights = [
+            np.linalg.lstsq(basis(at, low, high, splines), curve(at) + arm)[0]
+            for curve, splines in (
+                (model.log_stiffness, self.stiffness_splines),
+                (model.log_damping, self.damping_splines),
+            )
+        ]
+        masses = self._unknowns(model)[:2]
+        return self._model(np.concatenate([masses, *weights]), low, high)
+
+    def misfit(self, rows: Rows, model: MovingModel) -> float:
+        """Share of the weighted responses that the model leaves, rms."""
+        rest = two_masses.sampled(model.parameters(rows.position_m), self.z, self.rate_hz) - rows.value
+        return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
+
     def refine(self, rows: Rows, model: MovingModel) -> MovingModel:
         """Weighted least squares over all rows, from a model on."""
         low, high = model.low_m, model.high_m

@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 Floats = NDArray[np.float64]
 
 _DEGREE = 3
+_BEYOND = 0.1  # of the range, on either side, where a curve goes on straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,12 @@ def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
         return np.ones((position_m.size, 1))
     inner = np.linspace(low, high, splines - _DEGREE + 1)
     knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
-    return np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+    value = np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+    reach = _BEYOND * (high - low)
+    slope = _DEGREE * np.array([-1.0, 1.0]) / (inner[1] - inner[0])
+    value[:, :2] += np.outer((position_m - low).clip(-reach, 0.0), slope)
+    value[:, -2:] += np.outer((position_m - high).clip(0.0, reach), slope)
+    return value
 
 
 @dataclass(frozen=True, eq=False)
