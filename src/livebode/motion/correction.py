@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from livebode.estimation import Settings, Tracker, snapshots
 from livebode.motion.chunk import Chunk, Recorded
 from livebode.motion.drive import drive_of
-from livebode.motion.learner import Learner, frozen
+from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_excitation
 from livebode.motion.residual import Scatter, residual
+from livebode.motion.standstill import Standstill, Stretch, without
 from livebode.motion.waiting import Waiting
 from livebode.nouns import Block, Channel, Event, InputError, Responses
 
@@ -121,12 +122,14 @@ class MotionCorrection:
         self._waiting = Waiting(lines)
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
+        self._standstill = Standstill(settings)
         self._from = 0
-        self._parts: dict[str, Recorded | Waiting | Learner | Scatter] = {
+        self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill] = {
             "recorded": self._recorded,
             "waiting": self._waiting,
             "learner": self._learner,
             "scatter": self._scatter,
+            "standstill": self._standstill,
         }
 
     @property
@@ -149,7 +152,7 @@ class MotionCorrection:
 
     def drain_events(self) -> list[Event]:
         """Events since the last call, those of the Tracker and of chunks that were completed."""
-        return self._tracker.drain_events()
+        return sorted(self._tracker.drain_events() + self._standstill.drain(), key=lambda event: event.sample)
 
     def process(self, block: Block) -> Responses:
         """Responses of the chunks that this Block completes; often none, once a chunk many.
@@ -218,35 +221,42 @@ class MotionCorrection:
         return self._correct(tracked, chunk) if len(tracked) else tracked
 
     def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
-        model = self._learner.learn(tracked, chunk, lambda model: self._moved(model, tracked, chunk))
-        if model is None:
+        def replay(model: MovingModel) -> Replayed:
+            return self._replayed(model, tracked, chunk)
+
+        now = self._learner.learn(tracked, chunk, replay)
+        if now is None:
             nothing = np.full_like(tracked.value, complex(np.nan, np.nan))
             return replace(tracked, value=nothing, sigma=np.full(nothing.shape, np.nan), valid=tracked.valid & False)
-        left = residual(model, chunk, self.settings).velocity
+        held: list[Stretch] = []
+        if self._learner.has_travelled:
+            found = self._standstill.stretches(now.left, chunk)
+            widened = (lambda: replay(self._learner.widened(tracked, chunk, now)).seen)
+            held = self._standstill.held(found, tracked, widened, chunk)
+            if found and not held and self._learner.travels:
+                now = self._learner.completed(tracked, chunk, replay, now)
+        left = without(now.left.velocity, held, chunk, self.settings.lines.window)
         seen, memory = self._scatter.then(left, chunk)
         self._scatter.keep(memory)
         seen = _rows_of(seen, tracked)
-        value = self._value(model, tracked, seen, chunk)
-        valid = tracked.valid & seen.valid & np.isfinite(value)
-        scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
+        valid = tracked.valid & seen.valid & np.isfinite(now.value)
+        scale = np.abs(now.value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         return replace(
             tracked,
-            value=np.where(valid, value, complex(np.nan, np.nan)),
+            value=np.where(valid, now.value, complex(np.nan, np.nan)),
             sigma=np.where(valid, seen.sigma * scale, np.nan),
             dof=seen.dof,
             valid=valid,
         )
 
-    def _moved(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Complex:
-        left = residual(model, chunk, self.settings).velocity
-        return self._value(model, tracked, _rows_of(self._scatter.once(left, chunk), tracked), chunk)
-
-    def _value(self, model: MovingModel, tracked: Responses, seen: Responses, chunk: Chunk) -> Complex:
-        """The tracked responses, moved as the model's had to be to its frozen one; NaN where it has no whole window."""
+    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Replayed:
+        left = residual(model, chunk, self.settings)
+        seen = _rows_of(self._scatter.once(left.velocity, chunk), tracked)
         held = frozen(model, tracked.schedule, self.settings)
         with np.errstate(invalid="ignore"):  # NaN where a window is not whole
             moving = tracked.value - seen.value if self._drive is None else self._under_excitation(model, tracked, chunk)
-            return np.asarray(tracked.value * (held / moving) if self._quotient else tracked.value + (held - moving))
+            value = tracked.value * (held / moving) if self._quotient else tracked.value + (held - moving)
+        return Replayed(model, left, seen, np.asarray(value))
 
     def _under_excitation(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Complex:
         s = self.settings

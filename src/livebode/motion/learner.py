@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,25 @@ from livebode.motion import two_masses
 from livebode.motion.chunk import Chunk
 from livebode.motion.fit import Fit, Rows
 from livebode.motion.model import Curve, MovingModel
+from livebode.motion.residual import Residual
 from livebode.motion.steady import FLAT_M, steady_rows
 from livebode.nouns import Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Moved = Callable[[MovingModel], Complex]
-"""From a model to the chunk's responses, corrected with it, (rows, lines); NaN where there is no whole window."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A model driven through a chunk: what it leaves, R/U of that, and the responses corrected with it, (rows, lines)."""
+
+    model: MovingModel
+    left: Residual
+    seen: Responses
+    value: Complex
+
+
+Replay = Callable[[MovingModel], Replayed]
 
 _ROWS_MIN = 12
 _OVERLAP = 4  # windows of a period that go into the fit: more share their samples, and say nothing new
@@ -36,54 +49,95 @@ class Learner:
         self._settings, self._radius_m, self._splines, self._passes = settings, radius_m, splines, passes
         self.model: MovingModel | None = None
         self.chunks = 0
+        self.travels = False
         self._misfit = np.inf
 
-    def learn(self, tracked: Responses, chunk: Chunk, moved: Moved) -> MovingModel | None:
-        """The model after this chunk; None as long as there is too little to fit."""
-        usable = np.flatnonzero(tracked.valid.all(axis=1) & np.isfinite(tracked.schedule))
-        window = self._settings.lines.window
-        steady = usable[steady_rows(tracked.sample[usable], chunk, window)]
+    @property
+    def has_travelled(self) -> bool:
+        """Whether the model knows the machine in motion."""
+        return self.model is not None and len(self.model.log_stiffness.weights) > 1
+
+    def learn(self, tracked: Responses, chunk: Chunk, replay: Replay) -> Replayed | None:
+        """The model after this chunk's steady motion; None as long as there is too little to fit."""
+        usable = self._usable(tracked)
+        steady = usable[steady_rows(tracked.sample[usable], chunk, self._settings.lines.window)]
         if steady.size >= _ROWS_MIN:
-            self._learn(tracked, steady, chunk, moved, self._splines)
-        elif self.model is None and usable.size >= _ROWS_MIN:
-            self._learn(tracked, usable, chunk, moved, (1, 1))
-        return self.model
+            self.travels = True
+            return self._learn(tracked, steady, chunk, replay)
+        self.travels = False
+        if self.model is None and usable.size >= _ROWS_MIN:
+            return self._learn(tracked, usable, chunk, replay)
+        return None if self.model is None else replay(self.model)
 
-    def _learn(
-        self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, moved: Moved, splines: tuple[int, int]
-    ) -> None:
-        lines, at = self._settings.lines, tracked.schedule[rows]
-        if np.ptp(at) <= FLAT_M:
-            splines = (1, 1)
-        rows = rows[_thinned(tracked.sample[rows], lines.window // _OVERLAP)]
+    def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
+        """The model over all positions of the chunk, with the stiffness that all responses show."""
+        rows, fit, model = self._over_all(tracked, now)
+        return fit.refine(self._rows(tracked, rows, chunk, now), model, stiffness_only=True)
+
+    def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
+        """The model fitted to all responses, for a chunk in which friction holds nowhere."""
+        rows, fit, model = self._over_all(tracked, now)
+        self.model = fit.refine(self._rows(tracked, rows, chunk, now), model)
+        return replay(self.model)
+
+    def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], Fit, MovingModel]:
+        rows = self._thinned(tracked, self._usable(tracked))
+        at = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
+        fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
+        return rows, fit, fit.follow(now.model, float(at.min()), float(at.max()))
+
+    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> Replayed:
+        rows = self._thinned(tracked, rows)
         at = tracked.schedule[rows]
-        fit = Fit(lines.z, lines.rate_hz, self._radius_m, *splines)
-        # The error of a response is n/|U|: white noise on y over the torque at the line.
-        weight = chunk.torque(lines, tracked.sample[rows])
-
-        def corrected(model: MovingModel) -> Rows:
-            value = moved(model)[rows]
-            return Rows(np.where(np.isfinite(value), value, tracked.value[rows]), weight, at)
-
-        raw = Rows(tracked.value[rows], weight, at)
+        splines = self._splines if self.travels else (1, 1)
+        fit = self._fit(*splines)
         best = None
         if self.model is not None and _reaches(self.model, at, splines):
             model = fit.follow(self.model, float(at.min()), float(at.max()))
-            best = self._refined(fit, model, corrected, corrected(model), self._passes - 1)
+            best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
         if best is None or best[1] > _WORSE * self._misfit:
-            anew = self._refined(fit, fit.start(raw), corrected, raw, self._passes)
+            raw = Rows(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
+            first = replay(fit.refine(raw, fit.start(raw)))
+            anew = self._refined(fit, first, tracked, rows, chunk, replay, self._passes - 1)
             best = anew if best is None or anew[1] < best[1] else best
-        self.model, self._misfit = best
+        found, self._misfit = best
+        self.model = found.model
         self.chunks += 1
+        return found
 
     def _refined(
-        self, fit: Fit, model: MovingModel, corrected: Callable[[MovingModel], Rows], rows: Rows, passes: int
-    ) -> tuple[MovingModel, float]:
-        for left in reversed(range(max(passes, 1))):
-            model = fit.refine(rows, model)
-            if left:
-                rows = corrected(model)
-        return model, fit.misfit(rows, model)
+        self,
+        fit: Fit,
+        now: Replayed,
+        tracked: Responses,
+        used: NDArray[np.intp],
+        chunk: Chunk,
+        replay: Replay,
+        passes: int,
+    ) -> tuple[Replayed, float]:
+        rows = self._rows(tracked, used, chunk, now)
+        for _ in range(passes):
+            now = replay(fit.refine(rows, now.model))
+            rows = self._rows(tracked, used, chunk, now)
+        return now, fit.misfit(rows, now.model)
+
+    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> Rows:
+        # The error of a response is n/|U|: white noise on y over the torque at the line.
+        weight = chunk.torque(self._settings.lines, tracked.sample[used])
+        value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])
+        return Rows(value, weight, tracked.schedule[used])
+
+    def _usable(self, tracked: Responses) -> NDArray[np.intp]:
+        return np.flatnonzero(tracked.valid.all(axis=1) & np.isfinite(tracked.schedule))
+
+    def _thinned(self, tracked: Responses, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The first of these rows in each quarter of a window."""
+        apart = max(self._settings.lines.window // _OVERLAP, 1)
+        return rows[np.unique(tracked.sample[rows] // apart, return_index=True)[1]]
+
+    def _fit(self, stiffness_splines: int, damping_splines: int) -> Fit:
+        lines = self._settings.lines
+        return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         head = {"count": np.array([self.chunks]), "misfit": np.array([self._misfit])}
@@ -103,11 +157,6 @@ class Learner:
             inertia, load, low, high = (float(n) for n in state["constants"])
             curves = (Curve(low, high, np.array(state[name], dtype=np.float64)) for name in ("stiffness", "damping"))
             self.model = MovingModel(inertia, load, self._radius_m, *curves)
-
-
-def _thinned(sample: NDArray[np.int64], apart: int) -> NDArray[np.intp]:
-    """Places in `sample`, the first of each stretch of `apart` samples."""
-    return np.unique(sample // max(apart, 1), return_index=True)[1]
 
 
 def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
