@@ -14,6 +14,7 @@ from livebode.motion.chunk import Chunk
 from livebode.motion.fit import Fit, Rows
 from livebode.motion.model import Curve, MovingModel
 from livebode.motion.residual import Residual
+from livebode.motion.standstill import turns
 from livebode.motion.steady import FLAT_M, steady_rows
 from livebode.nouns import Responses
 
@@ -115,11 +116,20 @@ class Learner:
         replay: Replay,
         passes: int,
     ) -> tuple[Replayed, float]:
-        rows = self._rows(tracked, used, chunk, now)
+        rows = self._rows(tracked, used := self._onward(tracked, used, chunk, now), chunk, now)
         for _ in range(passes):
             now = replay(fit.refine(rows, now.model))
             rows = self._rows(tracked, used, chunk, now)
         return now, fit.misfit(rows, now.model)
+
+    def _onward(
+        self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed
+    ) -> NDArray[np.intp]:
+        """Those in whose window neither motor nor cart turns, where dry friction would bias them; all, if few are left."""
+        where, newest = turns(now.left, chunk, chunk.start), tracked.sample[used]
+        inside = np.searchsorted(where, newest, "right") - np.searchsorted(where, newest - self._settings.lines.window, "right")
+        onward = used[inside == 0]
+        return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
 
     def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> Rows:
         # The error of a response is n/|U|: white noise on y over the torque at the line.

@@ -16,6 +16,8 @@ from livebode.nouns import Event, Responses
 Floats = NDArray[np.float64]
 
 _UNEXPLAINED = 0.06  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
+_SLOW = 0.05  # of the largest speed: friction at its bend
+_LONGEST = 4  # windows that are judged together
 
 
 @dataclass(frozen=True)
@@ -43,15 +45,13 @@ class Standstill:
         self._events: list[Event] = []
 
     def stretches(self, left: Residual, chunk: Chunk) -> list[tuple[int, int]]:
-        """Numbers of the first and last sample of stretches with changes of sign less than a window apart."""
-        at = max(chunk.first - self._window + 1 - chunk.start, 0)
-        end = chunk.stop - chunk.start
-        changes = np.zeros(max(end - at - 1, 0), dtype=np.bool_)
-        for velocity in (chunk.y, left.cart):
-            forward = velocity[at:end] > 0
-            changes |= forward[1:] != forward[:-1]
-        where = chunk.start + at + 1 + np.flatnonzero(changes)
-        groups = np.split(where, 1 + np.flatnonzero(np.diff(where) >= self._window))
+        """Numbers of the first and last sample of stretches with changes of sign less than a window apart.
+
+        None is longer than four windows, so that each speaks for one place.
+        """
+        where = turns(left, chunk, max(chunk.first - self._window + 1, chunk.start))
+        apart = (np.diff(where) >= self._window) | (np.diff(where // (_LONGEST * self._window)) > 0)
+        groups = np.split(where, 1 + np.flatnonzero(apart))
         return [(int(group[0]), int(group[-1])) for group in groups if group.size]
 
     def held(
@@ -77,10 +77,11 @@ class Standstill:
             self._noise = float(np.median(rest[moving]))
         for (first, last), touch in zip(found, touches):
             goes_on = self._until >= 0 and first - self._until < self._window
+            rest_of_one = goes_on and last - first < self._window
             at = touch & np.isfinite(rest)
             excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
             stretch = Stretch(first, last, float(np.sqrt(excess)))
-            if goes_on or stretch.unexplained > _UNEXPLAINED:
+            if rest_of_one or stretch.unexplained > _UNEXPLAINED:
                 if not goes_on:
                     self._say(stretch, tracked)
                 self._until = last
@@ -107,6 +108,16 @@ class Standstill:
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         self._noise, self._until = float(state["noise"][0]), int(state["until"][0])
         self._events = []
+
+
+def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
+    """Numbers of the samples, from `first` on, at which motor or cart changes its direction, or all but stands."""
+    at, end = first - chunk.start, chunk.stop - chunk.start
+    changes = np.zeros(max(end - at - 1, 0), dtype=np.bool_)
+    for velocity in (chunk.y[at:end], left.cart[at:end]):
+        forward, speed = velocity > 0, np.abs(velocity)
+        changes |= (forward[1:] != forward[:-1]) | (speed[1:] < _SLOW * np.max(speed, initial=0.0))
+    return np.asarray(first + 1 + np.flatnonzero(changes), dtype=np.int64)
 
 
 def without(velocity: Floats, held: list[Stretch], chunk: Chunk, window: int) -> Floats:
