@@ -19,7 +19,7 @@ class Chunk:
 
     `start` is the number of the first one, `first` that of the first one that is new; what is before it is the lead, in
     which the model comes to the machine's state. `stop` is the number behind the last one that is new; a window more
-    may follow. `missing` (samples,) is True where a sample was not finite or implausibly large; it is as the one before.
+    may follow. `missing` (samples,) is True where a sample was not finite or implausibly large, and is the one before.
     """
 
     start: int
@@ -58,7 +58,7 @@ class Recorded:
         if not self:
             self.start = block.start
         data = block.data[[block.index(name) for name in self._names]]
-        signals = np.isfinite(data[:3]).all(axis=0)
+        signals: NDArray[np.bool_] = np.asarray(np.isfinite(data[:3]).all(axis=0))
         implausible = self._range.process(np.where(signals, data[:3], 0.0))
         signals[implausible] = False
         data[:3, ~signals] = np.nan
@@ -79,7 +79,7 @@ class Recorded:
             known = np.where(np.isfinite(data), np.arange(data.shape[1]), -1)
             last = np.maximum.accumulate(known, axis=1)
             data = np.where(last >= 0, np.take_along_axis(data, last.clip(0), axis=1), 0.0)
-        return Chunk(self.start, first, stop, *data, missing)
+        return Chunk(self.start, first, stop, data[0], data[1], data[2], data[3], missing)
 
     def _whole(self) -> Floats:
         if len(self._parts) > 1:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings, Tracker, snapshots
+from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
 from livebode.motion.drive import drive_of
 from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_excitation
 from livebode.motion.residual import Scatter, residual
-from livebode.motion.standstill import Standstill, Stretch, without
+from livebode.motion.standstill import Standstill, without
 from livebode.motion.waiting import Waiting
 from livebode.nouns import Block, Channel, Event, InputError, Responses
 
@@ -29,29 +30,33 @@ class MotionCorrection:
     """A Tracker whose Responses are those of the machine held at each window's centre.
 
     A window sees a machine that changes, and its resonance rings on from where the machine was: in motion a response
-    is off, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses,
-    started by themselves from a scan of ten stiffnesses; the fitted model is driven as the machine was, along the
-    measured positions; its signals go through the same windows; what the motion did to the model is taken off the
-    machine:
+    is off, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses, the
+    first time from a scan of ten stiffnesses, later from the model before; the model is driven as the machine was,
+    along the measured positions; what it leaves of the output, r = y − y_model, goes through the same windows; and
 
-        Ĝ = Y/U + G_frozen(x_centre) − Y_model/U_model
+        Ĝ = G_frozen(x_centre) + R/U = Y/U + G_frozen(x_centre) − Y_model/U
 
-    with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ, `passes` times. Only
-    w, u, y, x, the radius and (driven by the excitation) the loop's description are used.
+    with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ. Only w, u, y, x, the
+    radius and (driven by the excitation) the loop's description are used.
 
     Driven by "torque", the model moves under the measured u, so that whatever rings from accelerations, and the answer
-    of the controllers to noise, is in Y_model as in Y, and U_model is U. Driven by "excitation", the described loop is
-    simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
+    of the controllers to noise, is in y_model as in y. Driven by "excitation", Ĝ = Y/U + G_frozen − Y_model/U_model
+    with the described loop simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
 
     To first order the same is (Y/U)·G_frozen/(Y_model/U_model) (`quotient`); at a line near the antiresonance, where
     the model's window sees much less than it has at its centre, that multiplies the noise.
 
-    Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
-    its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same.
+    `sigma` is that of the corrected response: it comes from how R scatters between periods (or from the quiet bins of
+    r), and the motion, which is in y_model too, is not in it. Windows in which the axis stands, reverses or creeps
+    while dry friction holds it are not valid, and an Event of kind "held" says so; a standing axis without dry friction
+    stays valid. See docs/motion.md for what that finds.
 
-    Bias: where the machine is not two masses, only what it shares with them is corrected. Dry friction at standstill,
-    and a window within 0.5 s of a start or a gap, are not; nor is an acceleration's onset where friction lets go.
-    `sigma` is the Tracker's (of a quotient, scaled with it); with noise = "periods" it counts the motion as noise.
+    Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
+    its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same, and a
+    restored correction goes on as if it had never stopped. It keeps chunk + window + 0.5 s of samples.
+
+    Bias: where the machine is not two masses, only what it shares with them is corrected. A window within 0.5 s of a
+    gap, or of a start in motion, is not.
 
     Parameters
     ----------
@@ -66,7 +71,7 @@ class MotionCorrection:
     quotient
         Correct by a quotient instead of a difference.
     passes
-        How often model and correction are repeated.
+        How often model and correction are repeated after a scan; from the model before two less.
     stiffness_splines, damping_splines
         How freely ln Keff(x) and ln bs(x) move over a chunk: 1 for a constant, else 4 or more B-splines.
 
@@ -102,18 +107,14 @@ class MotionCorrection:
         stiffness_splines: int = 8,
         damping_splines: int = 4,
     ) -> None:
-        _check(settings, radius_m, passes, stiffness_splines, damping_splines)
-        if driven_by not in ("torque", "excitation"):
-            raise InputError(f"{driven_by=} is not known; choose 'torque' or 'excitation'")
         lines = settings.lines
+        self._chunk = round(4 * lines.rate_hz) if chunk_samples is None else chunk_samples
+        splines = (stiffness_splines, damping_splines)
+        check(settings, radius_m, self._chunk, driven_by, passes, splines)
         self.settings = settings
         self._drive = drive_of(settings.loop, lines.rate_hz) if driven_by == "excitation" else None
         self._quotient = quotient
-        self._chunk = round(4 * lines.rate_hz) if chunk_samples is None else chunk_samples
-        if self._chunk < 2 * lines.window:
-            raise InputError(f"chunk_samples={self._chunk} is less than two windows of {lines.window}; take a stroke")
         self._lead = max(round(_LEAD_S * lines.rate_hz), 2 * lines.window)
-        splines = (stiffness_splines, damping_splines)
         self._identity = repr((settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines))
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
@@ -228,22 +229,22 @@ class MotionCorrection:
         if now is None:
             nothing = np.full_like(tracked.value, complex(np.nan, np.nan))
             return replace(tracked, value=nothing, sigma=np.full(nothing.shape, np.nan), valid=tracked.valid & False)
-        held: list[Stretch] = []
-        if self._learner.has_travelled:
-            found = self._standstill.stretches(now.left, chunk)
-            widened = (lambda: replay(self._learner.widened(tracked, chunk, now)).seen)
-            held = self._standstill.held(found, tracked, widened, chunk)
-            if found and not held and self._learner.travels:
+        held = self._standstill.tail(chunk)
+        if self._learner.has_travelled and (found := self._standstill.stretches(now.left, chunk)):
+            wide = replay(self._learner.widened(tracked, chunk, now))
+            held += self._standstill.held(found, tracked, wide.seen, chunk)
+            if not held and self._learner.travels:
                 now = self._learner.completed(tracked, chunk, replay, now)
         left = without(now.left.velocity, held, chunk, self.settings.lines.window)
         seen, memory = self._scatter.then(left, chunk)
         self._scatter.keep(memory)
         seen = _rows_of(seen, tracked)
-        valid = tracked.valid & seen.valid & np.isfinite(now.value)
-        scale = np.abs(now.value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
+        value = self._value(now, tracked, chunk)
+        valid = tracked.valid & seen.valid & np.isfinite(value)
+        scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         return replace(
             tracked,
-            value=np.where(valid, now.value, complex(np.nan, np.nan)),
+            value=np.where(valid, value, complex(np.nan, np.nan)),
             sigma=np.where(valid, seen.sigma * scale, np.nan),
             dof=seen.dof,
             valid=valid,
@@ -252,11 +253,19 @@ class MotionCorrection:
     def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Replayed:
         left = residual(model, chunk, self.settings)
         seen = _rows_of(self._scatter.once(left.velocity, chunk), tracked)
-        held = frozen(model, tracked.schedule, self.settings)
+        return Replayed(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
+
+    def _value(self, now: Replayed, tracked: Responses, chunk: Chunk) -> Complex:
+        """The tracked responses, moved as the model's had to be to its frozen one; NaN where it has no whole window."""
+        if self._drive is None and not self._quotient:
+            return now.value
+        held = frozen(now.model, tracked.schedule, self.settings)
         with np.errstate(invalid="ignore"):  # NaN where a window is not whole
-            moving = tracked.value - seen.value if self._drive is None else self._under_excitation(model, tracked, chunk)
-            value = tracked.value * (held / moving) if self._quotient else tracked.value + (held - moving)
-        return Replayed(model, left, seen, np.asarray(value))
+            if self._drive is None:
+                moving = tracked.value - now.seen.value
+            else:
+                moving = self._under_excitation(now.model, tracked, chunk)
+            return np.asarray(tracked.value * (held / moving) if self._quotient else tracked.value + (held - moving))
 
     def _under_excitation(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Complex:
         s = self.settings
@@ -274,17 +283,3 @@ def _rows_of(seen: Responses, tracked: Responses) -> Responses:
     """The rows at the samples of the others."""
     first = int(np.searchsorted(seen.sample, tracked.sample[0]))
     return seen[first : first + len(tracked)]
-
-
-def _check(settings: Settings, radius_m: float, passes: int, stiffness_splines: int, damping_splines: int) -> None:
-    if settings.input is None or settings.schedule is None:
-        raise InputError("the correction needs the input (torque) and the schedule (position); name their channels")
-    if settings.quantity != "plant" or settings.average or settings.estimator == "indirect":
-        raise InputError("the correction is of single windows of the plant by the joint or the direct estimator")
-    if not (np.isfinite(radius_m) and radius_m > 0):
-        raise InputError(f"{radius_m=} is not a positive number of metres per radian")
-    if passes < 1:
-        raise InputError(f"{passes=} is not at least 1; 3 is usual")
-    for name, splines in (("stiffness_splines", stiffness_splines), ("damping_splines", damping_splines)):
-        if splines != 1 and splines < 4:
-            raise InputError(f"{name}={splines} is neither 1 nor at least 4")

@@ -70,7 +70,10 @@ class Fit:
 
     def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
         """A model from before, over another range of positions."""
-        at, arm = np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)), 2 * np.log(self.radius_m)
+        at, arm = (
+            np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)),
+            2 * np.log(self.radius_m),
+        )
         weights = [
             np.linalg.lstsq(basis(at, low, high, splines), curve(at) + arm)[0]
             for curve, splines in (
@@ -86,11 +89,11 @@ class Fit:
         rest = two_masses.sampled(model.parameters(rows.position_m), self.z, self.rate_hz) - rows.value
         return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
 
-    def refine(self, rows: Rows, model: MovingModel, *, stiffness_only: bool = False) -> MovingModel:
-        """Weighted least squares over all rows, from a model on; `stiffness_only` holds the rest as it is."""
+    def refine(self, rows: Rows, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
+        """Weighted least squares over all rows, from a model on; `masses_known` holds Js and mL."""
         low, high = model.low_m, model.high_m
         known = self._unknowns(model)
-        free = np.s_[2 : 2 + self.stiffness_splines] if stiffness_only else np.s_[:]
+        free = np.s_[2:] if masses_known else np.s_[:]
         design = self._design(rows.position_m, low, high)
         pull = _SMOOTH * self._smoothness(rows)
 

@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """A model driven through a chunk: what it leaves, R/U of that, and the responses corrected with it, (rows, lines)."""
+    """A model driven through a chunk: what it leaves, R/U of that, and the corrected responses (rows, lines)."""
 
     model: MovingModel
     left: Residual
@@ -71,9 +71,9 @@ class Learner:
         return None if self.model is None else replay(self.model)
 
     def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
-        """The model over all positions of the chunk, with the stiffness that all responses show."""
+        """The model over all positions of the chunk, with the stiffness and damping that all responses show."""
         rows, fit, model = self._over_all(tracked, now)
-        return fit.refine(self._rows(tracked, rows, chunk, now), model, stiffness_only=True)
+        return fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
 
     def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
         """The model fitted to all responses, for a chunk in which friction holds nowhere."""
@@ -122,12 +122,12 @@ class Learner:
             rows = self._rows(tracked, used, chunk, now)
         return now, fit.misfit(rows, now.model)
 
-    def _onward(
-        self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed
-    ) -> NDArray[np.intp]:
-        """Those in whose window neither motor nor cart turns, where dry friction would bias them; all, if few are left."""
+    def _onward(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> NDArray[np.intp]:
+        """Those in whose window neither motor nor cart turns, which friction would bias; all, if few are left."""
         where, newest = turns(now.left, chunk, chunk.start), tracked.sample[used]
-        inside = np.searchsorted(where, newest, "right") - np.searchsorted(where, newest - self._settings.lines.window, "right")
+        inside = np.searchsorted(where, newest, "right") - np.searchsorted(
+            where, newest - self._settings.lines.window, "right"
+        )
         onward = used[inside == 0]
         return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
 

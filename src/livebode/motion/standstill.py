@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ from livebode.nouns import Event, Responses
 
 Floats = NDArray[np.float64]
 
-_UNEXPLAINED = 0.06  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
+_UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
 _SLOW = 0.05  # of the largest speed: friction at its bend
 _LONGEST = 4  # windows that are judged together
 
@@ -34,7 +33,8 @@ class Standstill:
 
     Coulomb friction is a constant torque while motor and cart keep their direction, and no line sees it. Where one of
     them stands or reverses, it is not. Such stretches are judged by how much of the output's power at the lines
-    the moving model leaves beyond what it leaves elsewhere (the noise): more than 6 % in amplitude is friction.
+    a belt on the masses known from the motion leaves, beyond what is left elsewhere (the noise): more than 3 % in
+    amplitude is friction. Masses that really changed while the axis stood would look the same.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -54,27 +54,24 @@ class Standstill:
         groups = np.split(where, 1 + np.flatnonzero(apart))
         return [(int(group[0]), int(group[-1])) for group in groups if group.size]
 
-    def held(
-        self, found: list[tuple[int, int]], tracked: Responses, seen: Callable[[], Responses], chunk: Chunk
-    ) -> list[Stretch]:
-        """Those of the stretches in which friction holds. `seen` gives R/U with a model whose stiffness fits here too.
-
-        One that the chunk before ended with is among them.
-        """
+    def tail(self, chunk: Chunk) -> list[Stretch]:
+        """The end of a stretch that the chunk before found held, if it reaches into this one."""
         reaches = self._until >= 0 and self._until + 2 * self._window > chunk.first
-        done = [Stretch(self._until, self._until, 0.0)] if reaches else []
-        if not found:
-            return done
+        return [Stretch(self._until, self._until, 0.0)] if reaches else []
+
+    def held(self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk) -> list[Stretch]:
+        """Those of the stretches in which friction holds; `seen` is R/U with a model whose belt fits here too."""
         rows = np.flatnonzero(tracked.valid.all(axis=1))
         rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
         torque = chunk.torque(self._settings.lines, tracked.sample[rows])
-        rest = np.sum(np.abs(seen().value[rows] * torque) ** 2, axis=1)
+        rest = np.sum(np.abs(seen.value[rows] * torque) ** 2, axis=1)
         output = np.sum(np.abs(tracked.value[rows] * torque) ** 2, axis=1)
         newest = tracked.sample[rows]
         touches = [(newest >= first) & (newest - self._window < last) for first, last in found]
         moving = ~np.any(touches, axis=0) & np.isfinite(rest)
         if moving.any():
             self._noise = float(np.median(rest[moving]))
+        done = []
         for (first, last), touch in zip(found, touches):
             goes_on = self._until >= 0 and first - self._until < self._window
             rest_of_one = goes_on and last - first < self._window
@@ -97,8 +94,8 @@ class Standstill:
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
         message = (
-            f"dry friction holds the axis, which stands or reverses: {100 * stretch.unexplained:.0f} % of its output is "
-            f"not what it is in motion; responses are invalid until it has moved for two windows"
+            f"dry friction holds the axis, which stands or reverses: {100 * stretch.unexplained:.0f} % of its output "
+            "is not as in motion; responses are invalid until it has moved for two windows"
         )
         self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
 
@@ -121,7 +118,7 @@ def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
 
 
 def without(velocity: Floats, held: list[Stretch], chunk: Chunk, window: int) -> Floats:
-    """The residual with NaN where friction holds, and a window to either side: where it lets go, the drift has a kink."""
+    """The residual with NaN where friction holds and a window to either side: its drift has a kink there."""
     left = velocity.copy()
     for stretch in held:
         left[max(stretch.first - window - chunk.start, 0) : max(stretch.last + window + 1 - chunk.start, 0)] = np.nan

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,5 +37,5 @@ class Waiting:
         return {name: getattr(whole, name) for name in _ARRAYS} | {"unit": np.array([whole.unit])}
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        arrays = {name: np.array(state[name]) for name in _ARRAYS if name in state}
+        arrays: dict[str, Any] = {name: np.array(state[name]) for name in _ARRAYS if name in state}
         self._parts = [Responses(lines=self._lines, unit=str(state["unit"][0]), **arrays)] if arrays else []
