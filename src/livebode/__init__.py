@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
     from livebode.kernel import SlidingDFT
+    from livebode.motion import MotionCorrection
     from livebode.nouns import (
         PID,
         Block,
@@ -31,6 +32,7 @@ _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
     "kernel": ("SlidingDFT",),
+    "motion": ("MotionCorrection",),
     "nouns": (
         "PID",
         "Block",
@@ -63,6 +65,7 @@ __all__ = [
     "Log",
     "Loop",
     "Model",
+    "MotionCorrection",
     "PositionPD",
     "Response",
     "Responses",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +142,14 @@ class MotionCorrection:
     def counts(self) -> dict[str, int]:
         """As of a Tracker: samples that came, were missing, and were left out for each reason."""
         return self._tracker.counts
+
+    def found(self) -> dict[str, Any]:
+        """As `Tracker.found`, and the model of the newest chunk: its masses, and its belt at eleven positions."""
+        driven_by = "torque" if self._drive is None else "excitation"
+        model = None if self.model is None else self.model.plain()
+        return self._tracker.found() | {
+            "motion": {"driven_by": driven_by, "chunks": self._learner.chunks, "model": model}
+        }
 
     def excitation_power(self) -> Floats:
         """As `Tracker.excitation_power`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +12,15 @@ from scipy.interpolate import BSpline
 Floats = NDArray[np.float64]
 
 _DEGREE = 3
+_SHOWN = 11
 _BEYOND = 0.1  # of the range, on either side, where a curve goes on straight
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A smooth function of the position: a cubic spline with evenly spaced knots, constant outside of its range.
+    """A smooth function of the position: a cubic spline with evenly spaced knots.
+
+    Outside of its range it goes on straight for a tenth of it, and is constant from there.
 
     Parameters
     ----------
@@ -76,12 +80,24 @@ class MovingModel:
         return self.log_stiffness.high
 
     def stiffness_at(self, position_m: ArrayLike) -> Floats:
-        """Keff, N/m; outside of the range that the fit has seen as at its end."""
+        """Keff, N/m; beyond the range that the fit has seen it goes on for a tenth of it."""
         return np.asarray(np.exp(self.log_stiffness(position_m)))
 
     def damping_at(self, position_m: ArrayLike) -> Floats:
         """bs, N s/m; likewise."""
         return np.asarray(np.exp(self.log_damping(position_m)))
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data: masses and radius, and the belt at eleven positions of the range."""
+        at = np.linspace(self.low_m, self.high_m, _SHOWN)
+        return {
+            "inertia_kg_m2": self.inertia_kg_m2,
+            "load_kg": self.load_kg,
+            "radius_m": self.radius_m,
+            "position_m": at.tolist(),
+            "stiffness_n_per_m": self.stiffness_at(at).tolist(),
+            "damping_n_s_per_m": self.damping_at(at).tolist(),
+        }
 
     def parameters(self, position_m: ArrayLike) -> Floats:
         """Logarithms in the order of `two_masses`, shape (..., 4)."""
