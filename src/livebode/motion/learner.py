@@ -37,6 +37,7 @@ Replay = Callable[[MovingModel], Replayed]
 _ROWS_MIN = 12
 _OVERLAP = 4  # windows of a period that go into the fit: more share their samples, and say nothing new
 _REACH = 0.25  # of the new range that may lie outside of the model's, for a start from it
+_CHECKED = 50  # positions
 _WORSE = 1.5  # misfit against the one before from which a start from the model before is doubted
 
 
@@ -73,13 +74,17 @@ class Learner:
     def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
         """The model over all positions of the chunk, with the stiffness and damping that all responses show."""
         rows, fit, model = self._over_all(tracked, now)
-        return fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
+        wide = fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
+        return wide if self._sound(wide) else now.model
 
     def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
         """The model fitted to all responses, for a chunk in which friction holds nowhere."""
         rows, fit, model = self._over_all(tracked, now)
-        self.model = fit.refine(self._rows(tracked, rows, chunk, now), model)
-        return replay(self.model)
+        model = fit.refine(self._rows(tracked, rows, chunk, now), model)
+        if not self._sound(model):
+            return now
+        self.model = model
+        return replay(model)
 
     def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], Fit, MovingModel]:
         rows = self._thinned(tracked, self._usable(tracked))
@@ -87,7 +92,7 @@ class Learner:
         fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
         return rows, fit, fit.follow(now.model, float(at.min()), float(at.max()))
 
-    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> Replayed:
+    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> Replayed | None:
         rows = self._thinned(tracked, rows)
         at = tracked.schedule[rows]
         splines = self._splines if self.travels else (1, 1)
@@ -98,9 +103,12 @@ class Learner:
             best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
         if best is None or best[1] > _WORSE * self._misfit:
             raw = Rows(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
-            first = replay(fit.refine(raw, fit.start(raw)))
-            anew = self._refined(fit, first, tracked, rows, chunk, replay, self._passes - 1)
-            best = anew if best is None or anew[1] < best[1] else best
+            first = fit.refine(raw, fit.start(raw))
+            if self._sound(first):
+                anew = self._refined(fit, replay(first), tracked, rows, chunk, replay, self._passes - 1)
+                best = anew if best is None or anew[1] < best[1] else best
+        if best is None:
+            return None if self.model is None else replay(self.model)
         found, self._misfit = best
         self.model = found.model
         self.chunks += 1
@@ -118,7 +126,10 @@ class Learner:
     ) -> tuple[Replayed, float]:
         rows = self._rows(tracked, used := self._onward(tracked, used, chunk, now), chunk, now)
         for _ in range(passes):
-            now = replay(fit.refine(rows, now.model))
+            model = fit.refine(rows, now.model)
+            if not self._sound(model):
+                break
+            now = replay(model)
             rows = self._rows(tracked, used, chunk, now)
         return now, fit.misfit(rows, now.model)
 
@@ -144,6 +155,13 @@ class Learner:
         """The first of these rows in each quarter of a window."""
         apart = max(self._settings.lines.window // _OVERLAP, 1)
         return rows[np.unique(tracked.sample[rows] // apart, return_index=True)[1]]
+
+    def _sound(self, model: MovingModel) -> bool:
+        """Whether all poles are slower than the rate; else too little was in the responses to fit it."""
+        js, load, stiffness, damping = np.exp(model.parameters(np.linspace(model.low_m, model.high_m, _CHECKED))).T
+        reduced = js * load / (js + load)
+        fastest = np.maximum(np.sqrt(stiffness / reduced), damping / reduced)
+        return bool(np.all(fastest < np.pi * self._settings.lines.rate_hz))
 
     def _fit(self, stiffness_splines: int, damping_splines: int) -> Fit:
         lines = self._settings.lines

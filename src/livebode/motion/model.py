@@ -36,18 +36,29 @@ class Curve:
 
     def __call__(self, position_m: ArrayLike) -> Floats:
         at = np.asarray(position_m, dtype=np.float64)
-        return np.asarray((basis(at.ravel(), self.low, self.high, len(self.weights)) @ self.weights).reshape(at.shape))
+        if len(self.weights) == 1:
+            return np.full(at.shape, self.weights[0])
+        knots, slope, reach = _knots(self.low, self.high, len(self.weights))
+        value = BSpline(knots, self.weights, _DEGREE)(at.clip(self.low, self.high))
+        before, beyond = (at - self.low).clip(-reach, 0.0), (at - self.high).clip(0.0, reach)
+        rise, fall = slope * (self.weights[1] - self.weights[0]), slope * (self.weights[-1] - self.weights[-2])
+        return np.asarray(value + before * rise + beyond * fall)
+
+
+def _knots(low: float, high: float, splines: int) -> tuple[Floats, float, float]:
+    """Knots; what the slope at an end is per difference of its two weights; how far a curve goes on straight."""
+    inner = np.linspace(low, high, splines - _DEGREE + 1)
+    knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
+    return knots, _DEGREE / float(inner[1] - inner[0]), _BEYOND * (high - low)
 
 
 def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
     """Value of every B-spline at these positions, shape (positions, splines); one of them alone is 1."""
     if splines == 1:
         return np.ones((position_m.size, 1))
-    inner = np.linspace(low, high, splines - _DEGREE + 1)
-    knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
+    knots, rise, reach = _knots(low, high, splines)
     value = np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
-    reach = _BEYOND * (high - low)
-    slope = _DEGREE * np.array([-1.0, 1.0]) / (inner[1] - inner[0])
+    slope = rise * np.array([-1.0, 1.0])
     value[:, :2] += np.outer((position_m - low).clip(-reach, 0.0), slope)
     value[:, -2:] += np.outer((position_m - high).clip(0.0, reach), slope)
     return value
