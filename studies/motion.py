@@ -311,9 +311,7 @@ class Study:
             self.target(f"three masses, σ = {sigma}, |G| corrected against Hann", ratio, 1.0)
 
     def standstill(self) -> None:
-        print(
-            "\ndry friction, dwells of 1 s: worst line of |G| in dB (95 %), uncorrected and where valid; held events"
-        )
+        print("\ndry friction, dwells of 1 s: worst line of |G| in dB (95 %), uncorrected and where valid; held events")
         for amplitude in (0.3, 1.0, 3.0):
             for friction in (0.0, 1.0, 5.0, 15.0):
                 self.numbers.setdefault("standstill", []).append(held(amplitude, friction))

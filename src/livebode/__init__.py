@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         Response,
         Responses,
     )
+    from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
 
 _HOME = {
@@ -48,12 +49,14 @@ _HOME = {
         "Response",
         "Responses",
     ),
+    "simulation": ("BeltAxis", "SimulatedAxis", "Strokes"),
     "sources": ("Log", "open_log"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "BeltAxis",
     "Block",
     "Cascade",
     "Channel",
@@ -70,7 +73,9 @@ __all__ = [
     "Response",
     "Responses",
     "Settings",
+    "SimulatedAxis",
     "SlidingDFT",
+    "Strokes",
     "Tracker",
     "multisine",
     "open_log",
