@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode import Responses
-from livebode.motion import MotionCorrection
 from livebode.simulation import Mechanics
 from studies.common import (
     RATE_HZ,
@@ -20,7 +19,6 @@ from studies.common import (
     error_db,
     lines,
     rms,
-    settings,
     stroke,
 )
 from studies.drawing import LIGHT, figure_of, spread
@@ -99,7 +97,7 @@ def measure(short: bool = False) -> Result:
         found[name] = errors
         rows.append((name, *errors.parts.values(), *without.parts.values()))
         if target:
-            verdicts += judged(name, errors.parts, without.parts, target, unseen(way, without, quiet[0]))
+            verdicts += judged(name, errors.parts, without.parts, target)
         left_out.append((name, *errors.after, *without.after))
     header = ("way", *PARTS, *(f"{part}, no noise" for part in PARTS))
     caption = f"Two masses, {len(seeds)} strokes: error of \\|G\\|, rms over all lines in dB"
@@ -126,24 +124,8 @@ def held_from(measured: list[tuple[list[float], float | None]]) -> str:
     return f"from {AFTER_S[first]:g} s on" if 0 < first < len(AFTER_S) else "nowhere" if first else "everywhere"
 
 
-def unseen(way: Way, without: Errors, quiet: Recording) -> str:
-    """What the reference model loses where its fit had no steady window to see the stiffness by."""
-    if way is not by_model:
-        return ""
-    block = quiet.block
-    correction = MotionCorrection(settings(), radius_m=quiet.axis.mechanics.radius_m, chunk_samples=len(block))
-    correction.process(block)
-    correction.finish()
-    low = correction.model.low_m
-    here, there = (float(rms(without.db[rows])) for rows in (without.position_m < low, without.position_m >= low))
-    return (
-        f"; the fit sees no steady window below {low:.2f} m and holds its stiffness there: without noise {here:.2g} dB "
-        f"below, {there:.2g} dB beyond"
-    )
-
-
-def judged(name: str, errors: dict[str, float], without: dict[str, float], target: float, also: str) -> list[Verdict]:
-    """The target on each part of the stroke; `also` is a reason more."""
+def judged(name: str, errors: dict[str, float], without: dict[str, float], target: float) -> list[Verdict]:
+    """The target on each part of the stroke."""
     whole, steady, beyond, settled = PARTS
     why = {
         whole: "windows that accelerate or brake are in it, with what they leave ringing",
@@ -152,9 +134,7 @@ def judged(name: str, errors: dict[str, float], without: dict[str, float], targe
         settled: "the axis changes within the window",
     }
     return [
-        Verdict(
-            f"{name}, {part}, rms dB", errors[part], target, why=f"{without[part]:.3g} without noise; {why[part]}{also}"
-        )
+        Verdict(f"{name}, {part}, rms dB", errors[part], target, why=f"{without[part]:.3g} without noise; {why[part]}")
         for part in PARTS
     ]
 

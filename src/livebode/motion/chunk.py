@@ -30,20 +30,29 @@ class Chunk:
     y: Floats
     x: Floats
     missing: NDArray[np.bool_]
+    rate_hz: float
 
     def torque(self, lines: Lines, sample: NDArray[np.int64]) -> Floats:
         """|U| at the lines over the windows that end at these samples, (rows, lines)."""
-        first = sample - self.start - lines.window + 1
         wave = np.exp(-2j * np.pi * np.outer(np.arange(lines.window), lines.bins) / lines.window)
-        return np.asarray(np.abs(np.lib.stride_tricks.sliding_window_view(self.u, lines.window)[first] @ wave))
+        return np.asarray(np.abs(self._windows(self.u, lines.window, sample) @ wave))
+
+    def drag(self, window: int, sample: NDArray[np.int64], inertia_kg_m2: float) -> Floats:
+        """Torque along the motion that accelerates nothing, over two windows up to these samples, (rows,)."""
+        u = self._windows(self.u, 2 * window, sample).mean(axis=1)
+        before, after = (self._windows(self.y, window, at).mean(axis=1) for at in (sample - window, sample))
+        return np.asarray((u - inertia_kg_m2 * (after - before) * self.rate_hz / window) * np.sign(after))
+
+    def _windows(self, signal: Floats, window: int, sample: NDArray[np.int64]) -> Floats:
+        return np.lib.stride_tricks.sliding_window_view(signal, window)[sample - self.start - window + 1]
 
 
 class Recorded:
     """The newest samples of w, u, y, x, as many as the next chunk needs."""
 
-    def __init__(self, names: list[str], window: int) -> None:
-        self._names = names
-        self._range = PlausibleRange(3, window)
+    def __init__(self, names: list[str], lines: Lines) -> None:
+        self._names, self._rate_hz = names, lines.rate_hz
+        self._range = PlausibleRange(3, lines.window)
         self.forget()
 
     def forget(self) -> None:
@@ -79,7 +88,7 @@ class Recorded:
             known = np.where(np.isfinite(data), np.arange(data.shape[1]), -1)
             last = np.maximum.accumulate(known, axis=1)
             data = np.where(last >= 0, np.take_along_axis(data, last.clip(0), axis=1), 0.0)
-        return Chunk(self.start, first, stop, data[0], data[1], data[2], data[3], missing)
+        return Chunk(self.start, first, stop, data[0], data[1], data[2], data[3], missing, self._rate_hz)
 
     def _whole(self) -> Floats:
         if len(self._parts) > 1:

@@ -119,7 +119,7 @@ class MotionCorrection:
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
         self._tracker = Tracker(settings)
-        self._recorded = Recorded(self._names, lines.window)
+        self._recorded = Recorded(self._names, lines)
         self._waiting = Waiting(lines)
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
@@ -240,7 +240,7 @@ class MotionCorrection:
         held = self._standstill.tail(chunk)
         if self._learner.has_travelled and (found := self._standstill.stretches(now.left, chunk)):
             wide = replay(self._learner.widened(tracked, chunk, now))
-            held += self._standstill.held(found, tracked, wide.seen, chunk)
+            held += self._standstill.held(found, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
             if not held and self._learner.travels:
                 now = self._learner.completed(tracked, chunk, replay, now)
         left = without(now.left.velocity, held, chunk, self.settings.lines.window)

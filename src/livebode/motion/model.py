@@ -83,6 +83,11 @@ class MovingModel:
     log_damping: Curve
 
     @property
+    def rigid_kg_m2(self) -> float:
+        """Js + mL·r²."""
+        return self.inertia_kg_m2 + self.load_kg * self.radius_m**2
+
+    @property
     def low_m(self) -> float:
         return self.log_stiffness.low
 

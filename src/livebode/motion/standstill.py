@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
 from livebode.motion.residual import Residual
+from livebode.motion.steady import steady_rows
 from livebode.nouns import Event, Responses
 
 Floats = NDArray[np.float64]
 
 _UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
+_DRAG = 0.01  # of the torque's amplitude at the lines, rms; friction that small cannot leave the share above
 _SLOW = 0.05  # of the largest speed: friction at its bend
 _LONGEST = 4  # windows that are judged together
 
@@ -34,13 +36,15 @@ class Standstill:
     Coulomb friction is a constant torque while motor and cart keep their direction, and no line sees it. Where one of
     them stands or reverses, it is not. Such stretches are judged by how much of the output's power at the lines
     a belt on the masses known from the motion leaves, beyond what is left elsewhere (the noise): more than 3 % in
-    amplitude is friction. Masses that really changed while the axis stood would look the same.
+    amplitude is friction, where steady motion has shown that there is a drag. Masses that really changed while an axis
+    with drag stood would look the same.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._window = settings.lines.window
         self._noise = 0.0  # Σ|R|² over the lines where the axis moves
+        self._drag = np.inf  # mean torque along a steady motion; unknown, it may be any
         self._until = -1  # end of the last stretch in which it was held
         self._events: list[Event] = []
 
@@ -59,8 +63,13 @@ class Standstill:
         reaches = self._until >= 0 and self._until + 2 * self._window > chunk.first
         return [Stretch(self._until, self._until, 0.0)] if reaches else []
 
-    def held(self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk) -> list[Stretch]:
-        """Those of the stretches in which friction holds; `seen` is R/U with a model whose belt fits here too."""
+    def held(
+        self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
+    ) -> list[Stretch]:
+        """Those of the stretches in which friction holds.
+
+        `seen` is R/U with a model whose belt fits here too, `inertia_kg_m2` what the motor moves in all.
+        """
         rows = np.flatnonzero(tracked.valid.all(axis=1))
         rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
         torque = chunk.torque(self._settings.lines, tracked.sample[rows])
@@ -71,6 +80,12 @@ class Standstill:
         moving = ~np.any(touches, axis=0) & np.isfinite(rest)
         if moving.any():
             self._noise = float(np.median(rest[moving]))
+        steady = steady_rows(newest, chunk, self._window)
+        if steady.any():
+            self._drag = float(np.abs(np.mean(chunk.drag(self._window, newest[steady], inertia_kg_m2))))
+        # |U| of a sine of amplitude a over N samples is N·a/2.
+        amplitude = np.sqrt(2 * np.mean(np.sum(torque**2, axis=1))) / self._window
+        dragged = self._drag > _DRAG * amplitude
         done = []
         for (first, last), touch in zip(found, touches):
             goes_on = self._until >= 0 and first - self._until < self._window
@@ -78,7 +93,7 @@ class Standstill:
             at = touch & np.isfinite(rest)
             excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
             stretch = Stretch(first, last, float(np.sqrt(excess)))
-            if rest_of_one or stretch.unexplained > _UNEXPLAINED:
+            if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
                 if not goes_on:
                     self._say(stretch, tracked)
                 self._until = last
@@ -100,10 +115,11 @@ class Standstill:
         self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"noise": np.array([self._noise]), "until": np.array([self._until])}
+        return {"noise": np.array([self._noise, self._drag]), "until": np.array([self._until])}
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._noise, self._until = float(state["noise"][0]), int(state["until"][0])
+        self._noise, self._drag = (float(n) for n in state["noise"])
+        self._until = int(state["until"][0])
         self._events = []
 
 
