@@ -100,7 +100,7 @@ class PhysicalModel:
     ...         return [1.0], [m, c, k]
     >>> grid = Grid(np.array([1.0, 16.0]), rate_hz=1000.0)
     >>> abs(Oscillator().at([1.0, 10.0, 1e4], grid)).round(6)
-    array([0.0001  , 0.000995])
+    array([0.0001  , 0.000989])
     >>> Oscillator().derived_names
     ('resonance', 'resonance_damping', 'resonance_q')
     """
@@ -112,7 +112,7 @@ class PhysicalModel:
         """Coefficients of numerator and denominator, each a number or an array like the arguments."""
         raise NotImplementedError(f"{type(self).__name__} has no transfer function; define transfer()")
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
         """First values to try for responses (rows, lines), shape (starts, rows, parameters).
 
         Unless a model knows better: the declared ones, and each of them a third and three times as large.
@@ -139,7 +139,7 @@ class PhysicalModel:
         """Response at the lines, behind the hold and the delay, for values (..., parameters): shape (..., lines)."""
         p = np.asarray(values, dtype=np.float64)
         transfer, delay_s = self._transfer(p), self._delay_s(p)
-        s = 2j * np.pi * grid.frequency_hz
+        s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
         if grid.hold == "zero-order":
             return transfer.sampled(np.exp(s / grid.rate_hz), grid.rate_hz, delay_s)
         late = np.exp(-s * np.asarray(delay_s)[..., np.newaxis])
@@ -151,7 +151,7 @@ class PhysicalModel:
 
     @property
     def derived_names(self) -> tuple[str, ...]:
-        """Of `derived`: for each mode its frequency, damping ratio and quality factor, and the same of each pair of zeros."""
+        """Of `derived`: frequency, damping ratio and quality factor of each mode, and of each pair of zeros."""
         return tuple(n + end for n in self._pairs() for end in ("", "_damping", "_q"))
 
     @property

@@ -1,4 +1,4 @@
-"""Transfer functions in s for many parameters at once: polynomials, poles and zeros, and how a held input samples them."""
+"""Transfer functions in s for many parameters at once: their poles and zeros, and how a held input samples them."""
 
 from __future__ import annotations
 
@@ -69,6 +69,7 @@ class Transfer(NamedTuple):
         found: Any = 0.0
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
+            poles[poles == 0] = _TINY**0.1  # a pole that friction just does not move: as good as an integrator
             residues = (self._residues(poles) / poles)[..., np.newaxis]
             poles = poles[..., np.newaxis] * tick
             end: Any = np.expm1(poles)
@@ -131,12 +132,12 @@ def roots(polynomial: Floats) -> Complex:
         # The larger root first: the difference of half and turn would lose the smaller one's digits.
         large = half - np.where(half > 0, -1, 1) * np.where(turn.imag == 0, turn, -turn)
         return np.stack([monic[..., 1] / np.where(large == 0, _TINY, large), large], axis=-1)
-    scale = np.abs(monic[..., -1:]) ** (1 / degree) + _TINY
+    power = np.arange(1, degree + 1)
+    scale = np.max(np.abs(monic) ** (1 / power), axis=-1, keepdims=True) + _TINY
     companion = np.zeros((*monic.shape[:-1], degree, degree))
-    companion[..., 0, :] = -monic / scale ** np.arange(1, degree + 1)
+    companion[..., 0, :] = -monic / scale**power
     companion[..., np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    finite = np.isfinite(companion).all(axis=(-1, -2))
-    found = np.linalg.eigvals(np.where(finite[..., np.newaxis, np.newaxis], companion, 0.0)) * scale
+    found = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
     return _by_size(found)
 
 
