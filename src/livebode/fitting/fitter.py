@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from livebode.fitting.models import model_named
 from livebode.fitting.physical import Grid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import NO_RESPONSE, SENTENCES, Fitted, fit_rows, squares
-from livebode.fitting.weighing import epsilon_for
+from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, Fitted, fit_rows
+from livebode.fitting.weighing import epsilon_for, squares
 from livebode.nouns import Event, InputError, Lines, Parameters, Responses
 from livebode.nouns.parameters import OK
 
@@ -192,10 +192,11 @@ class Fitter:
         epsilon = None if self._epsilon is None else np.full(len(responses), self._epsilon)
         found = fit_rows(problem, measured, noise_dof, self._start, epsilon)
         good = np.flatnonzero(found.status == OK)
+        near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
         parts = squares(measured, found.response)
         self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
-        if good.size:
-            self._next = found.values[good[-1]]
+        if near.size:
+            self._next = found.ended[near[-1]]
         self._seen += len(responses)
         if self._seen % _GROUP == 0:
             self._finish_group(problem)

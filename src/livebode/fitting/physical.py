@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -108,6 +108,9 @@ class PhysicalModel:
     name: ClassVar[str]
     parameters: tuple[Parameter, ...]
 
+    frictions: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are viscous frictions, which a fit tries where the model lacks something."""
+
     def transfer(self, *parameters: Any) -> tuple[Sequence[ArrayLike], Sequence[ArrayLike]]:
         """Coefficients of numerator and denominator, each a number or an array like the arguments."""
         raise NotImplementedError(f"{type(self).__name__} has no transfer function; define transfer()")
@@ -126,6 +129,10 @@ class PhysicalModel:
                     other[i] = np.clip(other[i] * factor, parameter.low, parameter.high)
                     tried.append(other)
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
+
+    def drag(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+        """The same values (..., parameters) with frictions that the lines would just show."""
+        return values
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -185,14 +192,14 @@ class PhysicalModel:
         return np.asarray(p[..., self.names.index(DELAY)]) if DELAY in self.names else 0.0
 
 
-def delay(low_s: float = -0.02, high_s: float = 0.02) -> Parameter:
+def delay(held: float | None = 0.0) -> Parameter:
     """A delay, held at zero unless freed; negative where the input was logged later than it acted."""
-    return Parameter(DELAY, "s", start=0.0, low=low_s, high=high_s, held=0.0)
+    return Parameter(DELAY, "s", start=0.0, low=-0.02, high=0.02, held=held)
 
 
 def free_friction(name: str, unit: str) -> Parameter:
     """A viscous friction, held at zero unless freed."""
-    return Parameter(name, unit, start=0.0, low=-inf, high=inf, held=0.0)
+    return Parameter(name, unit, start=1e-3, low=1e-15, high=1e12, held=0.0)
 
 
 def _paired(roots: Complex) -> Complex:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Measured(NamedTuple):
     sigma: Floats
     use: NDArray[np.bool_]
 
-    def rows(self, which: NDArray[np.bool_]) -> Measured:
+    def rows(self, which: NDArray[Any]) -> Measured:
         return Measured(self.value[which], self.sigma[which], self.use[which])
 
     def repeated(self, times: int) -> Measured:
@@ -71,7 +71,7 @@ class Problem:
             raise InputError(f"every parameter of {model.name!r} is held; free at least one")
         chosen = [p for p, free_ in zip(model.parameters, self.free) if free_]
         for p in model.parameters:
-            if (value := fixed.get(p.name)) is not None and not p.low <= value <= p.high:
+            if (value := fixed.get(p.name)) not in (None, p.held) and not p.low <= value <= p.high:
                 raise InputError(f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}")
         self._log = np.array([p.logarithmic for p in chosen])
         self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
@@ -94,10 +94,10 @@ class Problem:
     def starts(self, measured: Measured, weight: Floats) -> Floats:
         """The model's first values, (starts, rows, parameters), within the bounds."""
         value = np.where(measured.use, measured.value, 0.0)
-        found = self.with_held(self.model.starts(value, weight, self.grid))
+        found = self.model.starts(value, weight, self.grid)
         low, high = (np.array([getattr(p, end) for p in self.model.parameters]) for end in ("low", "high"))
         middle = np.array([p.start for p in self.model.parameters])
-        return np.asarray(np.where(np.isfinite(found), found, middle).clip(low, high))
+        return self.with_held(np.where(np.isfinite(found), found, middle).clip(low, high))
 
     def solve(self, measured: Measured, weight: Floats, start: Floats, rounds: int = 30) -> tuple[Solution, Floats]:
         """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,)."""

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
-from livebode.fitting.weighing import chi_squared, epsilon_for, weights
+from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
 from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
@@ -19,6 +20,7 @@ NOT_CONVERGED = "not converged"
 BOUND = "bound hit"
 NOT_SEEN = "not seen"
 NO_FIT = "model does not fit"
+FRICTION = "friction"
 
 SENTENCES = {
     OK: "the fit holds",
@@ -27,8 +29,9 @@ SENTENCES = {
     BOUND: "a parameter ended at its bound; the lines do not hold it",
     NOT_SEEN: "the lines do not show what the model says: a parameter is uncertain by more than half; take lines "
     "around the resonance and the antiresonance, or hold parameters that are known",
-    NO_FIT: "the model misses the response by more than half of it; a standing axis that friction holds, or another "
-    "machine than the model's",
+    NO_FIT: "the model misses the response by more than half of it: another machine than the model's, or no response",
+    FRICTION: "friction holds the machine and explains most of what the model lacks; move, excite more, or free the "
+    "model's viscous friction",
 }
 """What each status means, for people."""
 
@@ -43,7 +46,8 @@ _CONDITION_MAX = 1e12
 
 
 class Fitted(NamedTuple):
-    """What a batch of rows came to: the arrays of `Parameters`, and the model's response (rows, lines)."""
+    """What a batch of rows came to: the arrays of `Parameters`, and, failed or not, the model's response (rows, lines)
+    and the values where the search ended."""
 
     values: Floats
     covariance: Floats
@@ -52,6 +56,7 @@ class Fitted(NamedTuple):
     chi2: Floats
     dof: Floats
     response: Complex
+    ended: Floats
 
 
 def fit_rows(
@@ -128,18 +133,6 @@ def _reweighted(problem: Problem, measured: Measured, found: Solution, dof: Floa
     return found, eps
 
 
-def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
-    """Each row's ε by its own residuals, (rows,)."""
-    return epsilon_for(*squares(measured, response), dof)
-
-
-def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:
-    """|residual|², sigma² and |G|² of the model, (rows, lines), zero where a line is not used."""
-    rest = np.abs(np.where(measured.use, measured.value - response, 0.0)) ** 2
-    noise = np.where(measured.use & (measured.sigma > 0), measured.sigma, 0.0) ** 2
-    return rest, noise, np.where(measured.use, np.abs(response), 0.0) ** 2
-
-
 def _judged(
     problem: Problem, measured: Measured, noise_dof: Floats, found: Solution, eps: Floats, dof: Floats
 ) -> Fitted:
@@ -148,9 +141,11 @@ def _judged(
     with np.errstate(invalid="ignore"):
         uncertain = np.sqrt(np.einsum("rii->ri", small))[:, problem.relative()]
         unseen = ~np.isfinite(small).all(axis=(1, 2)) | ~(uncertain <= _UNCERTAIN).all(axis=1)
+    lacking = own_epsilon(measured, found.response, dof)
     status = np.full(len(dof), OK, dtype="<U20")
     for word, failed in (
-        (NO_FIT, own_epsilon(measured, found.response, dof) > EPSILON_MAX),
+        (FRICTION, held_by_friction(problem, measured, found.values, lacking)),
+        (NO_FIT, lacking > EPSILON_MAX),
         (NOT_SEEN, unseen),
         (BOUND, problem.at_bound(found.values)),
         (NOT_CONVERGED, ~found.settled),
@@ -166,7 +161,7 @@ def _judged(
     return Fitted(
         np.where(failed[:, np.newaxis], np.nan, found.values),
         whole, status, np.where(failed, np.nan, eps), np.where(dof > 0, chi_squared(rest, noise), np.nan), dof,
-        found.response,
+        found.response, found.values,
     )  # fmt: skip
 
 

@@ -141,24 +141,6 @@ def roots(polynomial: Floats) -> Complex:
     return _by_size(found)
 
 
-def multiplied(first: Floats, second: Floats) -> Floats:
-    """Product of two polynomials, coefficients along the last axis."""
-    one, two = np.asarray(first), np.asarray(second)
-    shape = np.broadcast_shapes(one.shape[:-1], two.shape[:-1])
-    product = np.zeros((*shape, one.shape[-1] + two.shape[-1] - 1))
-    for i in range(two.shape[-1]):
-        product[..., i : i + one.shape[-1]] += one * two[..., i : i + 1]
-    return product
-
-
-def added(first: Floats, second: Floats) -> Floats:
-    """Sum of two polynomials, coefficients along the last axis."""
-    one, two = (first, second) if first.shape[-1] >= second.shape[-1] else (second, first)
-    total = np.array(np.broadcast_to(one, (*np.broadcast_shapes(one.shape[:-1], two.shape[:-1]), one.shape[-1])))
-    total[..., one.shape[-1] - two.shape[-1] :] += two
-    return total
-
-
 def _by_size(found: Complex) -> Complex:
     size = np.round(np.abs(found) / np.max(np.abs(found) + _TINY, axis=-1, keepdims=True), 9)
     order = np.lexsort((found.imag, size))

@@ -53,7 +53,7 @@ class TwoMassGain(PhysicalModel):
             Parameter("resonance", "Hz", 20.0, *_HZ),
             Parameter("antiresonance_damping", "", 0.05, *_RATIO),
             Parameter("resonance_damping", "", 0.05, *_RATIO),
-            delay(),
+            delay(held=None),
         )
 
     def transfer(

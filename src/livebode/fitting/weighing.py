@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.fitting.problem import Measured
+
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -16,8 +18,8 @@ def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
 
     sigma (rows, lines), NaN or zero where it is not known; size |G|, (rows, lines); epsilon (rows,).
     """
-    variance = np.where(sigma > 0, sigma, 0.0) ** 2 + (epsilon[:, np.newaxis] * size) ** 2
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # a fit that ran away has no size
+        variance = np.where(sigma > 0, sigma, 0.0) ** 2 + (epsilon[:, np.newaxis] * size) ** 2
         return np.where(variance > 0, np.sqrt(2 / variance), 0.0)
 
 
@@ -36,6 +38,18 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
             above = _reduced(rest, noise, size, middle) > dof
             low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(noisy | ~(dof > 0) | ~np.isfinite(high), 0.0, np.sqrt(high))
+
+
+def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:
+    """|residual|², sigma² and |G|² of the model, (rows, lines), zero where a line is not used."""
+    rest = np.abs(np.where(measured.use, measured.value - response, 0.0)) ** 2
+    noise = np.where(measured.use & (measured.sigma > 0), measured.sigma, 0.0) ** 2
+    return rest, noise, np.where(measured.use, np.abs(response), 0.0) ** 2
+
+
+def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
+    """Each row's ε by its own residuals, (rows,)."""
+    return epsilon_for(*squares(measured, response), dof)
 
 
 def chi_squared(rest: Floats, noise: Floats) -> Floats:
