@@ -78,8 +78,7 @@ def fit_rational(
     true. Where no sigma is known lines weigh by their size.
 
     The covariance of the first two is that of noise by sigma through the linear equations; that of the third takes in
-    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true, since
-    they do not make it least.
+    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true.
 
     Parameters
     ----------
