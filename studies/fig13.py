@@ -148,7 +148,8 @@ def draw(result: Result) -> Figure:
             axes.set_ylabel(name)
         for axes in panels[1]:
             axes.set_xlabel("time, s")
-        panels[0, 0].legend(loc="lower right", fontsize=8)
+        handles, names = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="upper left", bbox_to_anchor=(0.01, 1 - 0.7 / 6.2), ncols=len(names))
     return figure
 
 
