@@ -45,7 +45,6 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
-	$(BIN)/python -m studies.motion
 
 fuzz: $(BUILT)   ## a long campaign of damaged files against the readers
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py

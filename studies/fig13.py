@@ -12,8 +12,9 @@ from livebode.fitting import Fitter, TwoMass
 from livebode.fitting.hold import to_discrete
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes
-from studies.common import SIGMA, Floats, Result, Study, Table, Verdict
+from studies.common import SIGMA, Floats
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

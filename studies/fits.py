@@ -12,7 +12,8 @@ from livebode.fitting import Fitter, Grid, TwoMass
 from livebode.fitting.problem import Measured, Problem
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
-from studies.common import EXCITATION, RATE_HZ, SIGMA, WINDOW, Floats, Result, Study, Table, Verdict, lines, rms
+from studies.common import EXCITATION, RATE_HZ, SIGMA, WINDOW, Floats, lines, rms
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from livebode.excitation import Excitation, multisine, recognise
     from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
     from livebode.kernel import SlidingDFT
+    from livebode.motion import MotionCorrection
     from livebode.nouns import (
         PID,
         Block,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         Response,
         Responses,
     )
+    from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
 
 _HOME = {
@@ -34,6 +36,7 @@ _HOME = {
     "excitation": ("Excitation", "multisine", "recognise"),
     "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
     "kernel": ("SlidingDFT",),
+    "motion": ("MotionCorrection",),
     "nouns": (
         "PID",
         "Block",
@@ -50,12 +53,14 @@ _HOME = {
         "Response",
         "Responses",
     ),
+    "simulation": ("BeltAxis", "SimulatedAxis", "Strokes"),
     "sources": ("Log", "open_log"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "BeltAxis",
     "Block",
     "Cascade",
     "Channel",
@@ -69,6 +74,7 @@ __all__ = [
     "Log",
     "Loop",
     "Model",
+    "MotionCorrection",
     "Parameter",
     "Parameters",
     "PhysicalModel",
@@ -77,7 +83,9 @@ __all__ = [
     "Response",
     "Responses",
     "Settings",
+    "SimulatedAxis",
     "SlidingDFT",
+    "Strokes",
     "Tracker",
     "fit",
     "fit_rational",

@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
 from livebode.nouns import Parameters, Response, Responses
-from livebode.records import RunDirectory, read_run
+from livebode.records import Run, RunDirectory
 from livebode.session.axis import FitSection
 
 _POSITIONS = ("rad", "m", "deg", "mm")
@@ -75,11 +75,12 @@ def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     Of a run that averages, the newest valid response; of another the mean of all. Where neither configuration nor unit
     say whether the output is a velocity or a position, the one that lacks less of the response is taken.
     """
-    responses, summary = read_run(directory)
+    run = Run.open(directory)
+    responses = run.responses()
     valid = np.flatnonzero(responses.valid.any(axis=1))
     chosen: Response | Responses = responses
     words = f"the mean of {valid.size} responses"
-    if valid.size and summary["configuration"].get("tracking", {}).get("average"):
+    if valid.size and run.summary.get("configuration", {}).get("tracking", {}).get("average"):
         chosen = responses[int(valid[-1])]
         words = f"the average up to {chosen.time_s:.6g} s"
     sections = [section]
