@@ -106,6 +106,11 @@ def _fitted(
     found = _begun(problem, measured, weight, start, dof)
     if epsilon is None:
         found, eps = _reweighted(problem, measured, found, dof)
+    else:
+        # A row that lacks much more than those before it is not known as well as they were.
+        more = own_epsilon(measured, found.response, _SUSPICIOUS * dof) > eps
+        if more.any():
+            eps = np.where(more, own_epsilon(measured, found.response, dof), eps)
     return _judged(problem, measured, noise_dof, found, eps, dof)
 
 
