@@ -13,8 +13,8 @@ import numpy as np
 
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.fitting.windows import fit_windows
 from livebode.motion import MotionCorrection
-from livebode.motion.windows import fit_windows
 from livebode.nouns import Block, Responses
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes
 from studies.common import RATE_HZ, WINDOW, correct, decibels, lines, rms

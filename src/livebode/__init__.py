@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
+    from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
     from livebode.kernel import SlidingDFT
     from livebode.motion import MotionCorrection
     from livebode.nouns import (
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
         Lines,
         Loop,
         Model,
+        Parameters,
         PositionPD,
         Response,
         Responses,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
+    "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
     "kernel": ("SlidingDFT",),
     "motion": ("MotionCorrection",),
     "nouns": (
@@ -45,6 +48,7 @@ _HOME = {
         "Lines",
         "Loop",
         "Model",
+        "Parameters",
         "PositionPD",
         "Response",
         "Responses",
@@ -62,6 +66,8 @@ __all__ = [
     "Channel",
     "Event",
     "Excitation",
+    "Fit",
+    "Fitter",
     "GridError",
     "InputError",
     "Lines",
@@ -69,7 +75,11 @@ __all__ = [
     "Loop",
     "Model",
     "MotionCorrection",
+    "Parameter",
+    "Parameters",
+    "PhysicalModel",
     "PositionPD",
+    "Rational",
     "Response",
     "Responses",
     "Settings",
@@ -77,6 +87,8 @@ __all__ = [
     "SlidingDFT",
     "Strokes",
     "Tracker",
+    "fit",
+    "fit_rational",
     "multisine",
     "open_log",
     "recognise",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.motion import two_masses
-from livebode.motion.windows import fit_windows
+from livebode.fitting import two_masses
+from livebode.fitting.windows import fit_windows
 
 RADIUS_M = 0.019
 ARM = np.array([1.0, RADIUS_M**2, RADIUS_M**2, RADIUS_M**2])  # to the motor's shaft

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.motion import two_masses
-from livebode.motion.least_squares import minimise
+from livebode.fitting import two_masses
+from livebode.fitting.least_squares import minimise
+from livebode.fitting.windows import scan
 from livebode.motion.model import Curve, MovingModel, basis
-from livebode.motion.windows import scan
 from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]

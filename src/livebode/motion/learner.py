@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings
-from livebode.motion import two_masses
+from livebode.fitting import two_masses
 from livebode.motion.chunk import Chunk
 from livebode.motion.fit import Fit, Rows
 from livebode.motion.model import Curve, MovingModel

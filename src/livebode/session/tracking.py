@@ -13,11 +13,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, InputError, Responses
+from livebode.nouns import Block, Channel, InputError, Model, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.fits import Fits
 from livebode.session.follower import Follower
 from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
@@ -25,7 +27,7 @@ from livebode.sources import open_log
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
-Draw = Callable[[Responses, Path, str], None]
+Draw = Callable[[Responses, Path, str, Model | None], None]
 
 
 class Source(Protocol):
@@ -43,11 +45,13 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: its directory, its summary as in run.json, and a thinned copy of its responses."""
+    """What a run came to: its directory, its summary as in run.json, a thinned copy of its responses, and the newest
+    fit that holds."""
 
     directory: Path
     summary: dict[str, Any]
     responses: Responses
+    fit: Fit | None = None
 
 
 def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
@@ -64,8 +68,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     progress
         Called after each block with samples done and in all (None where not known).
     draw
-        Called with the thinned responses, the directory before it is put in place, and the scheduling signal's name
-        with its unit, to add pictures.
+        Called with the thinned responses, the directory before it is put in place, the scheduling signal's name
+        with its unit, and the newest fit, to add pictures.
 
     Raises
     ------
@@ -77,7 +81,10 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started)
+    fits = None if axis.fit is None else Fits(axis.fit)
+    return record(
+        log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
+    )
 
 
 def record(
@@ -91,12 +98,14 @@ def record(
     draw: Draw,
     watch: Watch | None = None,
     started: float | None = None,
+    fits: Fits | None = None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
     `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
-    opening the source began, where that is to count in the speed; `delivery` goes to the source's `blocks`.
+    opening the source began, where that is to count in the speed; `fits` are made of every response; `delivery` goes to
+    the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
@@ -106,6 +115,8 @@ def record(
         def publish(responses: Responses) -> None:
             overview.add(responses)
             out.write(responses)
+            if fits is not None:
+                fits.take(responses, out)
             if watch is not None and len(responses):
                 watch(responses)
 
@@ -113,9 +124,12 @@ def record(
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
+        newest = None
+        if fits is not None:
+            newest, summary["fit"] = fits.newest(), fits.summary()
         out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(source, tracker.settings.schedule))
-    return Outcome(directory, summary, responses)
+        draw(responses, out.partial, _schedule_label(source, tracker.settings.schedule), newest)
+    return Outcome(directory, summary, responses, newest)
 
 
 def _track(
