@@ -1,0 +1,1 @@
+"""From responses to what the machine is: physical parameters and rational models, with covariance."""
