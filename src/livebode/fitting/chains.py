@@ -78,10 +78,18 @@ class Chain(PhysicalModel):
     def _motor(self) -> Parameter:
         return Parameter("Js", "kg m²", 1e-2, *_INERTIA)
 
-    def _with_held(self, found: Floats) -> Floats:
-        """Found values (..., some) with those behind them that are held at first."""
-        held = np.array([p.start for p in self.parameters[found.shape[-1] :]])
-        return np.concatenate([found, np.broadcast_to(held, (*found.shape[:-1], held.size))], axis=-1)
+    def drag(self, values: Floats, grid: Grid) -> Floats:
+        """Frictions that stop the motor's inertia in as long as ten of the lowest line's radians take."""
+        dragged = np.array(values)
+        for name in self.frictions:
+            arm = self.arm if name == "BL" else 1.0
+            dragged[..., self.names.index(name)] = values[..., 0] * (2 * np.pi * grid.frequency_hz.min() / 10) / arm
+        return dragged
+
+    def _whole(self, found: Floats, grid: Grid) -> Floats:
+        """Found values (..., some) with frictions and no delay behind them."""
+        rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
+        return self.drag(np.concatenate([found, rest], axis=-1), grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +101,7 @@ class Rigid(Chain):
     """
 
     name = "rigid"
+    frictions = ("B",)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
@@ -104,7 +113,7 @@ class Rigid(Chain):
 
     def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
         weights = scan(value, weight, grid, modes=0, integrators=self.integrators)[0]
-        return self._with_held(self.lever / weights[..., :1])
+        return self._whole(self.lever / weights[..., :1], grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +136,7 @@ class TwoMass(Chain):
 
     inertia_ratio: float | None = None
     name = "two-mass"
+    frictions = ("B", "BL")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -190,7 +200,7 @@ class TwoMass(Chain):
         found = [inertia[..., 0], inertia[..., 1] / self.arm, spring[..., 0] / self.arm, damper[..., 0] / self.arm]
         if ratio is not None:
             del found[1]
-        return self._with_held(np.stack(found, axis=-1))
+        return self._whole(np.stack(found, axis=-1), grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,7 +238,7 @@ class ThreeMass(Chain):
         weights, omega = scan(value, weight, grid, modes=2, integrators=self.integrators)
         inertia, spring, damper = chain_of(weights, omega)
         found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
-        return self._with_held(np.concatenate(found, axis=-1))
+        return self._whole(np.concatenate(found, axis=-1), grid)
 
 
 def _times(first: list[Any], second: list[Any]) -> list[Any]:

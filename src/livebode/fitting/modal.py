@@ -71,7 +71,7 @@ def chain_of(weights: Floats, omega: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _part(numerator: list[float], denominator: list[float], grid: Grid) -> Complex:
     transfer = Transfer.of(numerator, denominator)
-    s = 2j * np.pi * grid.frequency_hz
+    s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
     if grid.hold == "none":
         return transfer.response(s)
     return transfer.sampled(np.exp(s / grid.rate_hz), grid.rate_hz)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -100,7 +100,7 @@ class PhysicalModel:
     ...         return [1.0], [m, c, k]
     >>> grid = Grid(np.array([1.0, 16.0]), rate_hz=1000.0)
     >>> abs(Oscillator().at([1.0, 10.0, 1e4], grid)).round(6)
-    array([0.0001  , 0.000995])
+    array([0.0001  , 0.000989])
     >>> Oscillator().derived_names
     ('resonance', 'resonance_damping', 'resonance_q')
     """
@@ -108,11 +108,14 @@ class PhysicalModel:
     name: ClassVar[str]
     parameters: tuple[Parameter, ...]
 
+    frictions: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are viscous frictions, which a fit tries where the model lacks something."""
+
     def transfer(self, *parameters: Any) -> tuple[Sequence[ArrayLike], Sequence[ArrayLike]]:
         """Coefficients of numerator and denominator, each a number or an array like the arguments."""
         raise NotImplementedError(f"{type(self).__name__} has no transfer function; define transfer()")
 
-    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
         """First values to try for responses (rows, lines), shape (starts, rows, parameters).
 
         Unless a model knows better: the declared ones, and each of them a third and three times as large.
@@ -127,6 +130,10 @@ class PhysicalModel:
                     tried.append(other)
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
 
+    def drag(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+        """The same values (..., parameters) with frictions that the lines would just show."""
+        return values
+
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
@@ -139,7 +146,7 @@ class PhysicalModel:
         """Response at the lines, behind the hold and the delay, for values (..., parameters): shape (..., lines)."""
         p = np.asarray(values, dtype=np.float64)
         transfer, delay_s = self._transfer(p), self._delay_s(p)
-        s = 2j * np.pi * grid.frequency_hz
+        s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
         if grid.hold == "zero-order":
             return transfer.sampled(np.exp(s / grid.rate_hz), grid.rate_hz, delay_s)
         late = np.exp(-s * np.asarray(delay_s)[..., np.newaxis])
@@ -151,7 +158,7 @@ class PhysicalModel:
 
     @property
     def derived_names(self) -> tuple[str, ...]:
-        """Of `derived`: for each mode its frequency, damping ratio and quality factor, and the same of each pair of zeros."""
+        """Of `derived`: frequency, damping ratio and quality factor of each mode, and of each pair of zeros."""
         return tuple(n + end for n in self._pairs() for end in ("", "_damping", "_q"))
 
     @property
@@ -185,14 +192,14 @@ class PhysicalModel:
         return np.asarray(p[..., self.names.index(DELAY)]) if DELAY in self.names else 0.0
 
 
-def delay(low_s: float = -0.02, high_s: float = 0.02) -> Parameter:
+def delay(held: float | None = 0.0) -> Parameter:
     """A delay, held at zero unless freed; negative where the input was logged later than it acted."""
-    return Parameter(DELAY, "s", start=0.0, low=low_s, high=high_s, held=0.0)
+    return Parameter(DELAY, "s", start=0.0, low=-0.02, high=0.02, held=held)
 
 
 def free_friction(name: str, unit: str) -> Parameter:
     """A viscous friction, held at zero unless freed."""
-    return Parameter(name, unit, start=0.0, low=-inf, high=inf, held=0.0)
+    return Parameter(name, unit, start=1e-3, low=1e-15, high=1e12, held=0.0)
 
 
 def _paired(roots: Complex) -> Complex:

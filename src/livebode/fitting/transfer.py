@@ -1,4 +1,4 @@
-"""Transfer functions in s for many parameters at once: polynomials, poles and zeros, and how a held input samples them."""
+"""Transfer functions in s for many parameters at once: their poles and zeros, and how a held input samples them."""
 
 from __future__ import annotations
 
@@ -69,6 +69,7 @@ class Transfer(NamedTuple):
         found: Any = 0.0
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
+            poles[poles == 0] = _TINY**0.1  # a pole that friction just does not move: as good as an integrator
             residues = (self._residues(poles) / poles)[..., np.newaxis]
             poles = poles[..., np.newaxis] * tick
             end: Any = np.expm1(poles)
@@ -131,31 +132,13 @@ def roots(polynomial: Floats) -> Complex:
         # The larger root first: the difference of half and turn would lose the smaller one's digits.
         large = half - np.where(half > 0, -1, 1) * np.where(turn.imag == 0, turn, -turn)
         return np.stack([monic[..., 1] / np.where(large == 0, _TINY, large), large], axis=-1)
-    scale = np.abs(monic[..., -1:]) ** (1 / degree) + _TINY
+    power = np.arange(1, degree + 1)
+    scale = np.max(np.abs(monic) ** (1 / power), axis=-1, keepdims=True) + _TINY
     companion = np.zeros((*monic.shape[:-1], degree, degree))
-    companion[..., 0, :] = -monic / scale ** np.arange(1, degree + 1)
+    companion[..., 0, :] = -monic / scale**power
     companion[..., np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    finite = np.isfinite(companion).all(axis=(-1, -2))
-    found = np.linalg.eigvals(np.where(finite[..., np.newaxis, np.newaxis], companion, 0.0)) * scale
+    found = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
     return _by_size(found)
-
-
-def multiplied(first: Floats, second: Floats) -> Floats:
-    """Product of two polynomials, coefficients along the last axis."""
-    one, two = np.asarray(first), np.asarray(second)
-    shape = np.broadcast_shapes(one.shape[:-1], two.shape[:-1])
-    product = np.zeros((*shape, one.shape[-1] + two.shape[-1] - 1))
-    for i in range(two.shape[-1]):
-        product[..., i : i + one.shape[-1]] += one * two[..., i : i + 1]
-    return product
-
-
-def added(first: Floats, second: Floats) -> Floats:
-    """Sum of two polynomials, coefficients along the last axis."""
-    one, two = (first, second) if first.shape[-1] >= second.shape[-1] else (second, first)
-    total = np.array(np.broadcast_to(one, (*np.broadcast_shapes(one.shape[:-1], two.shape[:-1]), one.shape[-1])))
-    total[..., one.shape[-1] - two.shape[-1] :] += two
-    return total
 
 
 def _by_size(found: Complex) -> Complex:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
-from livebode.motion.model import Curve, MovingModel, basis
 from livebode.fitting.windows import scan
+from livebode.motion.model import Curve, MovingModel, basis
 from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]

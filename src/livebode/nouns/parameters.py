@@ -87,7 +87,7 @@ class Parameters:
     def sigma(self) -> Floats:
         """Standard deviation of each parameter, shape (rows, parameters)."""
         with np.errstate(invalid="ignore"):
-            return np.sqrt(np.einsum("rii->ri", self.covariance))
+            return np.asarray(np.sqrt(np.einsum("rii->ri", self.covariance)))
 
     def bound(self, probability: float = 0.95) -> Floats:
         """Half-width of the interval that holds the truth with this probability, shape (rows, parameters).
@@ -114,12 +114,15 @@ class Parameters:
         n, shape = self.value.shape[1], (len(self), len(names))
         value, covariance = np.full(shape, np.nan), np.full((*shape, len(names)), np.nan)
         if (ok := self.ok).any():
-            at = self.value[ok]
-            steps = np.maximum(np.abs(at), 1e-12)[:, np.newaxis] * (_STEP * np.eye(n))
+            at, sigma = self.value[ok], self.sigma[ok]
+            moving = np.flatnonzero((sigma > 0).any(axis=0))  # those that are held move nothing
+            # Of a parameter near zero, sigma says what a small step is.
+            size = _STEP * np.maximum(np.abs(at), sigma)[:, moving]
+            steps = size[..., np.newaxis] * np.eye(n)[moving]
             both = of(at[:, np.newaxis] + steps), of(at[:, np.newaxis] - steps)
-            slope = (both[0] - both[1]) / (2 * np.einsum("rii->ri", steps)[:, :, np.newaxis])
+            slope = (both[0] - both[1]) / (2 * size[..., np.newaxis])
             value[ok] = of(at)
-            covariance[ok] = slope.swapaxes(1, 2) @ self.covariance[ok] @ slope
+            covariance[ok] = slope.swapaxes(1, 2) @ self.covariance[ok][:, moving[:, np.newaxis], moving] @ slope
         return replace(self, names=tuple(names), units=tuple(units), value=value, covariance=covariance)
 
     @classmethod
