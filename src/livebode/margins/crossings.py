@@ -32,7 +32,8 @@ Side = Callable[[Complex], Floats]
 
 def gain_crossings(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
     """Where |L| = 1."""
-    return _found(loop, values, frequency_hz, grid, lambda x: np.log(np.abs(x)))
+    with np.errstate(divide="ignore"):  # a sampled loop may be nought at half the rate
+        return _found(loop, values, frequency_hz, grid, lambda x: np.log(np.abs(x)))
 
 
 def phase_crossings(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:

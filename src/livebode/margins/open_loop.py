@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.fitting.physical import Grid, Hold
+from livebode.fitting import Grid, PhysicalModel
+from livebode.fitting.physical import Hold
 from livebode.nouns import InputError, Loop, Model
 
 Floats = NDArray[np.float64]
@@ -19,14 +18,6 @@ _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150
 _POINTS_IN_A_PEAK = 3.0  # in half the width of a resonance
 _POINTS_MAX = 4000
-
-
-class Plant(Protocol):
-    """A model of the plant as `livebode.fitting` has it."""
-
-    def at(self, values: Any, grid: Grid) -> Complex:
-        """Response (..., lines) for values (..., parameters) at frequencies (lines,) or (..., lines)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -52,11 +43,11 @@ class OpenLoop:
         If the loop does not say what feeds back.
     """
 
-    plant: Plant
+    plant: PhysicalModel
     loop: Loop
     rate_hz: float
     hold: Hold = "zero-order"
-    filters: tuple[Model, ...] = field(default=())
+    filters: tuple[Model, ...] = ()
 
     def __post_init__(self) -> None:
         if self.loop.feedback is None:
@@ -75,11 +66,9 @@ class OpenLoop:
         return replace(self, filters=(*self.filters, extra))
 
     def unstable_poles(self, values: Floats) -> NDArray[np.int64]:
-        """Of the plant, for each row; 0 where the model does not tell."""
-        continuous: Callable[[Floats], Any] | None = getattr(self.plant, "continuous", None)
-        if continuous is None:
-            return np.zeros(len(values), dtype=np.int64)
-        return np.asarray(np.count_nonzero(continuous(values).poles().real > 0, axis=-1))
+        """Of the plant, for each row."""
+        poles = self.plant.continuous(values).poles()
+        return np.asarray(np.count_nonzero(poles.real > 0, axis=-1))
 
     def frequencies(self, values: Floats, band_hz: tuple[float, float]) -> Floats:
         """Frequencies up to half the rate that are dense enough for every crossing and peak of these rows.
@@ -99,10 +88,10 @@ class OpenLoop:
 
     def _peaks(self, values: Floats) -> list[tuple[Floats, Floats]]:
         """Frequency, Hz, and damping ratio of each mode and each pair of zeros, over the rows."""
-        names: tuple[str, ...] = getattr(self.plant, "derived_names", ())
+        names = self.plant.derived_names
         if not names:
             return []
-        derived = getattr(self.plant, "derived")(values)  # noqa: B009: not part of the Plant protocol
+        derived = self.plant.derived(values)
         column = {name: derived[..., i] for i, name in enumerate(names)}
         pairs = [(column[n], np.abs(column[f"{n}_damping"])) for n in names if f"{n}_damping" in column]
         return [(f[kept], z[kept]) for f, z in pairs if (kept := np.isfinite(f) & np.isfinite(z) & (f > 0)).any()]

@@ -56,7 +56,7 @@ def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
     plus, minus = loop.at(tried.reshape(-1, values.shape[1]), everywhere).reshape(2, len(f), free.size)
     by_parameter = np.zeros(values.shape, dtype=np.complex128)
     by_parameter[:, free] = np.log(plus / minus) / (2 * step) * sigma[:, free]
-    return Slopes(by_frequency, by_parameter)
+    return Slopes(np.asarray(by_frequency, dtype=np.complex128), by_parameter)
 
 
 def moved(residual: Floats, by: Floats) -> Floats:
