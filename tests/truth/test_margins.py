@@ -74,7 +74,8 @@ def test_peak_and_bandwidth_are_those_of_a_fine_comb(case: Case) -> None:
     assume(found.ok[0])
     f = np.geomspace(1e-2, 2000, 100_000)
     value = case.open.at(parameters(case.belt[np.newaxis]).value, f)[0]
-    assert found.of("peak_sensitivity")[0] == pytest.approx(np.max(1 / np.abs(1 + value)), rel=1e-5)
+    seen = np.max(1 / np.abs(1 + value))
+    assert seen * (1 - 1e-9) <= found.of("peak_sensitivity")[0] <= seen * (1 + 1e-3)
     below = np.flatnonzero(np.abs(value / (1 + value)) < 10 ** (-3 / 20))
     true = f[below[0]] if below.size else np.nan
     assert found.of("bandwidth")[0] == pytest.approx(true, rel=3e-4, nan_ok=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt, tan
+from math import atan, pi, sqrt, tan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -91,8 +91,18 @@ def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: fl
 
     With v = (f/f0 − f0/f)/2 its size squared is (v² + g²ζ²)/(v² + ζ²), which is g at v = √g·ζ. Its zeros are damped by
     `least_damping` at least: by as much as the resonance, so that it takes the peak away and leaves no dip beside it.
+
+    Raises
+    ------
+    InputError
+        If the range does not lie below half the rate.
     """
+    if not 0 < low_hz <= high_hz < rate_hz / 2:
+        raise InputError(
+            f"a notch over {low_hz:g} … {high_hz:g} Hz cannot run at {rate_hz:g} Hz; it must lie below half"
+        )
     share = 10 ** (-depth_db / 20)
-    centre_hz = sqrt(low_hz * high_hz)
-    edge = (high_hz / centre_hz - centre_hz / high_hz) / 2
+    low, high = tan(pi * low_hz / rate_hz), tan(pi * high_hz / rate_hz)  # as the bilinear transformation bends them
+    centre_hz = atan(sqrt(low * high)) * rate_hz / pi
+    edge = (sqrt(high / low) - sqrt(low / high)) / 2
     return notch(centre_hz, depth_db, max(edge / sqrt(share), least_damping / share), rate_hz)

@@ -134,8 +134,8 @@ def tuning(
     if not before.ok.all():
         return Tuning(
             "refused",
-            f"with {np.count_nonzero(~before.ok)} of {len(rows)} fits the loop would be unstable; where the machine runs, "
-            "the loop's description or the fit is wrong",
+            f"with {np.count_nonzero(~before.ok)} of {len(rows)} fits the loop would be unstable; where the machine "
+            "runs, the loop's description or the fit is wrong",
             before,
         )
     largest = float(np.max(ms + bound))
@@ -178,11 +178,11 @@ def worst(found: Margins) -> dict[str, float]:
     rows = found.value[found.ok]
     if not len(rows):
         return {}
-    found = {name: float(np.min(rows[:, i])) for i, name in enumerate(NAMES)}
+    least = {name: float(np.min(rows[:, i])) for i, name in enumerate(NAMES)}
     turn = rows[:, NAMES.index("phase_margin")]
-    found["phase_margin"] = float(turn[np.argmin(np.abs(turn))])
-    found["peak_sensitivity"] = float(np.max(rows[:, NAMES.index("peak_sensitivity")]))
-    return found
+    least["phase_margin"] = float(turn[np.argmin(np.abs(turn))])
+    least["peak_sensitivity"] = float(np.max(rows[:, NAMES.index("peak_sensitivity")]))
+    return least
 
 
 def _spread(fits: Parameters) -> Parameters:
