@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
-    from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, fit
+    from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
     from livebode.kernel import SlidingDFT
     from livebode.nouns import (
         PID,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
-    "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "fit"),
+    "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
     "kernel": ("SlidingDFT",),
     "nouns": (
         "PID",
@@ -73,12 +73,14 @@ __all__ = [
     "Parameters",
     "PhysicalModel",
     "PositionPD",
+    "Rational",
     "Response",
     "Responses",
     "Settings",
     "SlidingDFT",
     "Tracker",
     "fit",
+    "fit_rational",
     "multisine",
     "open_log",
     "recognise",

@@ -4,8 +4,9 @@ from livebode.fitting.chains import Rigid, ThreeMass, TwoMass
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response
 from livebode.fitting.models import MODELS, model_named
-from livebode.fitting.once import Fit, fit
+from livebode.fitting.once import Fit, fit, fit_of
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel
+from livebode.fitting.rational import Rational, fit_rational, rational_of
 from livebode.fitting.unknown_gain import TwoMassGain
 
 __all__ = [
@@ -15,11 +16,15 @@ __all__ = [
     "Grid",
     "Parameter",
     "PhysicalModel",
+    "Rational",
     "Rigid",
     "ThreeMass",
     "TwoMass",
     "TwoMassGain",
     "fit",
+    "fit_of",
+    "fit_rational",
     "mean_response",
     "model_named",
+    "rational_of",
 ]

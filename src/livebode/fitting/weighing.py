@@ -52,6 +52,13 @@ def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
     return epsilon_for(*squares(measured, response), dof)
 
 
+def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:
+    """Rows whose own ε is larger than this one."""
+    rest, noise, size = squares(measured, response)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _reduced(rest, noise, size, np.full(len(dof), epsilon**2)) > dof
+
+
 def chi_squared(rest: Floats, noise: Floats) -> Floats:
     """Σ 2·rest/noise over the lines whose noise is known, (rows,); NaN where none is."""
     known = noise > 0

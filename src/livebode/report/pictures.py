@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from livebode.nouns import Responses
+from livebode.nouns import Model, Responses
 from livebode.report.style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ def save_pictures(
     title: str = "",
     schedule_name: str = "",
     names: tuple[str, str] | None = None,
+    fitted: Model | None = None,
     dark: bool = False,
 ) -> list[Path]:
     """Write bode.png and tracking.png into an existing directory and return their paths; see the two figures.
@@ -35,7 +36,7 @@ def save_pictures(
     from livebode.report.tracking import tracking_figure
 
     pictures = {
-        "bode.png": bode_figure(responses, title=title, names=names, dark=dark),
+        "bode.png": bode_figure(responses, title=title, names=names, fitted=fitted, dark=dark),
         "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
     }
     return [_save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]

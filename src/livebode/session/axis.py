@@ -141,6 +141,20 @@ class LoopSection(_Section):
         return Gain(-self.entry_gain) * feedback
 
 
+class FitSection(_Section):
+    """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
+
+    model: str = "auto"
+    output: Literal["auto", "velocity", "position"] = "auto"
+    side: Literal["motor", "load"] | None = None
+    radius_m: Positive | None = None
+    inertia_ratio: Positive | None = None
+    fixed: dict[str, float] = {}
+    free: list[str] = []
+    band_hz: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    hold: Literal["zero-order", "none"] = "zero-order"
+
+
 class Axis(_Section):
     """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
 
@@ -149,6 +163,7 @@ class Axis(_Section):
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
+    fit: FitSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:

@@ -13,18 +13,20 @@ from typing import Any, Protocol
 import numpy as np
 
 from livebode.estimation import Settings, Tracker
+from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, InputError, Responses
+from livebode.nouns import Block, Channel, InputError, Model, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.fits import Fits
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
 from livebode.sources import open_log
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
-Draw = Callable[[Responses, Path, str], None]
+Draw = Callable[[Responses, Path, str, Model | None], None]
 
 
 class Source(Protocol):
@@ -42,11 +44,13 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: its directory, its summary as in run.json, and a thinned copy of its responses."""
+    """What a run came to: its directory, its summary as in run.json, a thinned copy of its responses, and the newest
+    fit that holds."""
 
     directory: Path
     summary: dict[str, Any]
     responses: Responses
+    fit: Fit | None = None
 
 
 def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
@@ -63,8 +67,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     progress
         Called after each block with samples done and in all (None where not known).
     draw
-        Called with the thinned responses, the directory before it is put in place, and the scheduling signal's name
-        with its unit, to add pictures.
+        Called with the thinned responses, the directory before it is put in place, the scheduling signal's name
+        with its unit, and the newest fit, to add pictures.
 
     Raises
     ------
@@ -76,7 +80,10 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     settings = make_settings(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started)
+    fits = None if axis.fit is None else Fits(axis.fit)
+    return record(
+        log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
+    )
 
 
 def record(
@@ -90,12 +97,13 @@ def record(
     draw: Draw,
     watch: Watch | None = None,
     started: float | None = None,
+    fits: Fits | None = None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
     `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
-    that is to count in the speed; `delivery` goes to the source's `blocks`.
+    that is to count in the speed; `fits` are made of every response; `delivery` goes to the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
@@ -105,6 +113,8 @@ def record(
         def publish(responses: Responses) -> None:
             overview.add(responses)
             out.write(responses)
+            if fits is not None:
+                fits.take(responses, out)
             if watch is not None:
                 watch(responses)
 
@@ -112,9 +122,12 @@ def record(
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
+        newest = None
+        if fits is not None:
+            newest, summary["fit"] = fits.newest(), fits.summary()
         out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(source, settings.schedule))
-    return Outcome(directory, summary, responses)
+        draw(responses, out.partial, _schedule_label(source, settings.schedule), newest)
+    return Outcome(directory, summary, responses, newest)
 
 
 def _track(
