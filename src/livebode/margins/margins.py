@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.nouns import InputError, Parameters
 from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
@@ -99,6 +99,30 @@ class Margins:
         from scipy.special import ndtri
 
         return np.asarray(self.sigma * float(ndtri(0.5 + probability / 2)))
+
+    def parameters(self) -> tuple[Parameters, ...]:
+        """For a table in long form: each margin and where it was read, with its place as status."""
+        empty = np.full(len(self), np.nan)
+        found = []
+        for i, (name, unit) in enumerate(zip(NAMES, UNITS)):
+            spread = np.stack([self.sigma[:, i], self.frequency_sigma_hz[:, i]], axis=1)
+            found.append(
+                Parameters(
+                    model="margins",
+                    names=(name, f"{name}_frequency"),
+                    units=(unit, "Hz"),
+                    value=np.stack([self.value[:, i], self.frequency_hz[:, i]], axis=1),
+                    covariance=np.einsum("rn,nm->rnm", spread**2, np.eye(2)),
+                    status=np.where(self.ok, self.place[:, i], self.status),
+                    epsilon=empty,
+                    chi2=empty,
+                    dof=empty,
+                    sample=self.sample,
+                    time_s=self.time_s,
+                    schedule=self.schedule,
+                )
+            )
+        return tuple(found)
 
     @classmethod
     def join(cls, parts: list[Margins]) -> Margins:

@@ -20,6 +20,7 @@ from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.fits import Fits
+from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
 from livebode.sources import open_log
@@ -80,7 +81,7 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     settings = make_settings(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    fits = None if axis.fit is None else Fits(axis.fit)
+    fits = None if axis.fit is None else Fits(axis.fit, settings.loop if settings.loop.feedback else None)
     return record(
         log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
     )
@@ -125,6 +126,9 @@ def record(
         newest = None
         if fits is not None:
             newest, summary["fit"] = fits.newest(), fits.summary()
+            if newest is not None and fits.loop is not None:
+                words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+                summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
         out.write_summary(summary)
         draw(responses, out.partial, _schedule_label(source, settings.schedule), newest)
     return Outcome(directory, summary, responses, newest)
