@@ -25,6 +25,7 @@ Complex = NDArray[np.complex128]
 
 _POINTS = 1200
 _DRAWS = 200  # of the fit's parameters, for the band
+_LOWEST_DEG = -460.0  # below it there is only the delay
 _REACH = 2.2  # of the Nyquist plot
 
 
@@ -126,10 +127,18 @@ def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, cur
     phase.set_ylabel("phase of L in degrees")
     phase.set_xlabel("frequency in Hz")
     bottom, top = np.min(_degrees(value)) - 20, np.max(_degrees(value)) + 20
-    phase.set_ylim(max(bottom, -800), top)
-    phase.set_yticks(np.arange(np.ceil(max(bottom, -800) / 90) * 90, top, 90))
+    phase.set_ylim(max(bottom, _LOWEST_DEG), top)
+    phase.set_yticks(np.arange(np.ceil(max(bottom, _LOWEST_DEG) / 90) * 90, top, 90))
     for axes in (magnitude, phase):
-        frequency_axis(axes, np.array([f[0], f[-1]]), labels=axes is phase)
+        frequency_axis(axes, _round_numbers(f[0], f[-1]), labels=axes is phase)
+
+
+def _round_numbers(low_hz: float, high_hz: float) -> Floats:
+    """Both ends, and 1, 2 and 5 of each decade between them."""
+    decades = np.arange(np.floor(np.log10(low_hz)), np.ceil(np.log10(high_hz)) + 1)
+    round_ones = np.outer(10.0**decades, [1, 2, 5]).ravel()
+    inside = round_ones[(round_ones > 1.2 * low_hz) & (round_ones < high_hz / 1.2)]
+    return np.concatenate([[low_hz], inside, [high_hz]])
 
 
 def _nyquist(axes: Axes, look: Style, found: Loop, f: Floats, value: Complex) -> None:

@@ -33,7 +33,7 @@ def validation_figure(found: Sequence[Validation], *, title: str = "", dark: boo
     """A row for each model: the last samples of the output, and the correlations over the lags.
 
     The band holds 97 % of what chance makes at a lag, the thin lines are 2.17/√L and 0.15. Lags that cannot tell a
-    wrong model are pale.
+    wrong model are thin.
     """
     look = style(dark)
     columns = 1 + max(len(v.correlations) for v in found)
@@ -76,7 +76,9 @@ def _correlation(axes: Axes, look: Style, c: Correlation, counts: bool, last: bo
     for level, dashes in ((c.white_limit, (4, 2)), (_SMALL, (1, 2))):
         for sign in (-1, 1):
             axes.axhline(sign * level, color=look.muted, linewidth=0.9, dashes=dashes)
-    axes.vlines(c.lags, 0, c.value, color=np.where(c.judged, look.run, look.nothing), linewidth=1.6)
+    axes.vlines(
+        c.lags, 0, c.value, color=np.where(c.judged, look.run, look.muted), linewidth=np.where(c.judged, 1.6, 0.6)
+    )
     outside = c.judged & (np.abs(c.value) > c.limit)
     axes.plot(c.lags[outside], c.value[outside], "o", markersize=3, color=look.newest)
     reach = 1.15 * max(_SMALL, float(np.max(np.abs(c.value))), float(np.max(c.limit)))
