@@ -1,5 +1,5 @@
 """The paper's experiments and ours on the simulated axis: `python -m studies`, or `make studies`."""
 
-from studies import budget, fig8_9, fig10, fig12, fig14
+from studies import budget, fig8_9, fig10, fig12, fig13, fig14, fits
 
-STUDIES = (fig8_9.STUDY, fig10.STUDY, fig12.STUDY, fig14.STUDY, budget.STUDY)
+STUDIES = (fig8_9.STUDY, fig10.STUDY, fig12.STUDY, fig13.STUDY, fig14.STUDY, fits.STUDY, budget.STUDY)

@@ -52,12 +52,14 @@ def minimise(
     for _ in range(rounds):
         tried, step = _stepped(now, state[1], state[2], damping, low, high)
         promised = -np.einsum("ri,ri->r", step, state[1]) / 2
-        settled |= (np.abs(step).max(axis=1) < tolerance) | ((promised >= 0) & (promised < enough))
+        last = (np.abs(step).max(axis=1) < tolerance) | ((promised >= 0) & (promised < enough))
+        last &= ~settled
+        now[last] = tried[last]
+        settled |= last
         if settled.all():
-            now = np.where(np.isfinite(tried), tried, now)
             break
         new = normal(tried)
-        better = (new[0] < state[0]) & ~settled if enough else new[0] < state[0]
+        better = (new[0] < state[0]) & ~settled
         if better.all():
             now, state = tried, new
         else:

@@ -77,8 +77,9 @@ def fit_rational(
     likelihood": least squares of (Ĝ − B/A)/sigma, started from it, unbiased to first order and best where the model is
     true. Where no sigma is known lines weigh by their size.
 
-    The covariance of the first two is that of noise by sigma through the linear equations. `chi2` by sigma alone,
-    `epsilon` what the model lacks, both of B/A; covariance takes ε in.
+    The covariance of the first two is that of noise by sigma through the linear equations; that of the third takes in
+    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true, since
+    they do not make it least.
 
     Parameters
     ----------
@@ -209,6 +210,7 @@ def _covariance(equations: _Equations, theta: Floats, weight: Floats, eps: Float
         entering = weight
     else:
         left, _ = _linear(equations, weight)
+        eps = np.where((measured.sigma > 0).any(axis=1), 0.0, eps)
         entering = weight * np.abs(_below(equations, theta))
     with np.errstate(divide="ignore", invalid="ignore"):
         deviation = np.where(measured.use, 1 / _noise_weights(measured, size, eps), 0.0)  # of each part

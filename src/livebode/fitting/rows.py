@@ -43,7 +43,8 @@ _REWEIGHTED, _SAME = 8, 0.01
 _SUSPICIOUS = 4.0  # of a reduced chi², ε and all
 _WARM_ROUNDS = 12
 _DOF_LEAST = 3.0
-_CONDITION_MAX = 1e12
+_CONDITION_MAX = 1e11
+_ROUNDING = 1e-14
 
 
 class Fitted(NamedTuple):
@@ -73,7 +74,7 @@ def fit_rows(
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
     """
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
-    if (dof > 0).all():
+    if dof.size and (dof > 0).all():
         return _fitted(problem, measured, noise_dof, start, epsilon, dof)
     some = np.flatnonzero(dof > 0)
     whole = _none(problem, measured, dof)
@@ -207,9 +208,10 @@ def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floa
     with np.errstate(all="ignore"):
         scale = np.sqrt(np.einsum("rii->ri", matrix))
         scaled = matrix / (scale[:, :, np.newaxis] * scale[:, np.newaxis])
-        usable = np.isfinite(scaled).all(axis=(1, 2))
-        usable[usable] = np.linalg.cond(scaled[usable]) < _CONDITION_MAX
-        inverse = np.full(matrix.shape, np.nan)
-        inverse[usable] = np.linalg.inv(scaled[usable])
+        unit = np.eye(matrix.shape[-1])
+        finite = np.isfinite(scaled).all(axis=(1, 2))
+        inverse = np.linalg.inv(np.where(finite[:, np.newaxis, np.newaxis], scaled, unit) + _ROUNDING * unit)
+        held = finite & (np.abs(inverse).max(axis=(1, 2)) < _CONDITION_MAX)
+        inverse[~held] = np.nan
         inverse /= scale[:, :, np.newaxis] * scale[:, np.newaxis]
     return np.asarray(inverse @ scattered @ inverse)
