@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SAMPLES, LAGS = 3000, 40
+FITTED_SAMPLES = 20_000
 RUNS, SHORT = 1000, 30
 BEFORE = 1000  # samples of each run that are left out: its noise's start
 LINES = Lines.parse("20:140:20", RATE_HZ, 400)
@@ -31,9 +32,9 @@ PAPER = (
 )
 
 
-def runs(count: int, seed: int, amplitude: float = 1.0, colour: float = 0.0) -> Floats:
-    """w, u, y of as many runs of the closed loop at standstill, shape (runs, 3, SAMPLES)."""
-    rng, total = np.random.default_rng(seed), SAMPLES + BEFORE
+def runs(count: int, seed: int, amplitude: float = 1.0, colour: float = 0.0, samples: int = SAMPLES) -> Floats:
+    """w, u, y of as many runs of the closed loop at standstill, shape (runs, 3, samples)."""
+    rng, total = np.random.default_rng(seed), samples + BEFORE
     noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal((total, count)), axis=0) * SIGMA
     drive = Drive()
     state = np.tile(drive.settled(amplitude * EXCITATION), (count, 1))
@@ -54,11 +55,11 @@ def true_model(stiffness: float = 1.0) -> Fit:
     return fit(exact, "two-mass", radius_m=0.019)
 
 
-def fitted_model(seed: int) -> Fit:
-    """The same fitted to another run of as many samples, as the tracker saw it."""
-    block = Block(runs(1, seed)[0], ("w", "u", "y"), RATE_HZ)
+def fitted_models(count: int) -> list[Fit]:
+    """The same fitted to other runs, as the tracker saw them."""
     settings = Settings(lines=LINES, excitation="w", input="u", output="y", average=True, forgetting=1.0)
-    return fit(Tracker(settings).process(block)[-1], "two-mass", radius_m=0.019)
+    blocks = (Block(columns, ("w", "u", "y"), RATE_HZ) for columns in runs(count, 4, samples=FITTED_SAMPLES))
+    return [fit(Tracker(settings).process(block)[-1], "two-mass", radius_m=0.019) for block in blocks]
 
 
 def judge(model: Fit, columns: Floats) -> Validation:
@@ -89,7 +90,7 @@ def measure(short: bool = False) -> Result:
     count = SHORT if short else RUNS
     strong, weak = runs(count, 1), runs(count, 2, WEAK)
     coloured = runs(count, 3, WEAK, colour=0.7)
-    fits = [fitted_model(1000 + i) for i in range(count // 10)]
+    fits = fitted_models(count // 10)
     cases = {
         "true model": [judge(true_model(), c) for c in strong],
         "true model, w 0.02 of it": [judge(true_model(), c) for c in weak],
@@ -125,6 +126,7 @@ def _verdicts(cases: dict[str, list[Validation]], found: dict[str, dict[str, flo
         "fitted to another run",
     )
     why = "the runs are few, or the limit is wrong"
+    wide = "the tracker's sigma beside the resonance is too high (estimators.md), and the room made for the fit with it"
     fails = told("Keff 10 % wrong", "fails")
     return [
         Verdict(
@@ -132,7 +134,7 @@ def _verdicts(cases: dict[str, list[Validation]], found: dict[str, dict[str, flo
         ),
         Verdict("the same in a loop that the noise rules", off(noisy, *plain), 1.0, why=why),
         Verdict("coloured residual, w, widened limit: points from 97 %", off(coloured, "w"), 1.0, why=why),
-        Verdict("fitted to another run, widened limit: points from 97 %", off(other, *white), 1.0, why=why),
+        Verdict("fitted to another run, widened limit: points from 97 %", off(other, *white), 1.0, why=wide),
         Verdict("true models that pass, %", told("true model", "passes"), 96.0, at_least=True, why=why),
         Verdict("fitted models that pass, %", told(other, "passes"), 96.0, at_least=True, why=why),
         Verdict("models with Keff 10 % wrong that fail, %", fails, 99.0, at_least=True, why=why),
