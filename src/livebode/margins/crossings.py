@@ -27,30 +27,42 @@ class Crossings(NamedTuple):
     open_loop: Complex
 
 
-Side = Callable[[Complex], Floats]
+class Kind(NamedTuple):
+    """What changes its sign at a crossing, and which changes count."""
+
+    side: Callable[[Complex], Floats]
+    counts: Callable[[Complex], NDArray[np.bool_]]
 
 
-def gain_crossings(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
-    """Where |L| = 1."""
+def _everywhere(value: Complex) -> NDArray[np.bool_]:
+    return np.ones(value.shape, dtype=np.bool_)
+
+
+GAIN = Kind(lambda x: np.log(np.abs(x)), _everywhere)
+PHASE = Kind(lambda x: np.asarray(x.imag), lambda x: x.real < 0)
+CLOSED = Kind(lambda x: np.log(np.abs(x / (1 + x)) / BANDWIDTH), _everywhere)
+_KINDS = (GAIN, PHASE, CLOSED)
+
+
+def crossings(
+    loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex
+) -> tuple[Crossings, Crossings, Crossings]:
+    """Where |L| = 1, where L is a negative number, and where |T| = |L/(1 + L)| first falls 3 dB below one.
+
+    Half the rate, where a sampled loop is real, is a crossing of the second kind if L is negative there. A row whose
+    |T| begins below has no bandwidth.
+    """
     with np.errstate(divide="ignore"):  # a sampled loop may be nought at half the rate
-        return _found(loop, values, frequency_hz, grid, lambda x: np.log(np.abs(x)))
-
-
-def phase_crossings(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
-    """Where L is a negative number; also half the rate, where a sampled loop is real, if it is negative there."""
-    found = _found(loop, values, frequency_hz, grid, lambda x: np.asarray(x.imag), lambda x: x.real < 0)
+        at_gain, at_phase = (_changes(grid, kind) for kind in (GAIN, PHASE))
+    below = np.abs(grid / (1 + grid)) < BANDWIDTH
+    first = np.argmax(below, axis=1)
+    row = np.flatnonzero((first > 0) & below[np.arange(len(grid)), first])
+    starts = [at_gain, at_phase, (row, first[row] - 1)]
+    found = _roots(loop, values, frequency_hz, starts)
     last = np.flatnonzero(grid[:, -1].real < 0)
     ends = Crossings(last, np.full(last.size, frequency_hz[-1]), grid[last, -1])
-    return Crossings(*(np.concatenate(parts) for parts in zip(found, ends)))
-
-
-def bandwidth_crossings(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
-    """Where |T| = |L/(1 + L)| first falls 3 dB below one; none for a row whose |T| begins below."""
-    closed = np.abs(grid / (1 + grid))
-    below = closed < BANDWIDTH
-    at = np.argmax(below, axis=1)
-    row = np.flatnonzero((at > 0) & below[np.arange(len(grid)), at])
-    return _between(loop, values, frequency_hz, row, at[row] - 1, lambda x: np.log(np.abs(x / (1 + x)) / BANDWIDTH))
+    phase = Crossings(*(np.concatenate(parts) for parts in zip(found[1], ends)))
+    return found[0], phase, found[2]
 
 
 def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
@@ -75,38 +87,39 @@ def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, g
     return Crossings(row, frequency, _one(loop, values, frequency, row))
 
 
-def _found(
-    loop: OpenLoop,
-    values: Floats,
-    frequency_hz: Floats,
-    grid: Complex,
-    side: Side,
-    counts: Callable[[Complex], NDArray[np.bool_]] | None = None,
-) -> Crossings:
-    """Every place where `side` changes its sign and `counts` holds."""
-    sign = side(grid) > 0
+Starts = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+def _changes(grid: Complex, kind: Kind) -> Starts:
+    """Row and grid point before every change of sign that counts.
+
+    At half the rate L is real but for rounding, and its sign there says nothing.
+    """
+    sign = kind.side(grid) > 0
     row, at = np.nonzero(sign[:, 1:] != sign[:, :-1])
-    if counts is not None:
-        # At half the rate L is real but for rounding; its sign there says nothing, and the end is counted by itself.
-        kept = counts(grid[row, at]) & (at < len(frequency_hz) - 2)
-        row, at = row[kept], at[kept]
-    return _between(loop, values, frequency_hz, row, at, side)
+    kept = kind.counts(grid[row, at])
+    if kind is PHASE:
+        kept &= at < grid.shape[1] - 2
+    return row[kept], at[kept]
 
 
-def _between(
-    loop: OpenLoop, values: Floats, frequency_hz: Floats, row: NDArray[np.int64], at: NDArray[np.int64], side: Side
-) -> Crossings:
-    """The roots of `side` between neighbours of the grid."""
-    if not row.size:
-        return Crossings(row, np.zeros(0), np.zeros(0, dtype=np.complex128))
+def _roots(loop: OpenLoop, values: Floats, frequency_hz: Floats, starts: list[Starts]) -> list[Crossings]:
+    """The roots between neighbours of the grid; all kinds at once, for it is the number of calls that costs."""
     from scipy.optimize import elementwise
 
-    def value(x: Floats, i: Any) -> Floats:
-        return side(_one(loop, values, x, i.astype(np.int64)))
+    row, at = (np.concatenate(part) for part in zip(*starts))
+    kind = np.repeat(np.arange(len(starts)), [len(r) for r, _ in starts])
+    if not row.size:
+        return [Crossings(row, np.zeros(0), np.zeros(0, dtype=np.complex128))] * len(starts)
 
-    ends = frequency_hz[at], frequency_hz[at + 1]
-    root = elementwise.find_root(value, ends, args=(row.astype(float),), tolerances={"xrtol": _TOLERANCE})
-    return Crossings(row, root.x, _one(loop, values, root.x, row))
+    def value(x: Floats, row: Any, kind: Any) -> Floats:
+        found = _one(loop, values, x, row.astype(np.int64))
+        return np.asarray(np.choose(kind.astype(np.int64), [k.side(found) for k in _KINDS]))
+
+    ends, about = (frequency_hz[at], frequency_hz[at + 1]), (row.astype(float), kind.astype(float))
+    root = elementwise.find_root(value, ends, args=about, tolerances={"xrtol": _TOLERANCE})
+    level = _one(loop, values, root.x, row)
+    return [Crossings(row[of], root.x[of], level[of]) for of in (kind == i for i in range(len(starts)))]
 
 
 def _one(loop: OpenLoop, values: Floats, frequency_hz: Floats, row: NDArray[np.int64]) -> Complex:

@@ -7,16 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.margins.crossings import (
-    Crossings,
-    bandwidth_crossings,
-    gain_crossings,
-    nearest_to_minus_one,
-    phase_crossings,
-)
+from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
 from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.open_loop import OpenLoop
-from livebode.margins.slopes import Fits, moved, peak_moved, slopes
+from livebode.margins.slopes import Fits, Slopes, moved, peak_moved, slopes
 from livebode.margins.stability import stable
 from livebode.nouns import InputError, Parameters
 
@@ -108,8 +102,8 @@ def _read(
     if not steady.any():
         return
     rows, values, covariance, grid = rows[steady], values[steady], covariance[steady], grid[steady]
-    crossing_of = (gain_crossings, phase_crossings, nearest_to_minus_one, bandwidth_crossings)
-    at_gain, at_phase, at_peak, at_bandwidth = (of(loop, values, f, grid) for of in crossing_of)
+    at_gain, at_phase, at_bandwidth = crossings(loop, values, f, grid)
+    at_peak = nearest_to_minus_one(loop, values, f, grid)
     size = np.log(np.abs(at_phase.open_loop))
     turn_deg = np.degrees(np.angle(-at_gain.open_loop))
     late_ms = np.degrees(np.angle(-at_gain.open_loop) % (2 * np.pi)) / 360e-3 / at_gain.frequency_hz
@@ -124,8 +118,12 @@ def _read(
     sigma = np.sqrt(np.einsum("rii->ri", covariance))
     unit = np.where(sigma > 0, sigma, 1.0)
     correlation = covariance / unit[:, :, np.newaxis] / unit[:, np.newaxis]
+    fits = Fits(values, sigma)
+    everywhere = slopes(loop, fits, Crossings(*(np.concatenate(parts) for parts in zip(*chosen))))
+    ends = np.cumsum([0, *(len(at.row) for at in chosen)])
     for column, at in enumerate(chosen):
-        _write(found, rows, column, at, _READING[column](loop, Fits(values, sigma), at), correlation)
+        reading = _READING[column](loop, fits, at, everywhere.part(slice(ends[column], ends[column + 1])))
+        _write(found, rows, column, at, reading, correlation)
     place = np.where((found.frequency_hz >= band[0]) & (found.frequency_hz <= band[1]), INTERPOLATED, EXTRAPOLATED)
     found.place[rows] = np.where(np.isnan(found.frequency_hz[rows]), NONE, place[rows])
 
@@ -161,46 +159,46 @@ def _nearest(places: Crossings, cost: Floats, counts: NDArray[np.bool_] | None =
 Reading = tuple[Floats, Floats, Floats]
 
 
-def _gain(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
+def _gain(loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
     """−|L| in dB where L is negative. At half the rate, the place itself stays."""
-    by_f, by = slopes(loop, fits, at)
+    by_f, by = along
     by_log_f = moved(by_f.imag, by.imag)
     by_log_f[at.frequency_hz >= loop.rate_hz / 2] = 0.0
     moving = by.real + by_f.real[:, np.newaxis] * by_log_f
     return -_DB * np.log(np.abs(at.open_loop)), -_DB * moving, by_log_f
 
 
-def _reduction(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
-    value, by, by_log_f = _gain(loop, fits, at)
+def _reduction(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    value, by, by_log_f = _gain(loop, fits, at, along)
     return -value, -by, by_log_f
 
 
-def _phase(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
+def _phase(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
     """Angle of −L where |L| = 1, deg."""
-    by_f, by = slopes(loop, fits, at)
+    by_f, by = along
     by_log_f = moved(by_f.real, by.real)
     turn = np.degrees(np.angle(-at.open_loop))
     return turn, np.degrees(by.imag + by_f.imag[:, np.newaxis] * by_log_f), by_log_f
 
 
-def _delay(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
+def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
     """The delay that turns L to −1 where |L| = 1, ms."""
-    turn, by_turn, by_log_f = _phase(loop, fits, at)
+    turn, by_turn, by_log_f = _phase(loop, fits, at, along)
     late = (turn % 360) / 360e-3 / at.frequency_hz
     by = by_turn / 360e-3 / at.frequency_hz[:, np.newaxis] - late[:, np.newaxis] * by_log_f
     return late, by, by_log_f
 
 
-def _peak(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
+def _peak(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
     """1/|1 + L| where it is largest; to first order the place does not matter."""
     largest = 1 / np.abs(1 + at.open_loop)
     closed = at.open_loop / (1 + at.open_loop)
-    by = -largest[:, np.newaxis] * (closed[:, np.newaxis] * slopes(loop, fits, at).by_parameter).real
+    by = -largest[:, np.newaxis] * (closed[:, np.newaxis] * along.by_parameter).real
     return largest, by, peak_moved(loop, fits, at)
 
 
-def _bandwidth(loop: OpenLoop, fits: Fits, at: Crossings) -> Reading:
-    by_f, by = slopes(loop, fits, at)
+def _bandwidth(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    by_f, by = along
     sensitivity = 1 / (1 + at.open_loop)
     by_log_f = moved((sensitivity * by_f).real, (sensitivity[:, np.newaxis] * by).real)
     return at.frequency_hz, at.frequency_hz[:, np.newaxis] * by_log_f, by_log_f

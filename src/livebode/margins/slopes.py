@@ -34,6 +34,9 @@ class Slopes(NamedTuple):
     by_frequency: Complex
     by_parameter: Complex
 
+    def part(self, places: slice) -> Slopes:
+        return Slopes(self.by_frequency[places], self.by_parameter[places])
+
 
 def slopes(loop: OpenLoop, fits: Fits, at: Crossings) -> Slopes:
     """Central differences of ln L where `at` says; by frequency one-sided at half the rate."""
@@ -42,20 +45,20 @@ def slopes(loop: OpenLoop, fits: Fits, at: Crossings) -> Slopes:
 
 def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
     """For one row of fits and one frequency each. A parameter without variance is not moved: it may not bear it."""
-    f = frequency_hz[:, np.newaxis]
-    above = np.minimum(f * (1 + _STEP), loop.rate_hz / 2)
-    below = f * (1 - _STEP)
-    moved = np.log(loop.at(fits.values, above) / loop.at(fits.values, below))[:, 0]
-    by_frequency = moved / np.log(above / below)[:, 0]
     values, sigma = fits
+    places, n = values.shape
+    above, below = np.minimum(frequency_hz * (1 + _STEP), loop.rate_hz / 2), frequency_hz * (1 - _STEP)
     free = np.flatnonzero(np.any(sigma > 0, axis=0))
     step = np.maximum(_OF_SIGMA * sigma, _OF_VALUE * np.abs(values))[:, free]
-    shifts = step[:, :, np.newaxis] * np.eye(values.shape[1])[free]
-    tried = np.stack([values[:, np.newaxis] + shifts, values[:, np.newaxis] - shifts])
-    everywhere = np.broadcast_to(f[np.newaxis], (2, len(f), free.size)).reshape(-1, 1)
-    plus, minus = loop.at(tried.reshape(-1, values.shape[1]), everywhere).reshape(2, len(f), free.size)
+    shifts = (step[:, :, np.newaxis] * np.eye(n)[free]).swapaxes(0, 1)
+    # All in one go: for few places it is the number of calls that costs.
+    tried = np.concatenate([values[np.newaxis], values[np.newaxis], values + shifts, values - shifts])
+    at_hz = np.concatenate([above, below, np.tile(frequency_hz, 2 * free.size)])
+    found = loop.at(tried.reshape(-1, n), at_hz[:, np.newaxis]).reshape(len(tried), places)
+    by_frequency = np.log(found[0] / found[1]) / np.log(above / below)
+    plus, minus = found[2 : 2 + free.size], found[2 + free.size :]
     by_parameter = np.zeros(values.shape, dtype=np.complex128)
-    by_parameter[:, free] = np.log(plus / minus) / (2 * step) * sigma[:, free]
+    by_parameter[:, free] = np.log(plus / minus).T / (2 * step) * sigma[:, free]
     return Slopes(np.asarray(by_frequency, dtype=np.complex128), by_parameter)
 
 
@@ -71,9 +74,9 @@ def peak_moved(loop: OpenLoop, fits: Fits, at: Crossings) -> Floats:
     found = np.full((len(at.row), fits.values.shape[1]), np.nan)
     if inside.any():
         f, row = at.frequency_hz[inside], at.row[inside]
-        around = [_distance_slopes(loop, fits.of(row), f * np.exp(step)) for step in (-_PEAK_STEP, _PEAK_STEP)]
-        curvature, mixed = (after - before for before, after in zip(*around))
-        found[inside] = moved(curvature, mixed)
+        both = np.concatenate([f * np.exp(-_PEAK_STEP), f * np.exp(_PEAK_STEP)])
+        by_f, by = _distance_slopes(loop, fits.of(np.tile(row, 2)), both)
+        found[inside] = moved(by_f[len(f) :] - by_f[: len(f)], by[len(f) :] - by[: len(f)])
     return found
 
 
