@@ -11,13 +11,14 @@ from livebode import Block, Parameters, Responses, Settings, Tracker
 from livebode.fitting import Fitter, Grid, TwoMass
 from livebode.fitting.problem import Measured, Problem
 from livebode.motion import MotionCorrection
-from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
+from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from studies.common import EXCITATION, RATE_HZ, SIGMA, WINDOW, Floats, Result, Study, Table, Verdict, lines, rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RUNS, PERIODS, PLACE_M = 1000, 30, 0.8
+RUNS, PERIODS, PLACE_M = 1000, (30, 10), 0.8
+FORCES_N = (0.0, 2.0, 5.0, 15.0)
 NAMES = ("Js", "mL", "Keff", "bs")
 MODEL = TwoMass(radius_m=0.019)
 FROZEN = Mechanics(frozen_position_m=PLACE_M)
@@ -29,9 +30,9 @@ PAPER = (
 )
 
 
-def standing(runs: int) -> Parameters:
-    """Fits of the two masses to averages over 30 periods, one run after the other, in the periodic state."""
-    span = PERIODS * WINDOW
+def standing(runs: int, periods: int = PERIODS[0]) -> Parameters:
+    """Fits of the two masses to averages over `periods`, one run after the other, in the periodic state."""
+    span = periods * WINDOW
     lead = round(10 * RATE_HZ)
     axis = BeltAxis(
         mechanics=FROZEN, motion=Standstill(position_m=PLACE_M), excitation_n_m=EXCITATION,
@@ -47,11 +48,11 @@ def standing(runs: int) -> Parameters:
     return Fitter(MODEL).process(Responses.join(found))
 
 
-def least_variance() -> Floats:
+def least_variance(periods: int = PERIODS[0]) -> Floats:
     """Cramér–Rao bound of the logarithms of Js, mL, Keff, bs: white noise on y makes sigma² = N·σ²/|U|² a period."""
     grid = Grid.of(lines())
     u = np.abs(BeltAxis(mechanics=FROZEN).closed_loop(PLACE_M).responses(grid.frequency_hz)[1]) * WINDOW / 2
-    sigma = np.sqrt(WINDOW / PERIODS) * SIGMA / u
+    sigma = np.sqrt(WINDOW / periods) * SIGMA / u
     exact = Measured(MODEL.at(TRUTH, grid)[np.newaxis], sigma[np.newaxis], np.ones((1, sigma.size), dtype=bool))
     solution, _ = Problem(MODEL, grid).solve(exact, np.sqrt(2) / exact.sigma, TRUTH[np.newaxis])
     left = np.sqrt(2) / sigma[:, np.newaxis] * solution.slope[0]
@@ -77,14 +78,53 @@ def moving(seed: int) -> tuple[Parameters, BeltAxis]:
     return found[(responses.first >= first) & (responses.sample <= full[-1])], axis
 
 
-def measure(short: bool = False) -> Result:
-    still = standing(60 if short else RUNS)
+def at_standstill(runs: int, periods: int) -> tuple[Floats, Floats, Floats]:
+    """Errors over sigma (runs, 4), mean square errors over the least variance, coverage of the 95 % bounds."""
+    still = standing(runs, periods)
     z = (still.value - TRUTH)[:, :4] / still.sigma[:, :4]
-    ratio = np.nanmean(np.log(still.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance()
-    cover = np.mean(np.abs(z) <= ndtri(0.975), axis=0)
-    rows = [(n, float(r), float(100 * c)) for n, r, c in zip(NAMES, ratio, cover)]
-    caption = f"Standstill, {len(still)} runs of 3 s: mean square error over the Cramér–Rao bound, and coverage"
-    tables = [Table(caption, ("parameter", "over the bound", "coverage of 95 % bounds, %"), rows)]
+    ratio = np.nanmean(np.log(still.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance(periods)
+    return z, ratio, np.mean(np.abs(z) <= ndtri(0.975), axis=0)
+
+
+def rubbing(short: bool) -> Table:
+    """Single windows at standstill under Coulomb friction of the cart."""
+    rows = []
+    for force in FORCES_N[::3] if short else FORCES_N:
+        axis = BeltAxis(
+            motion=Standstill(position_m=PLACE_M), excitation_n_m=EXCITATION, friction=Friction(load_coulomb_n=force),
+            sensor=Sensor(noise_rad_per_s=SIGMA), seconds=4.0, seed=1,
+        )  # fmt: skip
+        settings = Settings(lines=lines(), output="velocity", input="u", excitation="w", hop=80, noise="quiet")
+        responses = Tracker(settings).process(SimulatedAxis(axis).run()[0])[60:]
+        truth = MODEL.at(TRUTH, Grid.of(lines()))
+        db = 20 * np.log10(np.abs(responses.value.mean(axis=0) / truth))
+        found = Fitter(MODEL).process(responses)
+        keff = f"{100 * (np.median(found['Keff'][found.ok]) / TRUTH[2] - 1):+.1f}" if found.ok.any() else "none"
+        rows.append((force, float(np.abs(db).max()), *shares(found.ok, found.status == "friction"), keff))
+    header = (
+        "friction, N",
+        "largest error of \\|G\\|, dB",
+        "fits that hold, %",
+        "status friction, %",
+        "Keff of those that hold, %",
+    )
+    return Table("Standstill under dry friction of the cart, single windows", header, rows)
+
+
+def shares(*which: np.ndarray) -> tuple[float, ...]:
+    return tuple(100 * float(np.mean(w)) for w in which)
+
+
+def measure(short: bool = False) -> Result:
+    runs = 60 if short else RUNS
+    z, ratio, cover = at_standstill(runs, PERIODS[0])
+    _, *fewer = at_standstill(runs, PERIODS[1])
+    rows = [(n, *(float(x) for x in row)) for n, *row in zip(NAMES, ratio, 100 * cover, fewer[0], 100 * fewer[1])]
+    caption = (
+        f"Standstill, about {runs} runs: mean square error over the Cramér–Rao bound, coverage of 95 % bounds in %"
+    )
+    header = [f"{what}, {p} windows" for p in PERIODS for what in ("over the bound", "coverage")]
+    tables = [Table(caption, ("parameter", *header), rows)]
     worst = float(np.max(np.abs(cover - 0.95)))
     verdicts = [
         Verdict("standstill: worst variance of Js, mL, Keff, bs over the Cramér–Rao bound", float(ratio.max()), 1.2),
@@ -95,13 +135,13 @@ def measure(short: bool = False) -> Result:
         found, axis = moving(seed)
         m = axis.mechanics
         keff, js = found["Keff"] / m.stiffness_at(found.schedule), found["Js"] / m.inertia_kg_m2
-        errors.append(
-            (seed, 100 * float(rms(keff[found.ok] - 1)), 100 * float(rms(js[found.ok] - 1)), float(np.mean(found.ok)))
-        )
+        held = np.abs(found["Keff"] - m.stiffness_at(found.schedule)) <= found.bound()[:, found.index("Keff")]
+        errors.append((seed, *(100 * float(rms(x[found.ok] - 1)) for x in (keff, js)), *shares(found.ok, held)))
         if seed == 0:
             curves |= {"stroke": found, "stiffness": m.stiffness_at(found.schedule), "inertia": m.inertia_kg_m2}
-    header = ("seed", "Keff, rms in %", "Js, rms in %", "share of fits that hold")
-    tables.append(Table("One window of 100 ms along a stroke at 0.38 m/s, corrected", header, errors))
+    along = ("seed", "Keff, rms in %", "Js, rms in %", "fits that hold, %", "Keff within its 95 % bound, %")
+    tables.append(Table("One window of 100 ms along a stroke at 0.38 m/s, corrected", along, errors))
+    tables.append(rubbing(short))
     keff, js = (float(rms(np.array([e[i] for e in errors]))) for i in (1, 2))
     verdicts += [
         Verdict("stroke: Keff of a window, rms in %", keff, 0.65),

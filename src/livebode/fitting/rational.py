@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from livebode.fitting.fitter import measured_of
-from livebode.fitting.hold import to_continuous
 from livebode.fitting.once import as_row
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
-from livebode.fitting.transfer import Transfer
 from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
 from livebode.nouns import InputError, Parameters, Response, Responses
 from livebode.nouns.parameters import OK
@@ -25,38 +22,6 @@ Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 _ROUNDS = 20
 _SETTLED = 1e-9
 _ORDER_MAX = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Rational:
-    """B(z)/A(z) with coefficients from the highest power on, at a rate; a Model.
-
-    Examples
-    --------
-    >>> integrator = Rational(np.array([0.01]), np.array([1.0, -1.0]), rate_hz=100.0)
-    >>> abs(integrator.response(5.0)).round(4), integrator.continuous().numerator.round(6)
-    (np.float64(0.032), array([1.]))
-    """
-
-    numerator: Floats
-    denominator: Floats
-    rate_hz: float
-
-    def response(self, frequency_hz: ArrayLike) -> Complex:
-        z = np.exp(2j * np.pi * np.asarray(frequency_hz, dtype=np.float64) / self.rate_hz)
-        return np.asarray(np.polyval(self.numerator, z) / np.polyval(self.denominator, z))
-
-    def continuous(self) -> Transfer:
-        """The system in s behind a zero-order hold that this samples; see `to_continuous`."""
-        return to_continuous(self.numerator, self.denominator, self.rate_hz)
-
-    def to_control(self) -> Any:
-        """python-control TransferFunction in z (extra `control`)."""
-        try:
-            import control
-        except ImportError:
-            raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
-        return control.tf(self.numerator, self.denominator, 1 / self.rate_hz)
 
 
 class _Equations(NamedTuple):
@@ -78,8 +43,7 @@ def fit_rational(
     true. Where no sigma is known lines weigh by their size.
 
     The covariance of the first two is that of noise by sigma through the linear equations; that of the third takes in
-    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true, since
-    they do not make it least.
+    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true.
 
     Parameters
     ----------
@@ -119,13 +83,6 @@ def fit_rational(
     equations = _Equations(lines.z[:, np.newaxis] ** np.arange(q + 1), m + 1, found)
     names = tuple([f"b{i}" for i in range(m + 1)] + [f"a{i}" for i in range(q)])
     return _fitted(equations, method, names, responses)
-
-
-def rational_of(parameters: Parameters, row: int, rate_hz: float) -> Rational:
-    """One row of what `fit_rational` gave, as a Model."""
-    m = sum(name.startswith("b") for name in parameters.names)
-    value = parameters.value[row]
-    return Rational(value[:m][::-1], np.concatenate([[1.0], value[m:][::-1]]), rate_hz)
 
 
 def _fitted(equations: _Equations, method: Method, names: tuple[str, ...], responses: Responses) -> Parameters:
