@@ -91,14 +91,14 @@ def test_a_true_model_passes_in_the_loop(colour: float) -> None:
 
 def test_in_a_loop_lags_at_which_the_residual_comes_first_are_not_for_judging() -> None:
     """What the study's table says: ŷ before the noise is fine, ŷ after it is made of the noise."""
-    found = [judged(fitted(1e-6), columns) for columns in loop(100, 0.02)[:60]]
+    found = [judged(fitted(1e-6), columns) for columns in loop(100, 0.02)[:30]]
     before = np.mean([np.abs(v.correlations[1].value[:LAGS]) <= v.correlations[1].limit[:LAGS] for v in found])
     assert before < 0.9
 
 
 def test_the_limits_make_room_for_a_fit_that_is_itself_uncertain() -> None:
-    """80 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
-    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(100)[:80])]
+    """60 fits to noisy lines, each on fresh data: without its covariance many lags would lie outside."""
+    found = [judged(fitted(0.08, seed), columns) for seed, columns in enumerate(loop(100)[:60])]
     share = np.mean([v.correlations[2].share for v in found])
     assert share == pytest.approx(0.97, abs=0.02)
     assert np.mean([v.correlations[2].white_share for v in found]) < share - 0.1

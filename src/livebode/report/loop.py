@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _POINTS = 1200
-_DRAWS = 200  # of the fit's parameters, for the band
+_DRAWS = 100  # of the fit's parameters, for the band
 _LOWEST_DEG = -460.0  # below it there is only the delay
 _REACH = 2.2  # of the Nyquist plot
 
