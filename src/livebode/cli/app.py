@@ -15,7 +15,9 @@ from livebode.cli.demo_command import demo_command
 from livebode.cli.export_command import export_command
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
+from livebode.cli.margins_command import margins_command
 from livebode.cli.run_command import run_command
+from livebode.cli.validate_command import validate_command
 from livebode.nouns import InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -31,6 +33,8 @@ app.command("fit")(fit_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
 app.command("export")(export_command)
+app.command("margins")(margins_command)
+app.command("validate")(validate_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -164,7 +164,7 @@ def _scales(look: Style, summary: Summary, *panels: Axes) -> None:
     for axes in panels:
         plain(axes)
         axes.yaxis.set_label_coords(-0.066, 0.5)
-        _frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
+        frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
     panels[-1].set_xlabel("frequency in Hz")
     _limits(magnitude, summary.magnitude_db, _newest_db(summary), room=3.0)
     low_deg, high_deg = _limits(phase, summary.phase_deg, _newest_deg(summary), room=10.0)
@@ -178,7 +178,7 @@ def _scales(look: Style, summary: Summary, *panels: Axes) -> None:
             axes.set_yticks([])
 
 
-def _frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
+def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
     """Logarithmic frequency with plain numbers."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullFormatter
 

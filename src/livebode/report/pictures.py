@@ -39,10 +39,11 @@ def save_pictures(
         "bode.png": bode_figure(responses, title=title, names=names, fitted=fitted, dark=dark),
         "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
     }
-    return [_save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
+    return [save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
 
 
-def _save(figure: Figure, path: Path, look: Style) -> Path:
+def save(figure: Figure, path: Path, look: Style) -> Path:
+    """Write a figure; the same figure gives the same bytes."""
     with drawing(look), quiet_about_letters():
         figure.savefig(path, format="png", metadata={"Software": None})
     return path

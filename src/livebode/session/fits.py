@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 
 from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
-from livebode.nouns import Parameters, Response, Responses
+from livebode.nouns import Loop, Parameters, Response, Responses
 from livebode.records import Run, RunDirectory
 from livebode.session.axis import FitSection
+from livebode.session.live_margins import live_margins
 
 _POSITIONS = ("rad", "m", "deg", "mm")
 
 
 class Fits:
-    """The fits of one run: into its directory, and what they came to.
+    """The fits of one run, and the margins of a known loop around them: into its directory, and what they came to.
 
     The model is chosen at the first responses, whose unit tells it where the configuration does not.
     """
 
-    def __init__(self, section: FitSection) -> None:
-        self._section = section
+    def __init__(self, section: FitSection, loop: Loop | None = None) -> None:
+        self.section, self.loop = section, loop
         self._fitter: Fitter | None = None
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
@@ -30,9 +31,10 @@ class Fits:
     def take(self, responses: Responses, out: RunDirectory) -> None:
         """Fit a batch, and write its parameters and events."""
         if self._fitter is None:
-            self._fitter = Fitter(chosen_model(self._section, responses.unit), **_settings(self._section))
+            self._fitter = Fitter(chosen_model(self.section, responses.unit), **_settings(self.section))
         found = self._fitter.process(responses)
-        out.write_parameters(found, self._fitter.derived(found))
+        around = () if self.loop is None else live_margins(found, self._fitter, self.loop)
+        out.write_parameters(found, self._fitter.derived(found), *around)
         for event in self._fitter.drain_events():
             out.write_event(event)
         for word, count in zip(*np.unique(found.status, return_counts=True)):

@@ -21,6 +21,7 @@ from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
+from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
 from livebode.sources import open_log
@@ -81,7 +82,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    fits = None if axis.fit is None else Fits(axis.fit)
+    loop = tracker.settings.loop
+    fits = None if axis.fit is None else Fits(axis.fit, loop if loop.feedback else None)
     return record(
         log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
     )
@@ -127,6 +129,9 @@ def record(
         newest = None
         if fits is not None:
             newest, summary["fit"] = fits.newest(), fits.summary()
+            if newest is not None and fits.loop is not None:
+                words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+                summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
         out.write_summary(summary)
         draw(responses, out.partial, _schedule_label(source, tracker.settings.schedule), newest)
     return Outcome(directory, summary, responses, newest)
