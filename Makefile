@@ -51,7 +51,7 @@ fuzz: $(BUILT)   ## a long campaign of damaged files against the readers
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends clang
+	apt-get install -y -qq --no-install-recommends clang mosquitto
 
 lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/python -m pip install --quiet uv
