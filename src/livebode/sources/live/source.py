@@ -57,6 +57,7 @@ class LiveSource(ABC):
         self._thread = threading.Thread(target=self._work, name=f"livebode {address.scheme}", daemon=True)
         self._ready: deque[LiveBlock] = deque()
         self._connected = False
+        self._outage = False
         self._failure: BaseException | None = None
         self._refused: str | None = None
         self._trouble = "nobody sent anything"
@@ -206,13 +207,13 @@ class LiveSource(ABC):
 
     def _stands(self) -> None:
         """A connection stands."""
-        self._connected = True
+        self._connected, self._outage = True, False
         self._said.say("connected", f"connected to {self.address}")
 
     def _lost_connection(self, why: str) -> None:
-        if self._connected or why != self._trouble:
+        if not self._outage:
             self._said.say("disconnected", f"{self.address}: {why}; it is tried again with growing pauses")
-        self._connected, self._trouble = False, why
+        self._connected, self._outage, self._trouble = False, True, why
 
     def _malformed(self, why: object) -> None:
         self._said.say("malformed", f"{self.address}: {why}")
