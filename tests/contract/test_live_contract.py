@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from livebode.nouns import InputError
-from livebode.sources.live import KINDS, LiveBlock, LiveSettings, LiveSource, open_source
+from livebode.sources.live import KINDS, LiveBlock, LiveSource, SourceSettings, open_source
 from livebode.sources.live.opening import MODULES
 from tests.peers.broker import MqttPeer
 from tests.peers.opcua import OpcUaPeer
@@ -37,7 +37,7 @@ def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Peer]:
 
 
 def opened(peer: Peer, **more: object) -> LiveSource:
-    return open_source(LiveSettings(**(peer.settings | {"timeout_s": PATIENCE_S} | more)))
+    return open_source(SourceSettings(**(peer.settings | {"timeout_s": PATIENCE_S} | more)))
 
 
 def received(source: LiveSource, last: int) -> list[LiveBlock]:

@@ -15,15 +15,33 @@ _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; InputError where they do not fit it or each other."""
+    settings = _settings(axis, log.rate_hz, _lines(axis, log))
+    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
+        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
+    return settings
+
+
+def live_settings(axis: Axis, rate_hz: float) -> Settings:
+    """The tracker's settings for a machine that sends at `rate_hz`; InputError where they do not fit each other."""
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if frequencies == "auto" or window == "auto":
+        raise InputError(
+            "lines or window are 'auto', which needs a recording to look at first; give lines.frequencies and "
+            "lines.window for a live source"
+        )
+    return _settings(axis, rate_hz, Lines.parse(frequencies, rate_hz, window))
+
+
+def _settings(axis: Axis, rate_hz: float, lines: Lines) -> Settings:
     signals, tracking = axis.signals, axis.tracking
-    settings = Settings(
-        lines=_lines(axis, log),
+    return Settings(
+        lines=lines,
         output=signals.output,
         input=signals.input,
         excitation=signals.excitation,
         schedule=signals.schedule,
         estimator=tracking.estimator,
-        loop=axis.loop.build(log.rate_hz),
+        loop=axis.loop.build(rate_hz),
         quantity=tracking.quantity,
         hop=tracking.hop,
         average=tracking.average,
@@ -33,9 +51,6 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         hann=tracking.hann,
         spikes=tuple(tracking.spikes),
     )
-    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
-        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
-    return settings
 
 
 def _lines(axis: Axis, log: Log) -> Lines:

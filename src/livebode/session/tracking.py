@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,13 +14,14 @@ import numpy as np
 
 from livebode.estimation import Settings, Tracker
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
 from livebode.sources import open_log
+from livebode.sources.live import LiveSource
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
@@ -72,6 +73,7 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
         For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
     """
     started = time.perf_counter()
+    assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     settings = make_settings(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
@@ -111,6 +113,8 @@ def record(
         counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
+        if isinstance(source, LiveSource):
+            summary["source"] = asdict(source.health) | {"first_sample": source.first_sample}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         out.write_summary(summary)
         draw(responses, out.partial, _schedule_label(source, settings.schedule))
@@ -133,17 +137,30 @@ def _track(
         tracked_s += time.perf_counter() - before
         totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
         publish(responses)
-        for event in tracker.drain_events():
+        for event in [*drained(source), *tracker.drain_events()]:
             out.write_event(event)
         progress(tracker.counts["samples"], source.samples)
     if block is None:
         raise InputError("the recording holds no samples")
-    check.finish()
-    check_length(block.stop, settings.lines.window)
-    check_excitation(tracker, check.variance)
     total, invalid, valid = (int(n) for n in totals)
-    check_some_valid(total, valid, tracker.counts, settings.lines.window)
+    try:
+        check.finish()
+        check_length(block.stop, settings.lines.window)
+        check_excitation(tracker, check.variance)
+        check_some_valid(total, valid, tracker.counts, settings.lines.window)
+    except InputError as error:
+        if not (isinstance(source, LiveSource) and total):
+            raise
+        # What a machine did cannot be had again: the run stays, and says what is wrong with it.
+        out.write_event(Event("doubtful", block.stop, block.time_s[-1], str(error)))
+    for event in drained(source):
+        out.write_event(event)
     return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
+
+
+def drained(source: Source) -> list[Event]:
+    """What a live source has to say; a recording says it all at once."""
+    return source.drain_events() if isinstance(source, LiveSource) else []
 
 
 def _keep_freed_memory() -> None:

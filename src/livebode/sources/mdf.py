@@ -36,6 +36,7 @@ class MdfRecording(Recording):
                 samples = int(group.channel_group.cycles_nr)
                 self._check_size(file, at, samples)
                 for index, channel in enumerate(group.channels):
+                    self._check_place(channel, int(group.channel_group.samples_byte_nr))
                     column = Column(channel.name, unit_of(channel), samples, key=(at, index))
                     first = file.get(group=at, index=index, record_count=1, ignore_invalidation_bits=True)
                     if first.samples.ndim == 1 and first.samples.dtype.kind in "fiub":
@@ -54,6 +55,15 @@ class MdfRecording(Recording):
         width = int(file.groups[at].channel_group.samples_byte_nr)
         if samples * max(width, 1) > 1000 * self.path.stat().st_size:
             raise InputError(f"{self.path} declares {samples} samples of {width} bytes, more than it can hold")
+
+    def _check_place(self, channel: Any, record_bytes: int) -> None:
+        """InputError where a channel lies outside its record: asammdf would read what is behind it in memory."""
+        if hasattr(channel, "byte_offset"):
+            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
+        else:
+            end = channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0) + channel.bit_count
+        if end > 8 * record_bytes:
+            raise InputError(f"{self.path}: channel {channel.name!r} ends at bit {end} of {record_bytes} bytes")
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         samples = columns[0].samples or 0

@@ -6,7 +6,7 @@ from livebode.sources.live.health import Health
 from livebode.sources.live.opening import open_source
 from livebode.sources.live.said import KINDS
 from livebode.sources.live.sequencer import Sequencer
-from livebode.sources.live.settings import LiveSettings
+from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
 
 __all__ = [
@@ -15,9 +15,9 @@ __all__ = [
     "FrameDecoder",
     "Health",
     "LiveBlock",
-    "LiveSettings",
     "LiveSource",
     "Sequencer",
+    "SourceSettings",
     "encode_layout",
     "encode_samples",
     "open_source",

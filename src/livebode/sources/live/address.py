@@ -14,7 +14,7 @@ PORTS: dict[str, int | None] = {
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and what stands behind them; `path` is the topic of MQTT, empty elsewhere."""
+    """Kind of source, host, port and what stands behind them; `path` is the topic of MQTT, or a file."""
 
     scheme: str
     host: str = ""
@@ -22,8 +22,8 @@ class Address:
     path: str = ""
 
     def __str__(self) -> str:
-        if self.scheme == "stdin":
-            return "stdin:"
+        if not self.host:
+            return self.path or "stdin:"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}" + (f"/{self.path}" if self.path else "")
 

@@ -14,7 +14,7 @@ from livebode.nouns import InputError
 from livebode.sources.live.address import Address
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch
-from livebode.sources.live.settings import LiveSettings, named_channels
+from livebode.sources.live.settings import SourceSettings, named_channels
 from livebode.sources.live.source import LiveSource, RefusedError
 
 TIMEOUT_MS = 2000
@@ -31,7 +31,7 @@ class AdsSource(LiveSource):
 
     format: ClassVar[str] = "ads"
 
-    def __init__(self, settings: LiveSettings, address: Address) -> None:
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
         super().__init__(settings, address)
         self._pyads = import_pyads()
         if settings.symbol is None or not settings.channels or settings.net_id is None:

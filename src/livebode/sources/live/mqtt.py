@@ -11,7 +11,7 @@ from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FRAME_BYTES_MAX, FrameDecoder
 from livebode.sources.live.ndjson import LineDecoder
 from livebode.sources.live.secret import existing, password
-from livebode.sources.live.settings import LiveSettings
+from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
 
 KEEPALIVE_S = 15
@@ -29,7 +29,7 @@ class MqttSource(LiveSource):
     format: ClassVar[str] = "mqtt"
     reorders: ClassVar[bool] = True
 
-    def __init__(self, settings: LiveSettings, address: Address) -> None:
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
         super().__init__(settings, address)
         try:
             from paho.mqtt import client as mqtt
@@ -134,7 +134,7 @@ class MqttSource(LiveSource):
             self._deliver(batch)
 
 
-def tls_context(settings: LiveSettings) -> ssl.SSLContext:
+def tls_context(settings: SourceSettings) -> ssl.SSLContext:
     """What TLS needs: the authority that is trusted, and our own certificate where one is given."""
     authority = None if settings.ca_file is None else existing(settings.ca_file, "ca_file")
     try:

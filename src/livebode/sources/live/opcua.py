@@ -17,7 +17,7 @@ from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.secret import existing, password
-from livebode.sources.live.settings import LiveSettings, named_channels
+from livebode.sources.live.settings import SourceSettings, named_channels
 from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
 
 REQUEST_S = 5.0
@@ -90,7 +90,7 @@ class OpcUaSource(LiveSource):
 
     format: ClassVar[str] = "opc ua"
 
-    def __init__(self, settings: LiveSettings, address: Address) -> None:
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
         super().__init__(settings, address)
         try:
             import asyncua

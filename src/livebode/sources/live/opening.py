@@ -5,8 +5,9 @@ from __future__ import annotations
 from importlib import import_module
 
 from livebode.nouns import InputError
-from livebode.sources.live.address import parse_address
-from livebode.sources.live.settings import LiveSettings, check_keys
+from livebode.sources.live.address import Address, parse_address
+from livebode.sources.live.follow import FollowSource
+from livebode.sources.live.settings import SourceSettings, check_keys
 from livebode.sources.live.source import LiveSource
 
 MODULES = {
@@ -21,8 +22,8 @@ MODULES = {
 """The module of each kind of URL; it ends with SOURCE, and imports its library when the source is made."""
 
 
-def open_source(settings: LiveSettings) -> LiveSource:
-    """The source at `settings.url`, connected, its channels and rate known.
+def open_source(settings: SourceSettings) -> LiveSource:
+    """The source at `settings.url`, or the `log` that grows; connected, its channels and rate known.
 
     Raises
     ------
@@ -31,8 +32,11 @@ def open_source(settings: LiveSettings) -> LiveSource:
         come within `timeout_s`.
     """
     if settings.url is None:
-        raise InputError("source.url is missing; give one, such as udp://0.0.0.0:5000")
+        check_keys(settings, "log")
+        if settings.log is None or not settings.follow:
+            raise InputError("source names no machine; give url, such as udp://0.0.0.0:5000, or log with follow = true")
+        return FollowSource(settings, Address("follow", path=str(settings.log))).open()
     address = parse_address(settings.url)
-    check_keys(settings, address)
+    check_keys(settings, address.scheme)
     kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
     return kind(settings, address).open()

@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 
 from livebode.nouns import InputError
-from livebode.sources.live.settings import LiveSettings
+from livebode.sources.live.settings import SourceSettings
 
 SECRET_BYTES_MAX = 1 << 16
 
 
-def password(settings: LiveSettings) -> str | None:
+def password(settings: SourceSettings) -> str | None:
     """The password that the settings point to; None where they point to none.
 
     Raises

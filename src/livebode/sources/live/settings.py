@@ -1,4 +1,4 @@
-"""The keys of [source] that live sources take, as plain data."""
+"""The keys of [source], as plain data, and which of them belong together."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.nouns import Channel, InputError
-from livebode.sources.live.address import Address
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -25,15 +24,21 @@ TAKEN: dict[str, set[str]] = {
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
 """Which keys each kind of URL takes, beside `url` and `timeout_s`."""
+LOG = {"log", "time", "rate_hz", "follow"}
 
 
-class LiveSettings(BaseModel):
-    """[source] with a `url`, or with a `log` that grows. docs/live.md says which keys belong to which source."""
+class SourceSettings(BaseModel):
+    """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/live.md has its keys.
+
+    Relative paths are from the file that names them.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    url: str | None = None
+    log: File | None = None
+    time: str | None = None
     follow: bool = False
+    url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
     reorder_batches: Annotated[int, Field(ge=0, le=256)] = 8
@@ -56,15 +61,29 @@ class LiveSettings(BaseModel):
     ams_port: Annotated[int, Field(ge=1, le=65535)] = 851
     poll_s: Annotated[float, Field(gt=0, le=10)] = 0.05
 
+    @property
+    def live(self) -> bool:
+        """Whether the samples come as time passes."""
+        return self.url is not None or self.follow
 
-def check_keys(settings: LiveSettings, address: Address) -> None:
-    """InputError for a key that means nothing for this kind of source."""
-    given = settings.model_fields_set & set(LiveSettings.model_fields) - {"url", "timeout_s", "follow"}
-    if stray := sorted(given - TAKEN[address.scheme]):
-        known = ", ".join(sorted(TAKEN[address.scheme]))
-        raise InputError(f"source.{stray[0]} means nothing for {address.scheme}; it takes {known}")
-    if settings.follow:
-        raise InputError("source.follow is for a log that grows; leave it out beside a url")
+    @property
+    def title(self) -> str:
+        """What to call it in a picture."""
+        return self.log.name if self.log is not None else self.url or ""
+
+    def beside(self, folder: Path) -> SourceSettings:
+        """The same with relative paths from `folder`."""
+        files = {
+            name: folder / value for name in self.model_fields_set if isinstance(value := getattr(self, name), Path)
+        }
+        return self.model_copy(update=files)
+
+
+def check_keys(settings: SourceSettings, kind: str) -> None:
+    """InputError for a key that means nothing for this kind of source: the scheme of a URL, or "log"."""
+    taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
+    if stray := sorted(settings.model_fields_set - taken - {"timeout_s"}):
+        raise InputError(f"source.{stray[0]} means nothing for {kind}; it takes {', '.join(sorted(taken))}")
 
 
 def named_channels(headings: list[str]) -> tuple[Channel, ...]:

@@ -20,7 +20,7 @@ from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import Sequencer
-from livebode.sources.live.settings import LiveSettings
+from livebode.sources.live.settings import SourceSettings
 
 TICK_S = 0.1
 """How soon a request to end is seen."""
@@ -45,7 +45,7 @@ class LiveSource(ABC):
     waits: ClassVar[bool] = False
     """Whether the sender can wait until there is room."""
 
-    def __init__(self, settings: LiveSettings, address: Address) -> None:
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._said = Said()
         self._inbox = Inbox()
