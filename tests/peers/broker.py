@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import ssl
 import subprocess
 from pathlib import Path
@@ -31,6 +32,8 @@ class Mosquitto:
             "log_type all",
             "set_tcp_nodelay true",
         ]
+        if os.geteuid() == 0:  # else it becomes a user that may not read the tests' files
+            listener.append("user root")
         self._settings.write_text("\n".join(listener) + "\n")
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -38,7 +41,12 @@ class Mosquitto:
         began = self.logged("running")
         with self._log.open("ab") as log:
             self._process = subprocess.Popen([self._program, "-c", str(self._settings)], stdout=log, stderr=log)
-        until(lambda: self.logged("running") > began, "the broker to run")
+        try:
+            until(lambda: self.logged("running") > began or self._process.poll() is not None, "the broker to run")
+            assert self._process.poll() is None, self._log.read_text()
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:

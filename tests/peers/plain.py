@@ -43,6 +43,8 @@ class UdpPeer(Peer):
 
 
 class TcpPeer(Peer):
+    layout = encode_layout(CHANNELS, RATE_HZ)
+
     def __enter__(self) -> TcpPeer:
         self._server = socket.create_server(("127.0.0.1", 0))
         self.settings = {"url": f"tcp://127.0.0.1:{self._server.getsockname()[1]}"}
@@ -57,7 +59,7 @@ class TcpPeer(Peer):
                 link, _ = self._server.accept()
             except OSError:
                 return
-            link.sendall(encode_layout(CHANNELS, RATE_HZ))
+            link.sendall(self.layout)
             self._link = link
 
     def __exit__(self, *_: object) -> None:

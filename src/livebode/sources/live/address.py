@@ -57,7 +57,7 @@ def parse_address(url: str) -> Address:
     if parts.scheme not in PORTS:
         raise InputError(f"source.url = {url!r} is of no known kind; give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
-    if not host or port is None or parts.query or parts.fragment:
+    if not host or port is None or "?" in url or "#" in url:
         raise InputError(f"source.url = {url!r} is no address; give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):

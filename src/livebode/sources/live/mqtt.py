@@ -97,6 +97,7 @@ class MqttSource(LiveSource):
                 properties=properties,
             )
         except ssl.SSLError as error:
+            close_left(error)
             raise RefusedError(
                 f"no TLS with the broker: {getattr(error, 'verify_message', '') or error.reason}"
             ) from None
@@ -145,6 +146,16 @@ def tls_context(settings: SourceSettings) -> ssl.SSLContext:
     except ssl.SSLError as error:
         raise InputError(f"a certificate or key of source cannot be used: {error.reason or error}") from None
     return context
+
+
+def close_left(error: ssl.SSLError) -> None:
+    """Close the socket that paho leaves open where the handshake fails; nothing but the error still knows it."""
+    trace = error.__traceback__
+    while trace is not None:
+        for left in trace.tb_frame.f_locals.values():
+            if isinstance(left, ssl.SSLSocket):
+                left.close()
+        trace = trace.tb_next
 
 
 def no_delay(_client: Any, _data: Any, link: socket.socket) -> None:

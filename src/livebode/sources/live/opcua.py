@@ -151,7 +151,10 @@ class OpcUaSource(LiveSource):
         async with client:
             by_node = {client.get_node(text): text for text in wanted}
             subscription: Any = await client.create_subscription(PUBLISH_MS, Handler(self, gathered, by_node))
-            await subscription.subscribe_data_change(list(by_node), queuesize=QUEUE, sampling_interval=0)
+            items = await subscription.subscribe_data_change(list(by_node), queuesize=QUEUE, sampling_interval=0)
+            for text, item in zip(by_node.values(), items):
+                if isinstance(item, self._asyncua.ua.StatusCode):
+                    raise RefusedError(f"the server does not give node {text} ({item.name})")
             self._stands()
             while not self._stop.is_set():
                 await asyncio.sleep(TICK_S)
@@ -163,12 +166,14 @@ class OpcUaSource(LiveSource):
         policy = getattr(security_policies, f"SecurityPolicy{self.settings.security}")
         try:
             expected = await uacrypto.load_certificate(Path(server))
+            # Asked without security: only what comes next proves that the server has the key as well.
+            plain = self._asyncua.Client(str(self.address), timeout=REQUEST_S)
+            shown = {endpoint.ServerCertificate for endpoint in await plain.connect_and_get_server_endpoints()}
+            if uacrypto.der_from_x509(expected) not in shown:  # type: ignore[no-untyped-call]
+                raise RefusedError("the server shows another certificate than source.server_certificate_file")
             await client.set_security(policy, certificate, key, server_certificate=server)
         except (ValueError, TypeError) as error:
             raise InputError(f"a certificate or key of source cannot be read: {str(error)[:100]}") from None
-        shown = {endpoint.ServerCertificate for endpoint in await client.connect_and_get_server_endpoints()}
-        if uacrypto.der_from_x509(expected) not in shown:  # type: ignore[no-untyped-call]
-            raise RefusedError("the server shows another certificate than source.server_certificate_file")
 
 
 class Handler:

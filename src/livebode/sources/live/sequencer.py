@@ -37,10 +37,21 @@ class Sequencer:
         Longest time to wait for a missing one.
     rate_hz
         The rate that must be, where it is known beforehand.
+    confirmed
+        Batches that a new epoch must bring before it is believed: 1 where nobody else can send.
     """
 
-    def __init__(self, said: Said, *, reorder: int = 8, wait_s: float = 1.0, rate_hz: float | None = None) -> None:
+    def __init__(
+        self,
+        said: Said,
+        *,
+        reorder: int = 8,
+        wait_s: float = 1.0,
+        rate_hz: float | None = None,
+        confirmed: int = CONFIRMED,
+    ) -> None:
         self._said, self._reorder, self._wait_s = said, reorder, wait_s
+        self._confirmed = confirmed
         self.face = Face(said, rate_hz)
         self.clock: ClockWatch | None = None
         self._epoch: int | None = None
@@ -177,7 +188,8 @@ class Sequencer:
         if last is not None and (last.epoch != batch.epoch or not (new_epoch or last.stop == batch.first_sample)):
             self._dismiss()
         self._doubted.append(batch)
-        if len(self._doubted) < (CONFIRMED if new_epoch or self._is_far(batch) else CONFIRMED_NEAR):
+        needed = self._confirmed if new_epoch else CONFIRMED if self._is_far(batch) else CONFIRMED_NEAR
+        if len(self._doubted) < needed:
             return []
         return self._restart()
 

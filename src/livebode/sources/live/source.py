@@ -19,7 +19,7 @@ from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.said import Said
-from livebode.sources.live.sequencer import Sequencer
+from livebode.sources.live.sequencer import CONFIRMED, Sequencer
 from livebode.sources.live.settings import SourceSettings
 
 TICK_S = 0.1
@@ -50,7 +50,10 @@ class LiveSource(ABC):
         self._said = Said()
         self._inbox = Inbox()
         self._sequencer = Sequencer(
-            self._said, reorder=settings.reorder_batches if self.reorders else 0, rate_hz=settings.rate_hz
+            self._said,
+            reorder=settings.reorder_batches if self.reorders else 0,
+            rate_hz=settings.rate_hz,
+            confirmed=CONFIRMED if self.reorders else 1,
         )
         self._stop = threading.Event()
         self._pauses = Pauses()
