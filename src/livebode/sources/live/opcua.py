@@ -49,8 +49,9 @@ class Gathered:
         """A new value of node `key`; the batch that it completes. InputError for what no batch can be made of."""
         if stamp is None:
             raise InputError(f"node {key} has no source timestamp; the server must give one for each array")
+        found = whole(value) if key == self._sample_node else numbers(value)
         moment = self._moments.setdefault(stamp, {})
-        moment[key] = whole(value) if key == self._sample_node else numbers(value)
+        moment[key] = found
         if moment.keys() != self._wanted:
             while len(self._moments) > INCOMPLETE_MAX:
                 self._moments.popitem(last=False)

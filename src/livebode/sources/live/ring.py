@@ -55,6 +55,8 @@ def read_ring(raw: bytes, symbol_bytes: int) -> tuple[Ring, np.dtype[np.floating
     values = ring.channels * ring.length
     if not (0 < ring.channels <= CHANNELS_MAX and ring.length > 1 and values <= VALUES_MAX):
         raise InputError(f"a ring of {ring.length} samples of {ring.channels} channels is empty or too large")
+    if not 1e-9 < ring.rate_hz < 1e9:
+        raise InputError(f"the ring's rate_hz={ring.rate_hz} is not a number of samples per second")
     for dtype in (np.dtype("<f4"), np.dtype("<f8")):
         if HEADER.size + values * dtype.itemsize == symbol_bytes:
             return ring, dtype
