@@ -39,8 +39,8 @@ def test_damaged_rings_give_batches_or_a_sentence():
         try:
             ring, dtype = read_ring(raw, size)
             for first, last in new_rows(ring, rng.choice([None, 0, 50, 10**6])):
-                assert 0 < last - first < LENGTH
-                assert first % LENGTH + last - first <= LENGTH
+                assert 0 < last - first < ring.length
+                assert first % ring.length + last - first <= ring.length
                 rows = bytes((last - first) * ring.channels * dtype.itemsize)
                 batch = ring_batch(rows, first, ring, header(ring.count + rng.randrange(100)), dtype, CHANNELS)
                 read += batch is not None

@@ -40,7 +40,7 @@ def test_the_c_header_writes_the_same_bytes(tmp_path):
     subprocess.run([gcc, *strict, tmp_path / "sender.c", "-o", tmp_path / "sender"], check=True)
     written = subprocess.run([tmp_path / "sender"], capture_output=True, check=True).stdout
     channels = (Channel("w", "N m"), Channel("y"))
-    data = np.arange(10) * np.array([[1.0], [-1.0]])
+    data = np.stack([np.arange(10.0), 0.0 - np.arange(10)])
     batch = Batch(77, data, channels, 4000.0, 5, 1.5e9)
     assert written == encode_layout(channels, 4000.0, epoch=5) + encode_samples(batch, sequence=1)
 
