@@ -44,7 +44,6 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
-	$(BIN)/python -m studies.motion
 
 fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py

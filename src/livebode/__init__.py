@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
     from livebode.kernel import SlidingDFT
+    from livebode.motion import MotionCorrection
     from livebode.nouns import (
         PID,
         Block,
@@ -25,12 +26,14 @@ if TYPE_CHECKING:
         Response,
         Responses,
     )
+    from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
 
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
     "kernel": ("SlidingDFT",),
+    "motion": ("MotionCorrection",),
     "nouns": (
         "PID",
         "Block",
@@ -46,12 +49,14 @@ _HOME = {
         "Response",
         "Responses",
     ),
+    "simulation": ("BeltAxis", "SimulatedAxis", "Strokes"),
     "sources": ("Log", "open_log"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "BeltAxis",
     "Block",
     "Cascade",
     "Channel",
@@ -63,11 +68,14 @@ __all__ = [
     "Log",
     "Loop",
     "Model",
+    "MotionCorrection",
     "PositionPD",
     "Response",
     "Responses",
     "Settings",
+    "SimulatedAxis",
     "SlidingDFT",
+    "Strokes",
     "Tracker",
     "multisine",
     "open_log",

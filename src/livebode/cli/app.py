@@ -1,4 +1,4 @@
-"""The command line: `livebode run`, `livebode inspect`. Exit codes: 0 done, 2 the user's mistake, 1 ours."""
+"""The command line: `livebode run`, `inspect`, `demo`, `export`. Exit codes: 0 done, 2 the user's mistake, 1 ours."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import traceback
 import typer
 
 from livebode.cli.demo_command import demo_command
+from livebode.cli.export_command import export_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.run_command import run_command
 from livebode.nouns import InputError
@@ -27,6 +28,7 @@ app = typer.Typer(
 app.command("run")(run_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
+app.command("export")(export_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -50,6 +50,15 @@ class TrackingSection(_Section):
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []
+    dtype: Literal["float64", "float32"] = "float64"
+
+
+class MotionSection(_Section):
+    """[motion]: responses freed from the axis's motion; see `livebode.motion.MotionCorrection`."""
+
+    radius_m: Positive
+    chunk_s: Positive = 4.0
+    driven_by: Literal["torque", "excitation"] = "torque"
 
 
 class _ControllerSection(_Section):
@@ -142,6 +151,7 @@ class Axis(_Section):
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
+    motion: MotionSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from livebode.session.axis import Axis
-from livebode.session.plan import live_settings
+from livebode.session.plan import live_follower
 from livebode.session.tracking import Draw, Outcome, Progress, record
 from livebode.sources.live import LiveSource, open_source
 
@@ -28,12 +28,12 @@ def run_live(axis: Axis, directory: Path, *, force: bool = False, progress: Prog
         Where the configuration cannot be, or no samples come.
     """
     with open_source(axis.source) as source, ended_by_signals(source):
-        settings = live_settings(axis, source.rate_hz)
+        tracker = live_follower(axis, source.rate_hz)
         about = {
             "configuration": axis.model_dump(mode="json", exclude_defaults=True),
             "found": {"format": source.format, "rate_from": "the sender"},
         }
-        return record(source, settings, directory, about=about, force=force, progress=progress, draw=draw)
+        return record(source, tracker, directory, about=about, force=force, progress=progress, draw=draw)
 
 
 @contextmanager

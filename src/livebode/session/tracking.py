@@ -6,20 +6,21 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from livebode.estimation import Settings, Tracker
 from livebode.kernel import instruction_set
 from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.follower import Follower
 from livebode.session.overview import Overview
-from livebode.session.plan import make_settings
+from livebode.session.plan import make_follower
 from livebode.sources import open_log
 from livebode.sources.live import LiveSource
 
@@ -75,15 +76,15 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     started = time.perf_counter()
     assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
-    settings = make_settings(axis, log)
+    tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started)
+    return record(log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started)
 
 
 def record(
     source: Source,
-    settings: Settings,
+    tracker: Follower,
     directory: Path,
     *,
     about: dict[str, Any],
@@ -96,18 +97,18 @@ def record(
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
-    that is to count in the speed; `delivery` goes to the source's `blocks`.
+    `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
+    opening the source began, where that is to count in the speed; `delivery` goes to the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
-    tracker, overview = Tracker(settings), Overview()
+    overview = Overview()
     with RunDirectory(directory, force=force) as out:
 
         def publish(responses: Responses) -> None:
             overview.add(responses)
             out.write(responses)
-            if watch is not None:
+            if watch is not None and len(responses):
                 watch(responses)
 
         counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
@@ -117,45 +118,54 @@ def record(
             summary["source"] = asdict(source.health) | {"first_sample": source.first_sample}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(source, settings.schedule))
+        draw(responses, out.partial, _schedule_label(source, tracker.settings.schedule))
     return Outcome(directory, summary, responses)
 
 
 def _track(
-    source: Source, tracker: Tracker, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
+    source: Source, tracker: Follower, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
 ) -> tuple[dict[str, int], float]:
     """Counts of samples and responses, and seconds spent in the tracker."""
     settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
     channels = [name for role in settings.roles if (name := settings.channel(role))]
     check = ChannelCheck(tuple(channels), settings.channel(settings.method.reference) or "")
     wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
+
+    def follow(step: Callable[[], Responses | None]) -> float:
+        """Seconds of one step, whose responses and events are published."""
+        before = time.perf_counter()
+        responses = step()
+        took_s = time.perf_counter() - before
+        if responses is not None:
+            totals[:] += (
+                len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
+            )  # fmt: skip
+            publish(responses)
+        for event in [*drained(source), *tracker.drain_events()]:
+            out.write_event(event)
+        return took_s
+
     block: Block | None = None
     for block in source.blocks(wanted, **delivery):
         check.take(block)
-        before = time.perf_counter()
-        responses = tracker.process(block)
-        tracked_s += time.perf_counter() - before
-        totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
-        publish(responses)
-        for event in [*drained(source), *tracker.drain_events()]:
-            out.write_event(event)
+        tracked_s += follow(partial(tracker.process, block))
         progress(tracker.counts["samples"], source.samples)
     if block is None:
         raise InputError("the recording holds no samples")
-    total, invalid, valid = (int(n) for n in totals)
     try:
         check.finish()
         check_length(block.stop, settings.lines.window)
+        tracked_s += follow(tracker.finish)
         check_excitation(tracker, check.variance)
-        check_some_valid(total, valid, tracker.counts, settings.lines.window)
+        check_some_valid(int(totals[0]), int(totals[2]), tracker.counts, settings.lines.window)
     except InputError as error:
-        if not (isinstance(source, LiveSource) and total):
+        if not (isinstance(source, LiveSource) and totals[0]):
             raise
         # What a machine did cannot be had again: the run stays, and says what is wrong with it.
         out.write_event(Event("doubtful", block.stop, block.time_s[-1], str(error)))
     for event in drained(source):
         out.write_event(event)
-    return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
+    return tracker.counts | {"responses": int(totals[0]), "invalid_responses": int(totals[1])}, tracked_s
 
 
 def drained(source: Source) -> list[Event]:
@@ -174,15 +184,8 @@ def _schedule_label(source: Source, name: str | None) -> str:
     return f"{name} in {unit}" if name and unit else name or ""
 
 
-def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> dict[str, Any]:
-    settings, lines = tracker.settings, tracker.settings.lines
-    found = {
-        "rate_hz": lines.rate_hz,
-        "window": lines.window,
-        "frequency_hz": lines.frequency_hz.tolist(),
-        "hop": settings.step,
-        "unit": responses.unit,
-    }
+def _summary(about: dict[str, Any], tracker: Follower, responses: Responses) -> dict[str, Any]:
+    found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}
     versions = {
         "livebode": version("livebode"),
         "numpy": np.__version__,
@@ -192,7 +195,7 @@ def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> d
     return about | {"found": about.get("found", {}) | found, "versions": versions}
 
 
-def _speed(tracker: Tracker, tracked_s: float, whole_s: float) -> dict[str, float]:
+def _speed(tracker: Follower, tracked_s: float, whole_s: float) -> dict[str, float]:
     samples = tracker.counts["samples"]
     recorded_s = samples / tracker.settings.lines.rate_hz
     return {

@@ -72,11 +72,6 @@ class Sequencer:
         """The sender's number of the sample at which it was begun, or begun anew; None before."""
         return None if self._next is None else self._begun_at
 
-    @property
-    def number(self) -> int:
-        """Number that the next sample in order will have in a Block."""
-        return self._number
-
     def push(self, batch: Batch) -> list[LiveBlock]:
         """Blocks that this batch completes."""
         aligned = self.face.aligned(batch)
