@@ -117,9 +117,8 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
         assert lost == 60 * SAMPLES
 
 
+@pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.reconnects], indirect=True)
 def test_a_broken_connection_comes_back_by_itself(peer):
-    if not peer.reconnects:
-        pytest.skip("it has no connection")
     given = batches(60)
 
     def script() -> None:
@@ -156,9 +155,8 @@ def test_rubbish_is_counted_and_the_stream_goes_on(peer):
     assert all("\n" not in event.message for event in events)
 
 
+@pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.numbers_begin_anew], indirect=True)
 def test_a_sender_that_begins_anew_is_a_restart(peer):
-    if not peer.numbers_begin_anew_at_restart:
-        pytest.skip("its samples are numbered by the clock, which goes on over a restart")
     old, new = batches(60, first=10_000_000), batches(60, first=0)
 
     def script() -> None:

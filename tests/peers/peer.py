@@ -40,7 +40,9 @@ class Peer:
 
     settings: dict[str, Any]
     reconnects = True
-    numbers_begin_anew_at_restart = True
+    """Whether there is a connection that can break."""
+    numbers_begin_anew = True
+    """Whether a restart begins its numbers anew; those from a clock go on."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

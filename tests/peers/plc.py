@@ -127,7 +127,7 @@ class RingPeer(AdsPeer):
 
 
 class NotifyPeer(AdsPeer):
-    numbers_begin_anew_at_restart = False
+    numbers_begin_anew = False
 
     def _prepare(self) -> None:
         self.settings |= {"mode": "notify", "rate_hz": RATE_HZ}
