@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, InputError, Model, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Model, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
@@ -25,6 +25,7 @@ from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
 from livebode.sources import open_log
+from livebode.sources.live import LiveSource
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
@@ -78,12 +79,12 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
         For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
     """
     started = time.perf_counter()
+    assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    loop = tracker.settings.loop
-    fits = None if axis.fit is None else Fits(axis.fit, loop if loop.feedback else None)
+    fits = Fits.of(axis.fit, tracker.settings.loop)
     return record(
         log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
     )
@@ -125,6 +126,8 @@ def record(
         counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
+        if isinstance(source, LiveSource):
+            summary["source"] = asdict(source.health) | {"first_sample": source.first_sample}
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         newest = None
         if fits is not None:
@@ -156,7 +159,7 @@ def _track(
                 len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
             )  # fmt: skip
             publish(responses)
-        for event in tracker.drain_events():
+        for event in [*drained(source), *tracker.drain_events()]:
             out.write_event(event)
         return took_s
 
@@ -167,13 +170,25 @@ def _track(
         progress(tracker.counts["samples"], source.samples)
     if block is None:
         raise InputError("the recording holds no samples")
-    check.finish()
-    check_length(block.stop, settings.lines.window)
     tracked_s += follow(tracker.finish)
-    check_excitation(tracker, check.variance)
-    total, invalid, valid = (int(n) for n in totals)
-    check_some_valid(total, valid, tracker.counts, settings.lines.window)
-    return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
+    try:
+        check.finish()
+        check_length(block.stop, settings.lines.window)
+        check_excitation(tracker, check.variance)
+        check_some_valid(int(totals[0]), int(totals[2]), tracker.counts, settings.lines.window)
+    except InputError as error:
+        if not (isinstance(source, LiveSource) and totals[0]):
+            raise
+        # What a machine did cannot be had again: the run stays, and says what is wrong with it.
+        out.write_event(Event("doubtful", block.stop, block.time_s[-1], str(error)))
+    for event in drained(source):
+        out.write_event(event)
+    return tracker.counts | {"responses": int(totals[0]), "invalid_responses": int(totals[1])}, tracked_s
+
+
+def drained(source: Source) -> list[Event]:
+    """What a live source has to say; a recording says it all at once."""
+    return source.drain_events() if isinstance(source, LiveSource) else []
 
 
 def _keep_freed_memory() -> None:
