@@ -1,0 +1,113 @@
+"""What changed: of all changes of one kind, everywhere or at one place, the one that the windows speak for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.machine import Accuracy
+from livebode.monitoring.offset import Place
+from livebode.monitoring.sensitivity import DIRECTIONS
+
+Floats = NDArray[np.float64]
+
+_WIDTHS_M = np.array([0.02, 0.035, 0.06])  # standard deviations; twice the widest still lies in a way of 0.3 m
+_GRID_M = 0.005
+_STIFFNESS = DIRECTIONS.index("stiffness")
+_CONFIDENCE = 1.96
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of one kind.
+
+    Attributes
+    ----------
+    direction
+        Number in `DIRECTIONS`.
+    amount, bound
+        Of the logarithm, and the half-width that holds the truth with 95 %.
+    place
+        Where, None for a change of the whole way.
+    evidence
+        By how many nats the windows speak for it against none.
+    """
+
+    direction: int
+    amount: float
+    bound: float
+    evidence: float
+    place: Place | None = None
+
+    def share(self, position_m: Floats) -> Floats:
+        """How much of the change there is at these positions, 0 … 1."""
+        return np.ones(position_m.shape) if self.place is None else self.place.share(position_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Windows since a change seems to have begun: score (rows, 4), information (rows, 4, 4), position (rows,)."""
+
+    score: Floats
+    information: Floats
+    position_m: Floats
+
+    def without(self, known: list[int]) -> Segment:
+        """The same with changes of these directions allowed for, whatever their size."""
+        if not known:
+            return self
+        inverse = np.linalg.inv(self.information[:, known][:, :, known])
+        gain = self.information[:, :, known] @ inverse
+        score = self.score - np.einsum("rjk,rk->rj", gain, self.score[:, known])
+        information = self.information - gain @ self.information[:, known]
+        for i in known:
+            score[:, i], information[:, i], information[:, :, i] = 0.0, 0.0, 0.0
+        return Segment(score, information, self.position_m)
+
+
+def candidates(segment: Segment, known: Accuracy, local: bool = True) -> list[Change]:
+    """Every single change, the likeliest first; what is `known` of the healthy machine widens the bounds."""
+    score = segment.score.sum(axis=0)
+    information = np.einsum("rjj->j", segment.information)
+    found = [
+        Change(j, score[j] / information[j], _bound(information[j] / known.inflation[j], known.scatter[j]), score[j] ** 2 / (2 * information[j]))
+        for j in range(len(DIRECTIONS))
+        if information[j] > 0
+    ]
+    if local and information[_STIFFNESS] > 0:
+        found.append(_place(segment, float(known.scatter[_STIFFNESS]), float(known.inflation[_STIFFNESS])))
+    return sorted(found, key=lambda change: -change.evidence)
+
+
+def _bound(information: float, scatter: float) -> float:
+    return float(_CONFIDENCE * np.hypot(1 / np.sqrt(information), scatter))
+
+
+def _place(segment: Segment, scatter: float, inflation: float) -> Change:
+    """The likeliest bell-shaped place of changed stiffness."""
+    x = segment.position_m
+    centres = np.arange(x.min(), x.max() + _GRID_M, _GRID_M)
+    bell = np.exp(-((x[:, np.newaxis, np.newaxis] - centres[:, np.newaxis]) ** 2) / (2 * _WIDTHS_M**2))
+    score = np.einsum("r,rcw->cw", segment.score[:, _STIFFNESS], bell)
+    information = np.einsum("r,rcw->cw", segment.information[:, _STIFFNESS, _STIFFNESS], bell**2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        evidence = np.where(information > 0, score**2 / (2 * information), 0.0)
+    c, w = np.unravel_index(int(np.argmax(evidence)), evidence.shape)
+    return Change(
+        _STIFFNESS,
+        float(score[c, w] / information[c, w]),
+        _bound(float(information[c, w]) / inflation, scatter),
+        # One of many places, chosen by the data: as likely as it looks, less what the choice is worth.
+        float(evidence[c, w] - np.log(max(np.ptp(x), _WIDTHS_M[0]) / _WIDTHS_M[0] * len(_WIDTHS_M))),
+        Place(float(centres[c]), float(_WIDTHS_M[w])),
+    )
+
+
+def begin_of(segment: Segment, change: Change) -> int:
+    """Row from which on the windows speak for the change most: the likeliest moment at which it began."""
+    amount = change.amount * change.share(segment.position_m)
+    score, information = segment.score[:, change.direction], segment.information[:, change.direction, change.direction]
+    gain = amount * score - amount**2 * information / 2
+    return int(np.argmax(np.cumsum(gain[::-1])[::-1]))

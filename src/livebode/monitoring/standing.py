@@ -1,0 +1,142 @@
+"""The changes that stand: how large they are by now, and whether they have gone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.alarms import Alarm
+from livebode.monitoring.machine import Machine
+from livebode.monitoring.naming import Change
+from livebode.monitoring.offset import Offset, Place
+
+Floats = NDArray[np.float64]
+
+_MEMORY = 0.95  # per window, of a change's size by now
+_HELD_FROM = 0.25  # of the change when it was named, or of the smallest if that is less: below it is on its way out
+_UNSEEN = 0.01  # of a change at a place: where there is less, the rest of the way is judged
+_MOVING = 0.005  # of the offset, from one stretch to the next: the others wait until the model has come along
+_MOST = 0.7  # of a logarithm: a factor of two
+
+
+class Standing:
+    """Alarms, with the Offset that they make of the model.
+
+    The model follows the changes that stand, stretch by stretch, so that evidence stays small and a large change does
+    not look like another one besides (Gauss–Newton). Changes of directions are estimated together.
+    """
+
+    def __init__(self, machine: Machine, threshold: float) -> None:
+        self._machine, self._threshold = machine, threshold
+        self.alarms: list[Alarm] = []
+        self.offset = Offset()
+        self._moving = False
+        self._forget()
+
+    def _forget(self) -> None:
+        n = len(self.offset.logarithms)
+        self._score, self._information = np.zeros(n), np.zeros((n, n))
+
+    @property
+    def directions(self) -> list[int]:
+        """Numbers of the directions that stand changed all along the way."""
+        return sorted({a.change.direction for a in self.alarms if a.change.place is None})
+
+    def hides(self, position_m: float) -> bool:
+        """Whether what stands keeps a window there from being judged for anything else."""
+        places = [a.change.place for a in self.alarms if a.change.place is not None]
+        return self._moving or any(_share(place, position_m) > _UNSEEN for place in places)
+
+    def add(self, change: Change, since_sample: int, since_s: float) -> Alarm:
+        """A change that was named."""
+        alarm = Alarm(change, since_sample, since_s, change.amount, self._threshold)
+        self.alarms.append(alarm)
+        self._moving = True
+        self._forget()
+        return alarm
+
+    def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
+        """Take a window; the alarms that it ends."""
+        if not self.alarms:
+            return []
+        hidden = any(_share(p, position_m) > _UNSEEN for p in self.offset.places)
+        if not hidden:
+            self._score = _MEMORY * self._score + score + information @ self.offset.logarithms
+            self._information = _MEMORY * self._information + information
+        gone = [a for a in self.alarms if self._gone(a, score, information, position_m, hidden)]
+        self.alarms = [a for a in self.alarms if a not in gone]
+        return gone
+
+    def _gone(self, alarm: Alarm, score: Floats, information: Floats, position_m: float, hidden: bool) -> bool:
+        change, j = alarm.change, alarm.change.direction
+        share = 1.0 if change.place is None else _share(change.place, position_m)
+        if (change.place is None and hidden) or share <= _UNSEEN:
+            return False
+        amount = self._amount(alarm)
+        # Against a machine without this change, with the others as they stand.
+        i = share**2 * information[j, j]
+        s = share * score[j] + i * amount
+        if change.place is not None:
+            alarm.score, alarm.information = _MEMORY * alarm.score + s, _MEMORY * alarm.information + i
+        size = min(abs(change.amount), float(self._machine.held.smallest[j]))
+        middle = max(_HELD_FROM * size, float(self._machine.held.allowed[j]))
+        ratio = size * (np.sign(change.amount) * s - middle * i) / self._machine.held.inflation[j]
+        alarm.height = float(np.clip(alarm.height + ratio, 0.0, self._threshold))
+        return alarm.height == 0.0
+
+    def _amount(self, alarm: Alarm) -> float:
+        """What the offset holds of this alarm."""
+        if alarm.change.place is None:
+            return float(self.offset.logarithms[alarm.change.direction])
+        return next((p.amount for p in self.offset.places if _same(p, alarm.change.place)), 0.0)
+
+    def settle(self) -> None:
+        """At a stretch's end: the model comes along with what stands by now."""
+        before, known = self.offset, self.directions
+        logarithms = np.zeros_like(before.logarithms)
+        if known and np.all(np.diagonal(self._information)[known] > 0):
+            inside = self._information[np.ix_(known, known)]
+            logarithms[known] = np.linalg.solve(inside, self._score[known]).clip(-_MOST, _MOST)
+        places = []
+        for alarm in self.alarms:
+            if alarm.change.place is None:
+                alarm.now = float(logarithms[alarm.change.direction]) or alarm.now
+                logarithms[alarm.change.direction] = alarm.now
+            else:
+                alarm.now = alarm.score / alarm.information if alarm.information > 0 else alarm.now
+                alarm.now = float(np.clip(alarm.now, -_MOST, _MOST))
+                places.append(replace(alarm.change.place, amount=alarm.now))
+        self.offset = Offset(logarithms, tuple(places))
+        at = np.array([p.centre_m for p in places])
+        moved = np.abs(logarithms - before.logarithms).max()
+        if places:
+            moved = max(moved, np.abs(self.offset.stiffness(at) - before.stiffness(at)).max())
+        self._moving = bool(moved > _MOVING)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        places = [[p.centre_m, p.width_m, p.amount] for p in self.offset.places]
+        return {
+            "alarms": np.array([a.row() for a in self.alarms]),
+            "logarithms": self.offset.logarithms,
+            "places": np.array(places),
+            "score": self._score,
+            "information": self._information,
+            "moving": np.array(self._moving),
+        }
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        self.alarms = [Alarm.of(row) for row in state["alarms"]]
+        self.offset = Offset(np.array(state["logarithms"]), tuple(Place(*map(float, row)) for row in state["places"]))
+        self._score, self._information = np.array(state["score"]), np.array(state["information"])
+        self._moving = bool(state["moving"])
+
+
+def _share(place: Place, position_m: float) -> float:
+    return float(place.share(np.array([position_m]))[0])
+
+
+def _same(one: Place, other: Place) -> bool:
+    return (one.centre_m, one.width_m) == (other.centre_m, other.width_m)
