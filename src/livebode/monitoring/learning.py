@@ -33,6 +33,7 @@ _SMOOTH = 1e-4
 _BATCHES = (2, 4, 8)
 _STRETCH = 24  # windows, over which what the model does not know is judged
 _SMALLEST = np.array([0.005, 0.005, 0.05, 0.005])
+_FURTHER = 2.0  # while a change stands, another is seen from so much more on
 _APART = 4.0  # a change is at least this many scatters
 _EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
 
@@ -163,20 +164,20 @@ def _judged(seen: Evidence, machine: Machine) -> Machine:
     return replace(
         machine,
         quiet_power=seen.quiet_power.mean(axis=0),
-        held=_accuracy(*held),
-        free=_accuracy(*free),
+        held=_accuracy(*held, _SMALLEST),
+        free=_accuracy(*free, _FURTHER * _SMALLEST),
         windows=cells(seen.position_m, low, high),
     )
 
 
-def _accuracy(score: Floats, information: Floats) -> Accuracy:
+def _accuracy(score: Floats, information: Floats, smallest: Floats) -> Accuracy:
     inflation = np.ones(len(DIRECTIONS))
     for size in _BATCHES:
         sums, total = _batched(score, size), _batched(information, size)
         inflation = np.maximum(inflation, np.mean(sums**2, axis=0) / np.mean(total, axis=0))
     sums, total = _batched(score, _STRETCH), _batched(information, _STRETCH)
     scatter = np.sqrt(np.maximum(np.mean((sums / total) ** 2 - 1 / total, axis=0), 0.0))
-    return Accuracy(inflation, scatter, np.maximum(_SMALLEST, _APART * scatter))
+    return Accuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
 
 
 def _batched(rows: Floats, size: int) -> Floats:

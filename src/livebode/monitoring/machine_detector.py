@@ -13,6 +13,7 @@ from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.naming import Change, Segment, begin_of, candidates
+from livebode.monitoring.offset import Offset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, unknown
 from livebode.monitoring.standing import Standing
@@ -21,9 +22,9 @@ from livebode.nouns import Event
 CHARTS = 2 * len(DIRECTIONS) + 2
 """That take a step with a window: up and down for each direction, and for stiffness in the cell where the cart is."""
 
-_RECENT = 300
 _DECISIVE = 7.0  # nats between the likeliest name and the next: wrong once in a thousand
-_LOOK_WINDOWS = 120  # after so many a change is named by what is likeliest
+_LOOK_WINDOWS = 600  # after so many a change is named by what is likeliest
+_OFTEN, _SELDOM = 40, 10  # windows during which every one, and then every tenth, is an occasion to name it
 _LOOK_M = 0.3  # a change is a place's only if the rest is not changed: so far one looks around
 _PASSED = 2.0  # standard deviations of a place, behind which its middle is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
@@ -37,7 +38,7 @@ class MachineDetector:
     Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
     has the stiffness of every cell of 5 cm, over all passes. When one reaches the threshold, the windows since it left
     zero are asked which single change they speak for: a direction, or a place of changed stiffness. The Event comes
-    when the likeliest leads by 7 nats and the cart has gone 0.3 m, or after 120 windows. While a change stands, the
+    when the likeliest leads by 7 nats and the cart has gone 0.3 m, or after 600 windows. While a change stands, the
     others are judged with it allowed for, whatever its size, and as coarsely as is known of them then; it clears when its own sum is back at zero.
 
     Parameters
@@ -55,8 +56,8 @@ class MachineDetector:
         self._further = Charts(free.smallest, free.allowed, threshold)
         self._cells = Charts(np.repeat(held.smallest[:1], size), np.repeat(held.allowed[:1], size), threshold)
         self.standing = Standing(machine, threshold)
-        self._recent = Recent(_RECENT)
-        self._pending = -1
+        self._recent = Recent(_LOOK_WINDOWS)
+        self._pending, self._taken = -1, 0
         self._unknown: set[str] = set()
         self.judged = 0
         """Windows judged so far."""
@@ -73,23 +74,28 @@ class MachineDetector:
                 where, speed = float(seen.position_m[i]), float(seen.speed_m_per_s[i])
                 events.append(unknown(status, self._machine, where, speed, int(seen.sample[i]), float(seen.time_s[i])))
         self.standing.settle()
-        return events
+        return events + [changed(a, int(seen.sample[-1]), float(seen.time_s[-1])) for a in self.standing.announced()]
 
     def finish(self) -> list[Event]:
         """A change that was found but not yet named, named by what is likeliest."""
-        return self._named(final=True) if self._pending >= 0 else []
+        if self._pending >= 0:
+            self._name(final=True)
+        _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
+        return [changed(alarm, int(sample), time_s) for alarm in self.standing.announced(known=False)]
 
     def _window(self, seen: Evidence, i: int) -> list[Event]:
         position_m, score, information = float(seen.position_m[i]), seen.score[i], seen.information[i]
         sample, time_s = int(seen.sample[i]), float(seen.time_s[i])
-        mark, self.judged = self.judged, self.judged + 1
-        self._recent.add(score, information, (position_m, float(sample), time_s))
+        self.judged += 1
+        offset = self.standing.offset.logarithms
         gone = self.standing.step(score, information, position_m)
         if gone:
             self._reset()
         events = [cleared(alarm, sample, time_s) for alarm in gone]
         if self.standing.hides(position_m):
             return events
+        mark, self._taken = self._taken, self._taken + 1
+        self._recent.add(score + information @ offset, information, (position_m, float(sample), time_s))
         if self.standing.directions:
             rest = Segment(score[np.newaxis], information[np.newaxis], np.array([position_m]))
             rest = rest.without(self.standing.directions)
@@ -101,34 +107,39 @@ class MachineDetector:
             self._first.step(score, information, mark)
             here = np.arange(len(self._machine.windows)) == self._machine.cell(position_m)
             self._cells.step(*(np.where(here, part[_STIFFNESS], 0.0) for part in (score, information)), mark)
-        return events + self._look()
+        self._look()
+        return events
 
-    def _look(self) -> list[Event]:
-        """The change that the charts have found, once it has a name."""
+    def _look(self) -> None:
+        """Name the change that the charts have found, if they have."""
         if self._pending < 0:
             found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.raised.any()]
             if not found:
-                return []
+                return
             self._pending = int(np.concatenate(found).min())
-        return self._named(final=self.judged - self._pending >= _LOOK_WINDOWS)
+        waited = self._taken - self._pending
+        if waited <= _OFTEN or waited % _SELDOM == 0:
+            self._name(final=waited >= _LOOK_WINDOWS)
 
-    def _named(self, final: bool) -> list[Event]:
-        first = max(self._pending - self.judged, -len(self._recent.moment))
+    def _name(self, final: bool) -> None:
+        first = max(self._pending - self._taken, -len(self._recent.moment))
         moments, standing = self._recent.moment[first:], self.standing.directions
-        segment = self._recent.segment(first).without(standing)
+        beyond = self._recent.segment(first, self.standing.offset)
+        segment = beyond.without(standing)
         known = self._machine.free if standing else self._machine.held
         found = candidates(segment, known, local=not standing)
         found = [c for c in found if abs(c.amount) >= _SMALL * known.smallest[c.direction]]
-        others = [c for c in found[1:] if found[0].evidence - c.evidence < _DECISIVE]
-        if not final and (not found or others or not self._seen_around(segment, found[0])):
-            return []
+        rivals = [c for c in found[1:] if found[0].evidence - c.evidence < _DECISIVE]
+        if not final and (not found or rivals or not self._seen_around(segment, found[0])):
+            return
         self._reset()
-        if not found:
-            return []
-        began = begin_of(segment, found[0])
-        alarm = self.standing.add(found[0], int(moments[began][1]), moments[began][2])
-        way = segment.position_m[began:]
-        return [changed(alarm, others, (float(way.min()), float(way.max())), int(moments[-1][1]), moments[-1][2])]
+        if found:
+            began = begin_of(segment, found[0])
+            way = segment.position_m[began:]
+            seen = self._recent.segment(first + began, Offset())
+            since = int(moments[began][1]), moments[began][2]
+            rival = rivals[0] if rivals else None
+            self.standing.add(found[0], rival, since, (float(way.min()), float(way.max())), seen)
 
     def _seen_around(self, segment: Segment, best: Change) -> bool:
         model, x = self._machine.model, segment.position_m
@@ -144,13 +155,13 @@ class MachineDetector:
 
     def state(self) -> dict[str, NDArray[Any]]:
         parts = {f"{name}.{key}": array for name, part in self._parts().items() for key, array in part.state().items()}
-        numbers = np.array([self._pending, self.judged])
+        numbers = np.array([self._pending, self._taken, self.judged])
         return parts | {"numbers": numbers, "unknown": np.array(sorted(self._unknown), dtype="U16")}
 
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         for name, part in self._parts().items():
             part.load({k.removeprefix(f"{name}."): v for k, v in state.items() if k.startswith(f"{name}.")})
-        self._pending, self.judged = (int(n) for n in state["numbers"])
+        self._pending, self._taken, self.judged = (int(n) for n in state["numbers"])
         self._unknown = {str(name) for name in state["unknown"]}
 
     def _parts(self) -> dict[str, Any]:

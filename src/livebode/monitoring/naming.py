@@ -17,6 +17,7 @@ _WIDTHS_M = np.array([0.02, 0.035, 0.06])  # standard deviations; twice the wide
 _GRID_M = 0.005
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _CONFIDENCE = 1.96
+_SHAPE = 0.3  # of a place's depth, which depends on the shape that it is taken to have
 
 
 @dataclass(frozen=True)
@@ -72,20 +73,22 @@ def candidates(segment: Segment, known: Accuracy, local: bool = True) -> list[Ch
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
     found = [
-        Change(j, score[j] / information[j], _bound(information[j] / known.inflation[j], known.scatter[j]), score[j] ** 2 / (2 * information[j]))
+        Change(j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j]))
         for j in range(len(DIRECTIONS))
         if information[j] > 0
     ]
     if local and information[_STIFFNESS] > 0:
-        found.append(_place(segment, float(known.scatter[_STIFFNESS]), float(known.inflation[_STIFFNESS])))
+        found.append(_place(segment, known))
     return sorted(found, key=lambda change: -change.evidence)
 
 
-def _bound(information: float, scatter: float) -> float:
-    return float(_CONFIDENCE * np.hypot(1 / np.sqrt(information), scatter))
+def bound(known: Accuracy, direction: int, information: float) -> float:
+    """Half-width that holds the truth with 95 %, from windows with this information together."""
+    noise = np.sqrt(known.inflation[direction] / information)
+    return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
 
 
-def _place(segment: Segment, scatter: float, inflation: float) -> Change:
+def _place(segment: Segment, known: Accuracy) -> Change:
     """The likeliest bell-shaped place of changed stiffness."""
     x = segment.position_m
     centres = np.arange(x.min(), x.max() + _GRID_M, _GRID_M)
@@ -95,10 +98,11 @@ def _place(segment: Segment, scatter: float, inflation: float) -> Change:
     with np.errstate(divide="ignore", invalid="ignore"):
         evidence = np.where(information > 0, score**2 / (2 * information), 0.0)
     c, w = np.unravel_index(int(np.argmax(evidence)), evidence.shape)
+    amount = float(score[c, w] / information[c, w])
     return Change(
         _STIFFNESS,
-        float(score[c, w] / information[c, w]),
-        _bound(float(information[c, w]) / inflation, scatter),
+        amount,
+        float(np.hypot(bound(known, _STIFFNESS, float(information[c, w])), _SHAPE * amount)),
         # One of many places, chosen by the data: as likely as it looks, less what the choice is worth.
         float(evidence[c, w] - np.log(max(np.ptp(x), _WIDTHS_M[0]) / _WIDTHS_M[0] * len(_WIDTHS_M))),
         Place(float(centres[c]), float(_WIDTHS_M[w])),

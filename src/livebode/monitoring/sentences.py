@@ -22,15 +22,12 @@ WHAT = {
 }
 
 
-def changed(
-    alarm: Alarm, others: list[Change], way_m: tuple[float, float], sample: int, time_s: float
-) -> Event:
-    """Something changed; `others` are changes that would explain it nearly as well, `way_m` where it was seen."""
-    details = about(alarm, others) | {"seen_from_m": way_m[0], "seen_to_m": way_m[1]}
-    message = f"Since {alarm.since_s:.1f} s {_amount(alarm.change)}{_where(alarm.change)} than the baseline"
-    if others:
-        message += f"; it may also be {' or '.join(_amount(c) for c in others)}"
-    return Event("change", sample, time_s, message + ".", details)
+def changed(alarm: Alarm, sample: int, time_s: float) -> Event:
+    """Something changed, as is known at this sample and time."""
+    message = f"Since {alarm.since_s:.1f} s {_amount(alarm.change, alarm.now, alarm.bound)} than in the baseline"
+    if (rival := alarm.rival) is not None:
+        message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
+    return Event("change", sample, time_s, message + ".", about(alarm))
 
 
 def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
@@ -38,7 +35,7 @@ def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
     where = _where(alarm.change)
     name = WHAT[DIRECTIONS[alarm.change.direction]]
     message = f"At {time_s:.1f} s {name}{where} is as in the baseline again; it had changed since {alarm.since_s:.1f} s."
-    return Event("change-cleared", sample, time_s, message, about(alarm, []))
+    return Event("change-cleared", sample, time_s, message, about(alarm))
 
 
 def unknown(status: str, machine: Machine, position_m: float, speed_m_per_s: float, sample: int, time_s: float) -> Event:
@@ -57,21 +54,20 @@ def unknown(status: str, machine: Machine, position_m: float, speed_m_per_s: flo
     return Event("baseline-unknown", sample, time_s, message, details)
 
 
-def about(alarm: Alarm, others: list[Change]) -> dict[str, Any]:
+def about(alarm: Alarm) -> dict[str, Any]:
     """An alarm as plain data; amounts in percent."""
-    change = alarm.change
+    place, rival = alarm.change.place, alarm.rival
     return {
-        "what": DIRECTIONS[change.direction],
-        "amount_percent": percent(change.amount),
-        "bound_percent": 100 * change.bound,
-        "now_percent": percent(alarm.now),
+        "what": DIRECTIONS[alarm.change.direction],
+        "amount_percent": percent(alarm.now),
+        "bound_percent": 100 * alarm.bound,
         "since_s": alarm.since_s,
         "since_sample": alarm.since_sample,
-        "place_m": change.place.centre_m if change.place else None,
-        "place_width_m": 2.355 * change.place.width_m if change.place else None,  # at half its depth
-        "may_also_be": [
-            {"what": DIRECTIONS[c.direction], "amount_percent": percent(c.amount), "place_m": c.place.centre_m if c.place else None} for c in others
-        ],
+        "place_m": place.centre_m if place else None,
+        "place_width_m": 2.355 * place.width_m if place else None,  # at half its depth
+        "named_from_m": alarm.way_m[0],
+        "named_to_m": alarm.way_m[1],
+        "may_also_be": DIRECTIONS[rival.direction] if rival else None,
     }
 
 
@@ -79,11 +75,10 @@ def percent(log_amount: float) -> float:
     return 100 * expm1(log_amount)
 
 
-def _amount(change: Change) -> str:
-    amount, bound = percent(change.amount), 100 * change.bound
-    digits = 2 if bound < 0.1 else 1
-    word_ = "less" if amount < 0 else "more"
-    return f"{WHAT[DIRECTIONS[change.direction]]} is {abs(amount):.{digits}f} ± {bound:.{digits}f} % {word_}"
+def _amount(change: Change, amount: float, bound: float) -> str:
+    digits = 2 if bound < 1e-3 else 1
+    size = f"{abs(percent(amount)):.{digits}f} ± {100 * bound:.{digits}f} %"
+    return f"{WHAT[DIRECTIONS[change.direction]]}{_where(change)} is {size} {'less' if amount < 0 else 'more'}"
 
 
 def _where(change: Change) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.machine import Machine
-from livebode.monitoring.naming import Change
+from livebode.monitoring.naming import Change, Segment, bound
 from livebode.monitoring.offset import Offset, Place
 
 Floats = NDArray[np.float64]
@@ -50,13 +50,24 @@ class Standing:
         places = [a.change.place for a in self.alarms if a.change.place is not None]
         return self._moving or any(_share(place, position_m) > _UNSEEN for place in places)
 
-    def add(self, change: Change, since_sample: int, since_s: float) -> Alarm:
-        """A change that was named."""
-        alarm = Alarm(change, since_sample, since_s, change.amount, self._threshold)
+    def add(
+        self, change: Change, rival: Change | None, since: tuple[int, float], way_m: tuple[float, float], seen: Segment
+    ) -> None:
+        """A change that was named, with the windows since it began: their evidence of changes from the baseline."""
+        alarm = Alarm(change, rival, *since, way_m, change.amount, change.bound, self._threshold)
+        alarm.information = 2 * change.evidence / change.amount**2
+        alarm.score = change.amount * alarm.information
         self.alarms.append(alarm)
+        self._score, self._information = seen.score.sum(axis=0), seen.information.sum(axis=0)
         self._moving = True
-        self._forget()
-        return alarm
+
+    def announced(self, known: bool = True) -> list[Alarm]:
+        """Alarms that were not out yet, and whose amount is `known`; that of a place is when it is next passed."""
+        new = [a for a in self.alarms if not a.announced]
+        new = [a for a in new if not known or a.change.place is not None or not self._moving]
+        for alarm in new:
+            alarm.announced = True
+        return new
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
         """Take a window; the alarms that it ends."""
@@ -67,7 +78,7 @@ class Standing:
             self._score = _MEMORY * self._score + score + information @ self.offset.logarithms
             self._information = _MEMORY * self._information + information
         gone = [a for a in self.alarms if self._gone(a, score, information, position_m, hidden)]
-        self.alarms = [a for a in self.alarms if a not in gone]
+        self.alarms = [a for a in self.alarms if not any(a is g for g in gone)]
         return gone
 
     def _gone(self, alarm: Alarm, score: Floats, information: Floats, position_m: float, hidden: bool) -> bool:
@@ -95,26 +106,37 @@ class Standing:
 
     def settle(self) -> None:
         """At a stretch's end: the model comes along with what stands by now."""
-        before, known = self.offset, self.directions
-        logarithms = np.zeros_like(before.logarithms)
-        if known and np.all(np.diagonal(self._information)[known] > 0):
-            inside = self._information[np.ix_(known, known)]
-            logarithms[known] = np.linalg.solve(inside, self._score[known]).clip(-_MOST, _MOST)
-        places = []
+        before, places = self.offset, []
+        logarithms = self._directions_now()
         for alarm in self.alarms:
-            if alarm.change.place is None:
-                alarm.now = float(logarithms[alarm.change.direction]) or alarm.now
-                logarithms[alarm.change.direction] = alarm.now
-            else:
-                alarm.now = alarm.score / alarm.information if alarm.information > 0 else alarm.now
-                alarm.now = float(np.clip(alarm.now, -_MOST, _MOST))
+            if alarm.change.place is not None:
+                if alarm.information > 0:
+                    alarm.now = float(np.clip(alarm.score / alarm.information, -_MOST, _MOST))
                 places.append(replace(alarm.change.place, amount=alarm.now))
         self.offset = Offset(logarithms, tuple(places))
         at = np.array([p.centre_m for p in places])
+        local = np.abs(self.offset.stiffness(at) - before.stiffness(at)).max() if places else 0.0
         moved = np.abs(logarithms - before.logarithms).max()
-        if places:
-            moved = max(moved, np.abs(self.offset.stiffness(at) - before.stiffness(at)).max())
-        self._moving = bool(moved > _MOVING)
+        self._moving = bool(max(local, moved) > _MOVING)
+        if moved > _MOVING:  # what was gathered around the old offset would pull the new one back
+            self._forget()
+
+    def _directions_now(self) -> Floats:
+        """Amounts of the directions that stand, estimated together, with their bounds."""
+        known, logarithms = self.directions, np.zeros_like(self.offset.logarithms)
+        inside = self._information[np.ix_(known, known)]
+        if known and np.all(np.diagonal(inside) > 0):
+            covariance = np.linalg.inv(inside)
+            found = covariance @ self._score[known]
+            for i, j in enumerate(known):
+                accuracy = self._machine.held if len(known) == 1 else self._machine.free
+                for alarm in (a for a in self.alarms if a.change.direction == j and a.change.place is None):
+                    alarm.now = float(np.clip(found[i], -_MOST, _MOST))
+                    alarm.bound = bound(accuracy, j, 1 / covariance[i, i])
+        for alarm in self.alarms:
+            if alarm.change.place is None:
+                logarithms[alarm.change.direction] = alarm.now
+        return logarithms
 
     def state(self) -> dict[str, NDArray[Any]]:
         places = [[p.centre_m, p.width_m, p.amount] for p in self.offset.places]
