@@ -19,8 +19,8 @@ import numpy as np
 
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.fitting.windows import fit_windows
 from livebode.motion import MotionCorrection
-from livebode.motion.windows import fit_windows
 from livebode.nouns import Block, Lines, Responses
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
+    from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, fit
     from livebode.kernel import SlidingDFT
     from livebode.nouns import (
         PID,
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
         Lines,
         Loop,
         Model,
+        Parameters,
         PositionPD,
         Response,
         Responses,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
+    "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "fit"),
     "kernel": ("SlidingDFT",),
     "nouns": (
         "PID",
@@ -42,6 +45,7 @@ _HOME = {
         "Lines",
         "Loop",
         "Model",
+        "Parameters",
         "PositionPD",
         "Response",
         "Responses",
@@ -57,18 +61,24 @@ __all__ = [
     "Channel",
     "Event",
     "Excitation",
+    "Fit",
+    "Fitter",
     "GridError",
     "InputError",
     "Lines",
     "Log",
     "Loop",
     "Model",
+    "Parameter",
+    "Parameters",
+    "PhysicalModel",
     "PositionPD",
     "Response",
     "Responses",
     "Settings",
     "SlidingDFT",
     "Tracker",
+    "fit",
     "multisine",
     "open_log",
     "recognise",

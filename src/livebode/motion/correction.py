@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings, Tracker
-from livebode.motion import two_masses
+from livebode.fitting import two_masses
 from livebode.motion.drive import drive_of
 from livebode.motion.fit import Fit, Rows
 from livebode.motion.model import MovingModel

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.motion import two_masses
-from livebode.motion.least_squares import minimise
+from livebode.fitting import two_masses
+from livebode.fitting.least_squares import minimise
+from livebode.fitting.windows import scan
 from livebode.motion.model import Curve, MovingModel, basis
-from livebode.motion.windows import scan
 from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ class Fit:
             cost = np.sum(np.abs(residual) ** 2) + unknowns[0] @ pull @ unknowns[0]
             return np.atleast_1d(cost), gradient[np.newaxis], matrix[np.newaxis]
 
-        unknowns, _ = minimise(normal, self._unknowns(model)[np.newaxis])
+        unknowns = minimise(normal, self._unknowns(model)[np.newaxis]).parameters
         return self._model(unknowns[0], low, high)
 
     def _design(self, position_m: Floats, low: float, high: float) -> Floats:

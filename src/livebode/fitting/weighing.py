@@ -1,0 +1,65 @@
+"""Weights of lines: their noise, and what the model lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.problem import Measured
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_HALVINGS = 50
+
+
+def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
+    """√2/√(sigma² + (ε|G|)²): residuals so weighted have a sum of squares of one each, real and imaginary apart.
+
+    sigma (rows, lines), NaN or zero where it is not known; size |G|, (rows, lines); epsilon (rows,).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):  # a fit that ran away has no size
+        variance = np.where(sigma > 0, sigma, 0.0) ** 2 + (epsilon[:, np.newaxis] * size) ** 2
+        return np.where(variance > 0, np.sqrt(2 / variance), 0.0)
+
+
+def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Floats:
+    """ε ≥ 0 with Σ 2·rest/(noise + ε²·size) = dof, (rows,); all are squares, (rows, lines), zero where not used.
+
+    Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Σ 2·rest/(ε²·size) bounds the left side from above.
+        highest = np.nansum(np.where(rest > 0, 2 * rest / size, 0.0), axis=-1) / dof
+        low, high = np.zeros(len(rest)), highest
+        noisy = _reduced(rest, noise, size, low) <= dof
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            above = _reduced(rest, noise, size, middle) > dof
+            low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return np.where(noisy | ~(dof > 0) | ~np.isfinite(high), 0.0, np.sqrt(high))
+
+
+def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:
+    """|residual|², sigma² and |G|² of the model, (rows, lines), zero where a line is not used."""
+    rest = np.abs(np.where(measured.use, measured.value - response, 0.0)) ** 2
+    noise = np.where(measured.use & (measured.sigma > 0), measured.sigma, 0.0) ** 2
+    return rest, noise, np.where(measured.use, np.abs(response), 0.0) ** 2
+
+
+def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
+    """Each row's ε by its own residuals, (rows,)."""
+    return epsilon_for(*squares(measured, response), dof)
+
+
+def chi_squared(rest: Floats, noise: Floats) -> Floats:
+    """Σ 2·rest/noise over the lines whose noise is known, (rows,); NaN where none is."""
+    known = noise > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = np.sum(np.where(known, 2 * rest / noise, 0.0), axis=-1)
+    return np.where(known.any(axis=-1), total, np.nan)
+
+
+def _reduced(rest: Floats, noise: Floats, size: Floats, square: Floats) -> Floats:
+    below = noise + square[:, np.newaxis] * size
+    return np.asarray(np.sum(np.where(rest > 0, 2 * rest / below, 0.0), axis=-1))
