@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.monitoring.accuracy import Accuracy, accuracy
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.machine import Accuracy, Machine, cells
+from livebode.monitoring.machine import Machine, cells
 from livebode.monitoring.model_evidence import ModelEvidence, held, wave, way
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.sensitivity import DIRECTIONS
@@ -30,11 +31,9 @@ _FLAT_M = 1e-2  # a way shorter than that has no curves
 _SLOWEST = 0.25  # of the fastest speed: slower, dry friction may hold the cart between the excitation's strokes
 _ROWS_MIN, _ROWS_MAX = 60, 4000
 _SMOOTH = 1e-4
-_BATCHES = (2, 4, 8)
-_STRETCH = 24  # windows, over which what the model does not know is judged
 _SMALLEST = np.array([0.005, 0.005, 0.05, 0.005])
-_FURTHER = 2.0  # while a change stands, another is seen from so much more on
-_APART = 4.0  # a change is at least this many scatters
+# While a change stands, another is seen from so much more on: friction of a slow cart looks like the last two.
+_FURTHER = np.array([2.0, 2.0, 4.0, 4.0])
 _EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
 
 
@@ -164,22 +163,7 @@ def _judged(seen: Evidence, machine: Machine) -> Machine:
     return replace(
         machine,
         quiet_power=seen.quiet_power.mean(axis=0),
-        held=_accuracy(*held, _SMALLEST),
-        free=_accuracy(*free, _FURTHER * _SMALLEST),
+        held=accuracy(*held, _SMALLEST),
+        free=accuracy(*free, _FURTHER * _SMALLEST),
         windows=cells(seen.position_m, low, high),
     )
-
-
-def _accuracy(score: Floats, information: Floats, smallest: Floats) -> Accuracy:
-    inflation = np.ones(len(DIRECTIONS))
-    for size in _BATCHES:
-        sums, total = _batched(score, size), _batched(information, size)
-        inflation = np.maximum(inflation, np.mean(sums**2, axis=0) / np.mean(total, axis=0))
-    sums, total = _batched(score, _STRETCH), _batched(information, _STRETCH)
-    scatter = np.sqrt(np.maximum(np.mean((sums / total) ** 2 - 1 / total, axis=0), 0.0))
-    return Accuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
-
-
-def _batched(rows: Floats, size: int) -> Floats:
-    whole = len(rows) // size * size
-    return np.asarray(rows[:whole].reshape(-1, size, rows.shape[1]).sum(axis=1))

@@ -7,37 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.monitoring.accuracy import Accuracy
 from livebode.motion import MovingModel
 
 Floats = NDArray[np.float64]
 
 _KNOWN_WINDOWS = 5
-_CELL_M = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Accuracy:
-    """Of a change of each direction, as healthy motion shows it, each of shape (4,).
-
-    Attributes
-    ----------
-    inflation
-        Variance of the mean over neighbouring windows, against what independent windows would have; at least 1.
-    scatter
-        Standard deviation of a change that was not there, over stretches of healthy motion: what speeds, directions
-        and friction leave that the model does not know.
-    smallest
-        The smallest change that an alarm is for, of the logarithm.
-    """
-
-    inflation: Floats
-    scatter: Floats
-    smallest: Floats
-
-    @property
-    def allowed(self) -> Floats:
-        """How far a healthy machine may lie off the model."""
-        return 2 * self.scatter
+_CELLS = 28
+_STILL_M = 1e-9  # a way of no length has one cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +32,7 @@ class Machine:
     slowest_m_per_s, fastest_m_per_s
         Speeds that were learned.
     windows
-        How many windows were learned in each cell of 5 cm from the model's lowest position on.
+        How many windows were learned in each of 28 cells of the way.
     """
 
     model: MovingModel
@@ -67,18 +44,28 @@ class Machine:
     fastest_m_per_s: float
     windows: NDArray[np.int64]
 
+    @property
+    def way_m(self) -> float:
+        """From the lowest to the highest position that was learned."""
+        return self.model.high_m - self.model.low_m
+
     def cell(self, position_m: float) -> int:
-        """Number of the cell of 5 cm there."""
-        return int(np.floor((position_m - self.model.low_m) / _CELL_M))
+        """Number of the cell there."""
+        return int(_cell(np.array([position_m]), self.model.low_m, self.model.high_m)[0])
 
     def known(self, position_m: Floats) -> NDArray[np.bool_]:
         """Whether enough windows were learned there."""
-        cell = np.floor((position_m - self.model.low_m) / _CELL_M).astype(int)
-        inside = (cell >= 0) & (cell < len(self.windows))
-        return np.asarray(inside & (self.windows[cell.clip(0, len(self.windows) - 1)] >= _KNOWN_WINDOWS))
+        low, high = self.model.low_m, self.model.high_m
+        margin = (high - low) / _CELLS / 2 + _STILL_M
+        inside = (position_m >= low - margin) & (position_m <= high + margin)
+        return np.asarray(inside & (self.windows[_cell(position_m, low, high)] >= _KNOWN_WINDOWS))
 
 
 def cells(position_m: Floats, low_m: float, high_m: float) -> NDArray[np.int64]:
-    """Number of windows in each cell of 5 cm."""
-    number = int(np.ceil((high_m - low_m) / _CELL_M + 1e-9)) + 1
-    return np.bincount(np.floor((position_m - low_m) / _CELL_M).astype(int).clip(0, number - 1), minlength=number)
+    """Number of windows in each of 28 cells of the way."""
+    return np.bincount(_cell(position_m, low_m, high_m), minlength=_CELLS)
+
+
+def _cell(position_m: Floats, low_m: float, high_m: float) -> NDArray[np.int64]:
+    share = (position_m - low_m) / max(high_m - low_m, _STILL_M)
+    return np.floor(share * _CELLS).astype(np.int64).clip(0, _CELLS - 1)

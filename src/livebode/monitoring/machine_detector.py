@@ -25,10 +25,10 @@ CHARTS = 2 * len(DIRECTIONS) + 2
 _DECISIVE = 7.0  # nats between the likeliest name and the next: wrong once in a thousand
 _LOOK_WINDOWS = 600  # after so many a change is named by what is likeliest
 _OFTEN, _SELDOM = 40, 10  # windows during which every one, and then every tenth, is an occasion to name it
-_LOOK_M = 0.3  # a change is a place's only if the rest is not changed: so far one looks around
+_LOOK = 0.22  # of the way: a change is a place's only if the rest is not changed, so one looks around
 _PASSED = 2.0  # standard deviations of a place, behind which its middle is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
-_SMALL = 0.25  # of the smallest change that an alarm is for: less is none
+_SMALL, _SMALL_FURTHER = 0.25, 0.5  # of the smallest change that an alarm is for: less is none
 _STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED}
 
 
@@ -36,9 +36,9 @@ class MachineDetector:
     """Evidence in, Events out: what changed, by how much, since when, where.
 
     Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
-    has the stiffness of every cell of 5 cm, over all passes. When one reaches the threshold, the windows since it left
+    has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since it left
     zero are asked which single change they speak for: a direction, or a place of changed stiffness. The Event comes
-    when the likeliest leads by 7 nats and the cart has gone 0.3 m, or after 600 windows. While a change stands, the
+    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows. While a change stands, the
     others are judged with it allowed for, whatever its size, and as coarsely as is known of them then; it clears when its own sum is back at zero.
 
     Parameters
@@ -127,8 +127,9 @@ class MachineDetector:
         beyond = self._recent.segment(first, self.standing.offset)
         segment = beyond.without(standing)
         known = self._machine.free if standing else self._machine.held
-        found = candidates(segment, known, local=not standing)
-        found = [c for c in found if abs(c.amount) >= _SMALL * known.smallest[c.direction]]
+        found = candidates(segment, known, self._machine.way_m, local=not standing)
+        least = (_SMALL_FURTHER if standing else _SMALL) * known.smallest
+        found = [c for c in found if abs(c.amount) >= least[c.direction]]
         rivals = [c for c in found[1:] if found[0].evidence - c.evidence < _DECISIVE]
         if not final and (not found or rivals or not self._seen_around(segment, found[0])):
             return
@@ -142,8 +143,8 @@ class MachineDetector:
             self.standing.add(found[0], rival, since, (float(way.min()), float(way.max())), seen)
 
     def _seen_around(self, segment: Segment, best: Change) -> bool:
-        model, x = self._machine.model, segment.position_m
-        if np.ptp(x) < min(_LOOK_M, (model.high_m - model.low_m) / 2):
+        x = segment.position_m
+        if np.ptp(x) < _LOOK * self._machine.way_m:
             return False
         return best.place is None or abs(float(x[-1]) - best.place.centre_m) > _PASSED * best.place.width_m
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.machine import Accuracy
+from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.offset import Place
 from livebode.monitoring.sensitivity import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
-_WIDTHS_M = np.array([0.02, 0.035, 0.06])  # standard deviations; twice the widest still lies in a way of 0.3 m
-_GRID_M = 0.005
+# Standard deviations of a place, and the grid of its centre, as shares of the way that was learned.
+_WIDTHS = np.array([0.015, 0.026, 0.045])
+_GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _CONFIDENCE = 1.96
 _SHAPE = 0.3  # of a place's depth, which depends on the shape that it is taken to have
@@ -68,8 +69,11 @@ class Segment:
         return Segment(score, information, self.position_m)
 
 
-def candidates(segment: Segment, known: Accuracy, local: bool = True) -> list[Change]:
-    """Every single change, the likeliest first; what is `known` of the healthy machine widens the bounds."""
+def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = True) -> list[Change]:
+    """Every single change, the likeliest first; what is `known` of the healthy machine widens the bounds.
+
+    `way_m` is the way that was learned; with `local`, places of a few hundredths of it are looked for too.
+    """
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
     found = [
@@ -77,8 +81,8 @@ def candidates(segment: Segment, known: Accuracy, local: bool = True) -> list[Ch
         for j in range(len(DIRECTIONS))
         if information[j] > 0
     ]
-    if local and information[_STIFFNESS] > 0:
-        found.append(_place(segment, known))
+    if local and way_m > 0 and information[_STIFFNESS] > 0:
+        found.append(_place(segment, known, way_m))
     return sorted(found, key=lambda change: -change.evidence)
 
 
@@ -88,11 +92,11 @@ def bound(known: Accuracy, direction: int, information: float) -> float:
     return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
 
 
-def _place(segment: Segment, known: Accuracy) -> Change:
+def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
     """The likeliest bell-shaped place of changed stiffness."""
-    x = segment.position_m
-    centres = np.arange(x.min(), x.max() + _GRID_M, _GRID_M)
-    bell = np.exp(-((x[:, np.newaxis, np.newaxis] - centres[:, np.newaxis]) ** 2) / (2 * _WIDTHS_M**2))
+    x, widths = segment.position_m, _WIDTHS * way_m
+    centres = np.arange(x.min(), x.max() + _GRID * way_m, _GRID * way_m)
+    bell = np.exp(-((x[:, np.newaxis, np.newaxis] - centres[:, np.newaxis]) ** 2) / (2 * widths**2))
     score = np.einsum("r,rcw->cw", segment.score[:, _STIFFNESS], bell)
     information = np.einsum("r,rcw->cw", segment.information[:, _STIFFNESS, _STIFFNESS], bell**2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -104,8 +108,8 @@ def _place(segment: Segment, known: Accuracy) -> Change:
         amount,
         float(np.hypot(bound(known, _STIFFNESS, float(information[c, w])), _SHAPE * amount)),
         # One of many places, chosen by the data: as likely as it looks, less what the choice is worth.
-        float(evidence[c, w] - np.log(max(np.ptp(x), _WIDTHS_M[0]) / _WIDTHS_M[0] * len(_WIDTHS_M))),
-        Place(float(centres[c]), float(_WIDTHS_M[w])),
+        float(evidence[c, w] - np.log(max(np.ptp(x) / widths[0], 1.0) * len(widths))),
+        Place(float(centres[c]), float(widths[w])),
     )
 
 

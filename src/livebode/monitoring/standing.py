@@ -62,12 +62,17 @@ class Standing:
         self._moving = True
 
     def announced(self, known: bool = True) -> list[Alarm]:
-        """Alarms that were not out yet, and whose amount is `known`; that of a place is when it is next passed."""
+        """Alarms that were not out yet, and whose amount is `known`; that of a place is when it is next passed.
+
+        One that comes to nothing once the model has come along is dropped.
+        """
         new = [a for a in self.alarms if not a.announced]
         new = [a for a in new if not known or a.change.place is not None or not self._moving]
         for alarm in new:
             alarm.announced = True
-        return new
+        nothing = [a for a in new if abs(a.now) <= a.bound]
+        self.alarms = [a for a in self.alarms if not any(a is n for n in nothing)]
+        return [a for a in new if abs(a.now) > a.bound]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
         """Take a window; the alarms that it ends."""
