@@ -79,7 +79,7 @@ class Apart:
         if len(sample):
             self._sample, self._schedule = int(sample[-1]), float(schedule[-1])
         step = np.diff(before)
-        known = follows | ~np.isfinite(schedule)
+        known = (follows & np.isfinite(step)) | ~np.isfinite(schedule)
         return Rows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
