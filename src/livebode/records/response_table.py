@@ -12,6 +12,7 @@ from livebode.nouns import Responses
 
 SCHEMA = pa.schema(
     [
+        ("first", pa.int64()),
         ("sample", pa.int64()),
         ("time_s", pa.float64()),
         ("schedule", pa.float64()),
@@ -24,11 +25,11 @@ SCHEMA = pa.schema(
         ("valid", pa.bool_()),
     ]
 )
-"""Columns: newest sample of the window, time of its centre (s), scheduling signal there, line (Hz), complex response,
-sigma with its degrees of freedom, coherence, validity. NaN where there is no value."""
+"""Columns: oldest and newest sample that went in, time of the centre (s), scheduling signal there, line (Hz), complex
+response, sigma with its degrees of freedom, coherence, validity. NaN where there is no value."""
 
 # Columns that repeat over the lines or rows compress by a dictionary; the measured ones never do.
-_REPEATING = ["sample", "time_s", "schedule", "frequency_hz", "dof"]
+_REPEATING = ["first", "sample", "time_s", "schedule", "frequency_hz", "dof"]
 _GROUP_ROWS = 1 << 18
 
 
@@ -63,7 +64,7 @@ class ResponseTable:
 def as_batch(responses: Responses) -> pa.RecordBatch:
     """The responses in long form."""
     rows, lines = responses.value.shape
-    per_row = [np.repeat(x, lines) for x in (responses.sample, responses.time_s, responses.schedule)]
+    per_row = [np.repeat(x, lines) for x in (responses.first, responses.sample, responses.time_s, responses.schedule)]
     per_line = np.tile(responses.lines.frequency_hz, rows)
     value = responses.value.ravel()
     columns = [

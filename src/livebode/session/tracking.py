@@ -163,7 +163,10 @@ def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> d
         "rate_hz": lines.rate_hz,
         "window": lines.window,
         "frequency_hz": lines.frequency_hz.tolist(),
+        "bins": list(lines.bins),
+        "quiet_bins": list(lines.quiet),
         "hop": settings.step,
+        "quantity": responses.quantity,
         "unit": responses.unit,
     }
     versions = {

@@ -1,0 +1,58 @@
+"""A run read back is what was written, and a damaged one is refused with a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.estimation import Settings, Tracker
+from livebode.nouns import Block, InputError, Lines
+from livebode.records import Run
+from tests.command import RATE_HZ, livebode, signals, write_parquet
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    columns = signals()
+    columns["y"][700] = np.nan
+    log, out = write_parquet(tmp_path / "log.parquet", columns), tmp_path / "run"
+    given = ("--excitation", "w", "--input", "u", "--output", "y", "--schedule", "t", "--lines", "50,100,200")
+    assert livebode("run", log, *given, "--window", 100, "--hop", 1, "--out", out).code == 0
+    return out
+
+
+@pytest.mark.parametrize("rows", [1, 7, 1 << 16])
+def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("livebode.records.run._ROWS", rows)
+    columns = signals()
+    columns["y"][700] = np.nan
+    lines = Lines.parse("50,100,200", RATE_HZ, 100)
+    block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
+    expected = Tracker(Settings(lines=lines, output="y", input="u", excitation="w", schedule="t", hop=1)).process(block)
+    read = Run.open(run)
+    assert read.lines == lines
+    found = read.responses()
+    for field in fields(found):
+        a, b = getattr(found, field.name), getattr(expected, field.name)
+        assert np.array_equal(a, b, equal_nan=a.dtype.kind in "fc") if isinstance(a, np.ndarray) else a == b, field.name
+    assert [event.kind for event in read.events()] == ["non-finite"]
+
+
+def test_what_is_not_a_whole_run_is_refused(run: Path, tmp_path: Path) -> None:
+    def refused(path: Path) -> str:
+        with pytest.raises(InputError) as error:
+            Run.open(path).responses()
+        return str(error.value)
+
+    assert "has no run.json" in refused(tmp_path)
+    table = run / "responses.parquet"
+    whole = table.read_bytes()
+    table.write_bytes(whole[: len(whole) // 2])
+    assert "responses.parquet' cannot be read" in refused(run)
+    (run / "run.json").write_text("{")
+    assert "run.json' cannot be read" in refused(run)
+    (run / "run.json").write_text("[]")
+    assert "does not name its lines" in refused(run)
