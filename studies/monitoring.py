@@ -124,7 +124,9 @@ class Study:
                 at = next((i for i in range(first, len(seen)) if raised(detector, seen, i)), len(seen))
                 alarms, first = alarms + (at < len(seen)), at + 1
             rows.append({"asked": self.count / strokes_between, "came": alarms})
-            print(f"  asked for one in {strokes_between} strokes: {alarms} came, {self.count / strokes_between:g} allowed")
+            print(
+                f"  asked for one in {strokes_between} strokes: {alarms} came, {self.count / strokes_between:g} allowed"
+            )
         self.numbers["rates"] = rows
         self.target("false alarms over those allowed, at worst", max(r["came"] / r["asked"] for r in rows), 1.0)
 
@@ -172,8 +174,14 @@ class Study:
             time_s = first.time_s if first else motion.edges_s[-1]
             lost.append(2 * time_s / ramp_s if first and first.details["what"] == "stiffness" else float("inf"))
             used += int(np.searchsorted(motion.edges_s, time_s))
-        self.numbers["ramp"] = {"ramps": len(lost), "lost_percent_mean": float(np.mean(lost)), "most": float(np.max(lost))}
-        print(f"\nramp of 2 % in 200 strokes, {len(lost)} ramps: found at {np.mean(lost):.3f} % lost, at most {max(lost):.3f} %")
+        self.numbers["ramp"] = {
+            "ramps": len(lost),
+            "lost_percent_mean": float(np.mean(lost)),
+            "most": float(np.max(lost)),
+        }
+        print(
+            f"\nramp of 2 % in 200 strokes, {len(lost)} ramps: found at {np.mean(lost):.3f} % lost, at most {max(lost):.3f} %"
+        )
         self.target("ramp of 2 % in 200 strokes: lost when found as stiffness, %", float(np.max(lost)), 1.0)
 
     def spot(self) -> None:
@@ -211,7 +219,9 @@ class Study:
             seeds = 400_000 if what == "stiffness" else 500_000
             done = [trial(self.machine, seeds + i, fault) for i in range(self.count)]
             self._found(f"{what}_2", f"2 % of {what}", done, what, truth)
-            self.target(f"2 % of {what}: named {what} within one stroke, %", self._share(t.found(what) for t in done), 99, True)
+            self.target(
+                f"2 % of {what}: named {what} within one stroke, %", self._share(t.found(what) for t in done), 99, True
+            )
 
     def damping(self) -> None:
         count = max(self.count // 5, 1)

@@ -1,4 +1,5 @@
 """The figure of docs/monitoring.md."""
+
 from __future__ import annotations
 from pathlib import Path
 from livebode.monitoring import Machine

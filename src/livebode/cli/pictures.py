@@ -6,9 +6,12 @@ import os
 import sys
 from pathlib import Path
 from shutil import get_terminal_size
+from typing import Any
 
 from livebode.nouns import Responses
 from livebode.session import Draw, Outcome
+
+_ALARMS_SHOWN = 8
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:
@@ -44,6 +47,16 @@ def show(outcome: Outcome) -> None:
         f"from {counts['samples']} samples{gaps}: "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
     )
+    if "monitoring" in outcome.summary:
+        _show_monitoring(outcome.summary["monitoring"])
+
+
+def _show_monitoring(found: dict[str, Any]) -> None:
+    for sentence in found.get("alarms", [])[:_ALARMS_SHOWN]:
+        print(sentence)
+    if (more := len(found.get("alarms", [])) - _ALARMS_SHOWN) > 0:
+        print(f"and {_many(more, 'alarm')} more in events.jsonl")
+    print(found["message"])
 
 
 def _many(number: int, noun: str) -> str:

@@ -99,7 +99,11 @@ class Recent:
         return Segment(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        return {"score": np.array(self.score), "information": np.array(self.information), "moment": np.array(self.moment)}
+        return {
+            "score": np.array(self.score),
+            "information": np.array(self.information),
+            "moment": np.array(self.moment),
+        }
 
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         self.score, self.information = list(state["score"]), list(state["information"])

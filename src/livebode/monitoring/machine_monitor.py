@@ -13,6 +13,7 @@ from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.machine_detector import CHARTS, MachineDetector
 from livebode.monitoring.model_evidence import ModelEvidence
+from livebode.monitoring.sentences import about
 from livebode.monitoring.stretches import Stretch, Stretches
 from livebode.nouns import Block, Event, Lines
 
@@ -45,6 +46,10 @@ class MachineMonitor:
     def finish(self, look: Look | None = None) -> list[Event]:
         """The same, and a change that was found but not yet told apart from others."""
         return self.rest(look) + self.detector.finish()
+
+    def standing(self) -> list[dict[str, Any]]:
+        """Changes that stand, as plain data."""
+        return [about(alarm) for alarm in self.detector.standing.alarms if alarm.announced]
 
     def _judged(self, stretches: list[Stretch], look: Look | None) -> list[Event]:
         events: list[Event] = []

@@ -120,9 +120,7 @@ def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
     return np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window)
 
 
-def way(
-    x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Position and speed at the centre of the windows that begin there, and whether they and the ones before are even.
 
     Where the speed changes, friction lets go or takes hold, which is not in the model.

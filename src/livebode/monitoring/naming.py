@@ -77,7 +77,9 @@ def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = Tr
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
     found = [
-        Change(j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j]))
+        Change(
+            j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j])
+        )
         for j in range(len(DIRECTIONS))
         if information[j] > 0
     ]

@@ -34,20 +34,24 @@ def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
     """A change that was alarmed has gone."""
     where = _where(alarm.change)
     name = WHAT[DIRECTIONS[alarm.change.direction]]
-    message = f"At {time_s:.1f} s {name}{where} is as in the baseline again; it had changed since {alarm.since_s:.1f} s."
+    message = (
+        f"At {time_s:.1f} s {name}{where} is as in the baseline again; it had changed since {alarm.since_s:.1f} s."
+    )
     return Event("change-cleared", sample, time_s, message, about(alarm))
 
 
-def unknown(status: str, machine: Machine, position_m: float, speed_m_per_s: float, sample: int, time_s: float) -> Event:
+def unknown(
+    status: str, machine: Machine, position_m: float, speed_m_per_s: float, sample: int, time_s: float
+) -> Event:
     """The machine does what was not learned."""
     if status == word.FAST:
         message = (
-            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} m/s, and the axis goes at "
-            f"{abs(speed_m_per_s):.3g} m/s; such motion is not judged. Learn from a run that holds it."
+            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis goes at "
+            f"{abs(speed_m_per_s):.3g}; such motion is not judged. Learn from a run that holds it."
         )
     else:
         message = (
-            f"The baseline does not know the axis at {position_m:.2f} m; it is not judged there. "
+            f"The baseline does not know the axis at position {position_m:.3g}; it is not judged there. "
             "Learn from a run that goes there."
         )
     details = {"reason": status, "position_m": position_m, "speed_m_per_s": speed_m_per_s}
@@ -82,4 +86,4 @@ def _amount(change: Change, amount: float, bound: float) -> str:
 
 
 def _where(change: Change) -> str:
-    return f" around {change.place.centre_m:.2f} m" if change.place else ""
+    return f" around position {change.place.centre_m:.3g}" if change.place else ""

@@ -142,4 +142,3 @@ class TableMonitor:
         self._seen_in = np.array(state["seen_in"])
         self.judged, self._found, told = (int(n) for n in state["numbers"])
         self._told_unknown = bool(told)
-

@@ -55,7 +55,13 @@ _KIND = {"lines": "responses", "parameters": "parameters"}
 
 def _item(table: Table, component: int, amount: float, bound: float) -> dict[str, Any]:
     if table.what == "parameters":
-        return {"name": table.names[component], "of": "value", "unit": "%", "amount": 100 * amount, "bound": 100 * bound}
+        return {
+            "name": table.names[component],
+            "of": "value",
+            "unit": "%",
+            "amount": 100 * amount,
+            "bound": 100 * bound,
+        }
     name = table.names[component // 2]
     if component % 2:
         return {"name": name, "of": "phase", "unit": "°", "amount": np.degrees(amount), "bound": np.degrees(bound)}

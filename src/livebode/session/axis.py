@@ -59,6 +59,13 @@ class TrackingSection(_Section):
     spikes: list[str] = []
 
 
+class MonitoringSection(_Section):
+    """[monitoring]: the baseline to tell changes against, and how often a false alarm may come, in words."""
+
+    baseline: Annotated[Path, Field(strict=False)] | None = None
+    false_alarms: str = "one in 30 days of motion"
+
+
 class _ControllerSection(_Section):
     rate_hz: Positive
     held_ticks: Annotated[int, Field(ge=1)] = 1
@@ -149,6 +156,7 @@ class Axis(_Section):
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
+    monitoring: MonitoringSection = MonitoringSection()
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -171,8 +179,12 @@ class Axis(_Section):
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
         axis = cls.of(data, str(path))
-        log = path.parent / axis.source.log
-        return axis.model_copy(update={"source": axis.source.model_copy(update={"log": log})})
+        log, baseline = path.parent / axis.source.log, axis.monitoring.baseline
+        axis = axis.model_copy(update={"source": axis.source.model_copy(update={"log": log})})
+        if baseline is None:
+            return axis
+        monitoring = axis.monitoring.model_copy(update={"baseline": path.parent / baseline})
+        return axis.model_copy(update={"monitoring": monitoring})
 
     @classmethod
     def of(cls, data: dict[str, Any], origin: str) -> Axis:

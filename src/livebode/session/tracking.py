@@ -20,6 +20,7 @@ from livebode.session.axis import Axis
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
+from livebode.session.watching import Watching, make_watching
 from livebode.sources import open_log
 
 Progress = Callable[[int, int | None], None]
@@ -76,7 +77,11 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     settings = make_settings(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started)
+    watching = make_watching(axis.monitoring, settings)
+    return record(
+        log, settings, directory, about=about, force=force, progress=progress, draw=draw, watching=watching,
+        started=started,
+    )  # fmt: skip
 
 
 def record(
@@ -89,12 +94,13 @@ def record(
     progress: Progress,
     draw: Draw,
     watch: Watch | None = None,
+    watching: Watching | None = None,
     started: float | None = None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
+    `watch` is called with each new batch of responses; `watching` tells changes; `started` (perf_counter) is when opening the source began, where
     that is to count in the speed; `delivery` goes to the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
@@ -108,9 +114,11 @@ def record(
             if watch is not None:
                 watch(responses)
 
-        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
+        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery, watching)
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
+        if watching is not None:
+            summary["monitoring"] = watching.finish(out.write_event)
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         out.write_summary(summary)
         draw(responses, out.partial, _schedule_label(source, settings.schedule))
@@ -118,7 +126,13 @@ def record(
 
 
 def _track(
-    source: Source, tracker: Tracker, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
+    source: Source,
+    tracker: Tracker,
+    publish: Watch,
+    out: RunDirectory,
+    progress: Progress,
+    delivery: dict[str, Any],
+    watching: Watching | None,
 ) -> tuple[dict[str, int], float]:
     """Counts of samples and responses, and seconds spent in the tracker."""
     settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
@@ -135,6 +149,8 @@ def _track(
         publish(responses)
         for event in tracker.drain_events():
             out.write_event(event)
+        if watching is not None:
+            watching.take(block, responses, out.write_event)
         progress(tracker.counts["samples"], source.samples)
     if block is None:
         raise InputError("the recording holds no samples")
