@@ -159,7 +159,7 @@ class Study:
         print(f"\n{title}: {json.dumps({k: round(v, 3) for k, v in row.items()})}", flush=True)
 
     def ramp(self) -> None:
-        """2 % of stiffness in 200 strokes: how much is gone when the alarm comes, over as many ramps as strokes allow."""
+        """2 % of stiffness in 200 strokes: how much is gone when the alarm comes."""
         lost, used = [], 0
         while used < self.count:
             generator = np.random.default_rng(200_000 + used)
@@ -179,9 +179,7 @@ class Study:
             "lost_percent_mean": float(np.mean(lost)),
             "most": float(np.max(lost)),
         }
-        print(
-            f"\nramp of 2 % in 200 strokes, {len(lost)} ramps: found at {np.mean(lost):.3f} % lost, at most {max(lost):.3f} %"
-        )
+        print(f"\n{len(lost)} ramps of 2 % in 200 strokes: found at {np.mean(lost):.3f} %, at most {max(lost):.3f} %")
         self.target("ramp of 2 % in 200 strokes: lost when found as stiffness, %", float(np.max(lost)), 1.0)
 
     def spot(self) -> None:

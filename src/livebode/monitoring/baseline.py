@@ -58,8 +58,8 @@ class Baseline:
         ):
             if learned != here:
                 raise InputError(
-                    f"the baseline was learned with {name} {learned}, and this run has {here}; take the same {name}, or "
-                    "learn a baseline from such runs"
+                    f"the baseline was learned with {name} {learned}, and this run has {here}; take the same {name}, "
+                    "or learn a baseline from such runs"
                 )
 
     @classmethod

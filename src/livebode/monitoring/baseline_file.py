@@ -57,8 +57,8 @@ def load(path: Path) -> Baseline:
         raise InputError(f"{str(path)!r} is not a baseline; make one with `livebode learn`")
     if data.get("version") != _VERSION:
         raise InputError(
-            f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}; "
-            "learn it again"
+            f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}"
+            "; learn it again"
         )
     try:
         return _baseline(data)
@@ -176,7 +176,9 @@ def _accuracy(data: dict[str, Any]) -> Accuracy:
 
 def _list(array: NDArray[Any]) -> Any:
     """Nested lists, with None for what is not a number."""
-    return np.where(np.isfinite(array), array, None).tolist()
+    plain = array.astype(object)
+    plain[~np.isfinite(array)] = None
+    return plain.tolist()
 
 
 def _array(values: Any) -> NDArray[np.float64]:

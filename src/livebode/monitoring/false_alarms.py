@@ -18,15 +18,12 @@ _UNITS_S = {
     "month": 30.4375 * 86400.0,
     "year": 365.25 * 86400.0,
 } | {"s": 1.0, "min": 60.0, "h": 3600.0}
-_NUMBERS = {
-    word: float(number)
-    for number, word in enumerate("a one two three four five six seven eight nine ten eleven twelve".split())
-} | {"a": 1.0, "an": 1.0, "once": 1.0, "twice": 2.0}
-_WORDS = re.compile(
-    r"(?:(?P<count>[\w.]+)(?: times?)?(?: false)?(?: alarms?)? )?"
-    r"(?:in|per|every|each|a|an)?(?: ?\b(?P<length>[\d.]+|" + "|".join(_NUMBERS) + r"))? ?(?P<unit>[a-z]+?)s?"
-    r"(?: of motion)?"
-)
+_WRITTEN = "one two three four five six seven eight nine ten eleven twelve"
+_NUMBERS = {word: float(number) for number, word in enumerate(_WRITTEN.split(" "), 1)}
+_NUMBERS |= {"a": 1.0, "an": 1.0, "once": 1.0, "twice": 2.0}
+_LENGTH = r"(?:(?P<length>[\w.]+) )?(?P<unit>[a-z]+?)s?(?: of motion)?"
+_RATE = re.compile(r"(?P<count>[\w.]+)(?: times?)?(?: false)?(?: alarms?)? (?:in|per|every|each|an?) " + _LENGTH)
+_TIME = re.compile(r"(?:every |each )?" + _LENGTH)
 _MOST_S = 1e12
 
 
@@ -62,10 +59,12 @@ def seconds_between(text: str) -> float:
 def _plain(words: str) -> float | None:
     if (number := _number(words)) is not None:
         return number
-    found = _WORDS.fullmatch(words)
-    unit_s = _UNITS_S.get(found["unit"]) if found else None
-    count = _number(found["count"] or "one") if found else None
-    length = _number(found["length"] or "one") if found else None
+    found = _RATE.fullmatch(words) or _TIME.fullmatch(words)
+    if found is None:
+        return None
+    said = found.groupdict()
+    unit_s, length = _UNITS_S.get(said["unit"]), _number(said["length"] or "one")
+    count = _number(said.get("count") or "one")
     if unit_s is None or length is None or not count:
         return None
     return length * unit_s / count

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.monitoring.accuracy import Accuracy, accuracy
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine, cells
-from livebode.monitoring.model_evidence import ModelEvidence, held, wave, way
+from livebode.monitoring.model_evidence import ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
@@ -84,20 +85,20 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) 
     use = np.flatnonzero((np.abs(speed) >= _SLOWEST * fastest) & np.all(np.abs(u) > 0, axis=1))
     if use.size < _ROWS_MIN or fastest == 0:
         raise InputError(
-            f"the runs hold {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that a model "
-            "of the moving machine needs; give longer runs, or a shorter window"
+            f"the runs hold {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that a "
+            "model of the moving machine needs; give longer runs, or a shorter window"
         )
     use = use[np.argsort(centre[use], kind="stable")]
     chosen = use[np.unique(np.linspace(0, use.size - 1, _ROWS_MAX).round().astype(int))]
     return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use]
 
 
-def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> Iterator[tuple[NDArray, ...]]:
+def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> Iterator[tuple[NDArray[Any], ...]]:
     transform, window = wave(lines.bins, lines.window), lines.window
     for run in runs:
         stretches = Stretches(names, window, lines.rate_hz)
         for stretch in (s for block in run() for s in stretches.process(block)):
-            bad = ~np.isfinite(stretch.data).all(axis=0)
+            bad = missing(stretch.data)
             u, y, x = held(stretch.data, bad)
             begin = np.arange(stretch.first, stretch.last) * window - stretch.start
             centre, speed, even = way(x, begin, window, lines.rate_hz)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring import evidence as word
-from livebode.monitoring.alarms import Alarm, Recent
+from livebode.monitoring.alarms import Recent
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
@@ -36,10 +36,11 @@ class MachineDetector:
     """Evidence in, Events out: what changed, by how much, since when, where.
 
     Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
-    has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since it left
-    zero are asked which single change they speak for: a direction, or a place of changed stiffness. The Event comes
-    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows. While a change stands, the
-    others are judged with it allowed for, whatever its size, and as coarsely as is known of them then; it clears when its own sum is back at zero.
+    has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since
+    it left zero are asked which single change they speak for: a direction, or a place of changed stiffness. It is named
+    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows, and told once
+    the model has come along with it. While a change stands, others are judged with it allowed for, whatever its size,
+    and as coarsely as is known of them then; it clears when its own sum is back at zero.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ class MachineDetector:
             score, information = score / inflation, np.diagonal(information) / inflation
             self._first.step(score, information, mark)
             here = np.arange(len(self._machine.windows)) == self._machine.cell(position_m)
-            self._cells.step(*(np.where(here, part[_STIFFNESS], 0.0) for part in (score, information)), mark)
+            self._cells.step(here * score[_STIFFNESS], here * information[_STIFFNESS], mark)
         self._look()
         return events
 

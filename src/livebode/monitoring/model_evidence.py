@@ -47,7 +47,7 @@ class ModelEvidence:
     def process(self, stretch: Stretch, offset: Offset) -> Evidence:
         """Evidence of every window of the stretch, in order."""
         lines, machine = self._lines, self._machine
-        bad = ~np.isfinite(stretch.data).all(axis=0)
+        bad = missing(stretch.data)
         u, y, x = held(stretch.data, bad)
         velocity, slopes = self._replay(u, x, offset)
         rest = y - without_drift(velocity, y, lines.window)
@@ -68,7 +68,7 @@ class ModelEvidence:
             quiet_power=quiet,
             position_m=centre,
             speed_m_per_s=speed,
-            time_s=stretch.origin_s + (stretch.start + begin + (lines.window - 1) / 2) / lines.rate_hz,
+            time_s=np.asarray(stretch.origin_s + (stretch.start + begin + (lines.window - 1) / 2) / lines.rate_hz),
             sample=stretch.start + begin + lines.window - 1,
             status=status,
         )
@@ -79,9 +79,9 @@ class ModelEvidence:
         """Position and speed at the windows' centres, and which windows are judged."""
         window, machine = self._lines.window, self._machine
         centre, speed, even = way(x, begin, window, self._lines.rate_hz)
-        missing = np.concatenate([[0], np.cumsum(bad)])
+        count = np.concatenate([[0], np.cumsum(bad)])
         since = (begin + stretch.start - stretch.settled < 0) | (
-            missing[begin + window] > missing[(begin - round(LEAD_S * self._lines.rate_hz)).clip(0)]
+            count[begin + window] > count[(begin - round(LEAD_S * self._lines.rate_hz)).clip(0)]
         )
         reasons = {
             word.DISTURBED: since,
@@ -107,6 +107,11 @@ class ModelEvidence:
         return levels
 
 
+def missing(data: Floats) -> NDArray[np.bool_]:
+    """Where a sample of any signal is not finite, shape (samples,)."""
+    return np.asarray(~np.isfinite(data).all(axis=0))
+
+
 def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
     """A sample that is not finite is as the last one before it, or zero."""
     if not bad.any():
@@ -117,7 +122,7 @@ def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
 
 def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
     """From a window's samples to its spectrum at these bins, shape (window, bins)."""
-    return np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window)
+    return np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
 
 
 def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:

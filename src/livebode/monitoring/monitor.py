@@ -45,7 +45,8 @@ class Monitor:
         self._machine: MachineMonitor | None = None
         self._tables: dict[str, TableMonitor] = {}
         if baseline.machine is not None:
-            assert settings.input is not None and settings.schedule is not None
+            assert settings.input is not None
+            assert settings.schedule is not None
             names = settings.input, settings.output, settings.schedule
             self._machine = MachineMonitor(baseline.machine, lines, names, mean_s)
         else:
@@ -78,7 +79,9 @@ class Monitor:
 
     def summary(self) -> dict[str, Any]:
         """What the run comes to: how much was judged, how many alarms came and cleared, and what stands now."""
-        standing = self._machine.standing() if self._machine else [t.what for t in self._tables.values() if t.standing]
+        standing = (
+            self._machine.standing() if self._machine else [name for name, t in self._tables.items() if t.standing]
+        )
         judged = self._machine.detector.judged if self._machine else max(t.judged for t in self._tables.values())
         summary = {
             "false_alarms": self.false_alarms,

@@ -52,7 +52,7 @@ class Apart:
     def of_responses(self, responses: Responses) -> Rows:
         """Rows of complex values at the lines."""
         use = self._chosen(responses.sample)
-        ok = responses.valid[use].all(axis=1) & np.isfinite(responses.sigma[use]).all(axis=1)
+        ok = np.all(responses.valid[use] & np.isfinite(responses.sigma[use]), axis=1)
         return self._rows(
             responses.value[use], responses.sigma[use] ** 2, responses.schedule[use], responses.time_s[use],
             responses.sample[use], ok,

@@ -82,4 +82,4 @@ class Replay:
         engine = Engine(self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}, _PLACE_M)
         if engine.advance(inputs, output) < inputs.shape[1]:
             raise InputError("the baseline's model does not stay finite under this torque; check its signals and units")
-        return output[1]
+        return np.asarray(output[1])

@@ -99,4 +99,4 @@ def _smallest(table: Table) -> Floats:
     own = np.einsum("...ii->...i", table.covariance).reshape(table.count.size, -1)
     enough = table.count.ravel() >= WINDOWS_MIN
     known = KNOWN * np.sqrt(own[enough] / table.count.ravel()[enough, np.newaxis])
-    return np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0))
+    return np.asarray(np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0)))

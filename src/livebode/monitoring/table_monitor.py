@@ -74,7 +74,7 @@ class TableMonitor:
                 events += self._row(score[i], information[i], (*moment, float(cell[i])))
             elif not self._told_unknown:
                 self._told_unknown = True
-                events.append(unknown(self._table, *moment))
+                events.append(unknown(*moment))
         return events
 
     def finish(self) -> list[Event]:

@@ -41,7 +41,7 @@ def cleared(table: Table, sample: int, time_s: float) -> Event:
     return Event("change-cleared", sample, time_s, message, {"what": table.what})
 
 
-def unknown(table: Table, schedule: float, sample: int, time_s: float) -> Event:
+def unknown(schedule: float, sample: int, time_s: float) -> Event:
     """The machine is where, or goes as, it was not learned."""
     message = (
         f"The baseline does not know the machine at {schedule:.4g} going this way; it is not judged there. "

@@ -100,8 +100,8 @@ def record(
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses; `watching` tells changes; `started` (perf_counter) is when opening the source began, where
-    that is to count in the speed; `delivery` goes to the source's `blocks`.
+    `watch` is called with each new batch of responses; `watching` tells changes; `started` (perf_counter) is when
+    opening the source began, where that is to count in the speed; `delivery` goes to the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
