@@ -32,8 +32,9 @@ _FLAT_M = 1e-2  # a way shorter than that has no curves
 _SLOWEST = 0.25  # of the fastest speed: slower, dry friction may hold the cart between the excitation's strokes
 _ROWS_MIN, _ROWS_MAX = 60, 4000
 _SMOOTH = 1e-4
-_SMALLEST = np.array([0.005, 0.005, 0.05, 0.005])
-# While a change stands, another is seen from so much more on: friction of a slow cart looks like the last two.
+# Of stiffness, load, damping, inertia; friction of a slow cart looks a little like the last two.
+_SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
+# While a change stands, another is seen from so much more on.
 _FURTHER = np.array([2.0, 2.0, 4.0, 4.0])
 _EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
 

@@ -12,7 +12,7 @@ from livebode.monitoring.alarms import Recent
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
-from livebode.monitoring.naming import Change, Segment, begin_of, candidates
+from livebode.monitoring.naming import Change, Segment, begin_of, candidates, lead
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, unknown
@@ -28,7 +28,7 @@ _OFTEN, _SELDOM = 40, 10  # windows during which every one, and then every tenth
 _LOOK = 0.22  # of the way: a change is a place's only if the rest is not changed, so one looks around
 _PASSED = 2.0  # standard deviations of a place, behind which its middle is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
-_SMALL, _SMALL_FURTHER = 0.25, 0.5  # of the smallest change that an alarm is for: less is none
+_SMALL = 0.5  # of the smallest change that an alarm is for: less is none
 _STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED}
 
 
@@ -38,8 +38,8 @@ class MachineDetector:
     Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
     has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since
     it left zero are asked which single change they speak for: a direction, or a place of changed stiffness. It is named
-    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows, and told once
-    the model has come along with it. While a change stands, others are judged with it allowed for, whatever its size,
+    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows if it is as large
+    as an alarm is for, and told once the model has come along with it. While a change stands, others are judged with it allowed for, whatever its size,
     and as coarsely as is known of them then; it clears when its own sum is back at zero.
 
     Parameters
@@ -129,9 +129,9 @@ class MachineDetector:
         segment = beyond.without(standing)
         known = self._machine.free if standing else self._machine.held
         found = candidates(segment, known, self._machine.way_m, local=not standing)
-        least = (_SMALL_FURTHER if standing else _SMALL) * known.smallest
+        least = (1.0 if final else _SMALL) * known.smallest
         found = [c for c in found if abs(c.amount) >= least[c.direction]]
-        rivals = [c for c in found[1:] if found[0].evidence - c.evidence < _DECISIVE]
+        rivals = [c for c in found[1:] if lead(segment, found[0], c, self._machine.free) < _DECISIVE]
         if not final and (not found or rivals or not self._seen_around(segment, found[0])):
             return
         self._reset()

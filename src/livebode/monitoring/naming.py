@@ -115,6 +115,20 @@ def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
     )
 
 
+def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float:
+    """By how many nats the windows prefer one change to the other, allowing for what the model does not know.
+
+    What tells two directions apart is how much of the one is left with the other free; and that much is known of a
+    healthy machine too, in `free`.
+    """
+    ahead, b, r = best.evidence - rival.evidence, best.direction, rival.direction
+    if best.place is not None or rival.place is not None:
+        return ahead
+    information = segment.information.sum(axis=0)
+    left = information[b, b] - information[b, r] ** 2 / information[r, r]
+    return float(ahead / (free.inflation[b] + left * free.scatter[b] ** 2))
+
+
 def begin_of(segment: Segment, change: Change) -> int:
     """Row from which on the windows speak for the change most: the likeliest moment at which it began."""
     amount = change.amount * change.share(segment.position_m)
