@@ -129,19 +129,19 @@ class MachineDetector:
         segment = beyond.without(standing)
         known = self._machine.free if standing else self._machine.held
         found = candidates(segment, known, self._machine.way_m, local=not standing)
-        least = (1.0 if final else _SMALL) * known.smallest
-        found = [c for c in found if abs(c.amount) >= least[c.direction]]
-        rivals = [c for c in found[1:] if lead(segment, found[0], c, self._machine.free) < _DECISIVE]
-        if not final and (not found or rivals or not self._seen_around(segment, found[0])):
+        best = found[0]
+        rivals = [c for c in found[1:] if lead(segment, best, c, self._machine.free) < _DECISIVE]
+        large = abs(best.amount) >= (1.0 if final else _SMALL) * known.smallest[best.direction]
+        if not final and (rivals or not large or not self._seen_around(segment, best)):
             return
         self._reset()
-        if found:
-            began = begin_of(segment, found[0])
+        if large:
+            began = begin_of(segment, best)
             way = segment.position_m[began:]
             seen = self._recent.segment(first + began, Offset())
             since = int(moments[began][1]), moments[began][2]
             rival = rivals[0] if rivals else None
-            self.standing.add(found[0], rival, since, (float(way.min()), float(way.max())), seen)
+            self.standing.add(best, rival, since, (float(way.min()), float(way.max())), seen)
 
     def _seen_around(self, segment: Segment, best: Change) -> bool:
         x = segment.position_m
