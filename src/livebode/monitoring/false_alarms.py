@@ -87,6 +87,6 @@ def threshold(mean_s: float, step_s: float, charts: int) -> float:
     really comes is rarer, for a sum overshoots its threshold.
 
     >>> round(threshold(2592000.0, 0.1, 8), 1)
-    19.2
+    19.1
     """
     return max(log(mean_s / step_s * charts), 1.0)

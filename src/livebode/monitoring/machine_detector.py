@@ -38,9 +38,10 @@ class MachineDetector:
     Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
     has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since
     it left zero are asked which single change they speak for: a direction, or a place of changed stiffness. It is named
-    when the likeliest leads by 7 nats and the cart has gone a fifth of its way, or after 600 windows if it is as large
-    as an alarm is for, and told once the model has come along with it. While a change stands, others are judged with it allowed for, whatever its size,
-    and as coarsely as is known of them then; it clears when its own sum is back at zero.
+    when the likeliest leads by 7 nats, is half as large as an alarm is for, and the cart has gone a fifth of its way;
+    or after 600 windows, if it is as large as an alarm is for. It is told once the model has come along with it. While
+    a change stands, others are judged with it allowed for, whatever its size, and as coarsely as is known of them then;
+    it clears when its own sum is back at zero.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ class Table:
             more = np.maximum(rows.variance / np.abs(mean) ** 2 - learned, 0.0)
         own = np.einsum("...ii->...i", self.covariance).reshape(cells, -1)[cell]
         if self.what == "lines":
-            deviation = np.stack([relative.real, relative.imag], axis=2).reshape(len(rows), -1)
+            deviation = np.stack([relative.real, relative.imag], axis=2).reshape(len(rows), 2 * mean.shape[1])
             variance = own + np.repeat(more / 2, 2, axis=1)
         else:
             deviation, variance = relative.real, own + more
