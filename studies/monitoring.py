@@ -226,6 +226,19 @@ class Study:
         done = [trial(self.machine, 600_000 + i, lambda _: DampingGrowth(factor=1.2)) for i in range(count)]
         self._found("damping_20", "20 % more damping", done, "damping", 20.0)
 
+    def cost(self) -> None:
+        """Of the monitor alone, on samples that are there already."""
+        blocks = list(run(axis(strokes(10, np.random.default_rng(3)), 3))())
+        times = []
+        for _ in range(3):
+            watcher, begun = monitor(self.machine), time.process_time()
+            for block in blocks:
+                watcher.process(block)
+            times.append(time.process_time() - begun)
+        cost_us = min(times) / blocks[-1].stop * 1e6
+        self.numbers["cost_us_per_sample"] = cost_us
+        print(f"\ncost: {cost_us:.2f} µs a sample, {cost_us * RATE_HZ / 1e4:.2f} % of a core at {RATE_HZ:g} Hz")
+
 
 def raised(detector: MachineDetector, seen: Evidence, i: int) -> bool:
     row = np.zeros(len(seen), dtype=bool)
@@ -241,7 +254,15 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     begun = time.process_time()
     study = Study(options.strokes)
-    for part in (study.healthy, study.stiffness, study.ramp, study.spot, study.told_apart, study.damping):
+    for part in (
+        study.cost,
+        study.healthy,
+        study.stiffness,
+        study.ramp,
+        study.spot,
+        study.told_apart,
+        study.damping,
+    ):
         part()
         study.numbers["cpu_s"] = time.process_time() - begun
         (options.out / "monitoring.json").write_text(json.dumps(study.numbers, indent=1) + "\n")
