@@ -5,7 +5,7 @@ BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies fuzz system-packages lock clean
+.PHONY: help demo test lint bench peers studies monitoring fuzz system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -45,6 +45,9 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
+
+monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
+	$(BIN)/python -m studies.monitoring
 
 fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py

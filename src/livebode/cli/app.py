@@ -15,6 +15,7 @@ from livebode.cli.demo_command import demo_command
 from livebode.cli.export_command import export_command
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
+from livebode.cli.learn_command import learn_command
 from livebode.cli.margins_command import margins_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
@@ -35,6 +36,7 @@ app.command("demo")(demo_command)
 app.command("export")(export_command)
 app.command("margins")(margins_command)
 app.command("validate")(validate_command)
+app.command("learn")(learn_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -13,6 +13,8 @@ from livebode.fitting import Fit
 from livebode.nouns import Model, Responses
 from livebode.session import Draw, Outcome
 
+_ALARMS_SHOWN = 8
+
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:
     """Draws bode.png and tracking.png."""
@@ -51,6 +53,16 @@ def show(outcome: Outcome) -> None:
         _show_statuses(outcome.summary["fit"])
     if outcome.fit is not None:
         show_fit(outcome.fit, f"newest fit, at {outcome.fit.parameters.time_s[0]:.6g} s")
+    if "monitoring" in outcome.summary:
+        _show_monitoring(outcome.summary["monitoring"])
+
+
+def _show_monitoring(found: dict[str, Any]) -> None:
+    for sentence in found.get("alarms", [])[:_ALARMS_SHOWN]:
+        print(sentence)
+    if (more := len(found.get("alarms", [])) - _ALARMS_SHOWN) > 0:
+        print(f"and {_many(more, 'alarm')} more in events.jsonl")
+    print(found["message"])
 
 
 def _show_statuses(summary: dict[str, Any]) -> None:

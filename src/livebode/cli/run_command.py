@@ -46,6 +46,13 @@ def run_command(
         list[str] | None, typer.Option(metavar="CHANNEL", help="Leave out windows in which this channel has a spike.")
     ] = None,
     hann: Annotated[bool | None, typer.Option(help="Hann window from three bins, for an axis in motion.")] = None,
+    baseline: Annotated[
+        Path | None, typer.Option(metavar="BASELINE", help="Tell changes against what `livebode learn` wrote.")
+    ] = None,
+    false_alarms: Annotated[
+        str | None,
+        typer.Option(metavar="WORDS", help="How often one may come, such as 'one in 30 days of motion' (unless said)."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
     as_json: Json = False,
@@ -69,6 +76,7 @@ def run_command(
             "spikes": spikes or None,
             "hann": hann,
         },
+        "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
     axis = _axis(target, given)
     outcome = _run(axis, out or Path("runs") / target.stem, force, quiet=as_json)

@@ -78,6 +78,13 @@ class Parameters:
             raise InputError(f"the model {self.model!r} has no parameter {name!r}; it has {', '.join(self.names)}")
         return self.names.index(name)
 
+    def only(self, names: Sequence[str]) -> Parameters:
+        """Some of the parameters, in this order; InputError where one is not there."""
+        at = [self.index(name) for name in names]
+        units = tuple(self.units[i] for i in at)
+        covariance = self.covariance[:, at][:, :, at]
+        return replace(self, names=tuple(names), units=units, value=self.value[:, at], covariance=covariance)
+
     @property
     def ok(self) -> NDArray[np.bool_]:
         """Rows that hold numbers, shape (rows,)."""

@@ -61,6 +61,13 @@ class MotionSection(_Section):
     driven_by: Literal["torque", "excitation"] = "torque"
 
 
+class MonitoringSection(_Section):
+    """[monitoring]: the baseline to tell changes against, and how often a false alarm may come, in words."""
+
+    baseline: Annotated[Path, Field(strict=False)] | None = None
+    false_alarms: str = "one in 30 days of motion"
+
+
 class _ControllerSection(_Section):
     rate_hz: Positive
     held_ticks: Annotated[int, Field(ge=1)] = 1
@@ -167,6 +174,7 @@ class Axis(_Section):
     loop: LoopSection = LoopSection()
     motion: MotionSection | None = None
     fit: FitSection | None = None
+    monitoring: MonitoringSection = MonitoringSection()
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -189,7 +197,12 @@ class Axis(_Section):
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
         axis = cls.of(data, str(path))
-        return axis.model_copy(update={"source": axis.source.beside(path.parent)})
+        axis = axis.model_copy(update={"source": axis.source.beside(path.parent)})
+        baseline = axis.monitoring.baseline
+        if baseline is None:
+            return axis
+        monitoring = axis.monitoring.model_copy(update={"baseline": path.parent / baseline})
+        return axis.model_copy(update={"monitoring": monitoring})
 
     @classmethod
     def of(cls, data: dict[str, Any], origin: str) -> Axis:

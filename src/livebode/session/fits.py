@@ -33,10 +33,10 @@ class Fits:
         """What a configuration asks for; margins where its loop says what feeds back."""
         return None if section is None else cls(section, loop if loop.feedback else None)
 
-    def take(self, responses: Responses, out: RunDirectory) -> None:
+    def take(self, responses: Responses, out: RunDirectory) -> Parameters:
         """Fit a batch, and write its parameters and events."""
         if self._fitter is None:
-            self._fitter = Fitter(chosen_model(self.section, responses.unit), **_settings(self.section))
+            self._fitter = fitter_of(self.section, responses.unit)
         found = self._fitter.process(responses)
         around = () if self.loop is None else live_margins(found, self._fitter, self.loop)
         out.write_parameters(found, self._fitter.derived(found), *around)
@@ -47,6 +47,7 @@ class Fits:
         good = np.flatnonzero(found.ok)
         if good.size:
             self._newest = found[good[-1:]]
+        return found
 
     def newest(self) -> Fit | None:
         """The newest fit that holds."""
@@ -62,6 +63,11 @@ class Fits:
             "statuses": self._counts,
             "newest": None if newest is None else plain_fit(newest),
         }
+
+
+def fitter_of(section: FitSection, unit: str) -> Fitter:
+    """The section's Fitter for responses of this unit."""
+    return Fitter(chosen_model(section, unit), **_settings(section))
 
 
 def chosen_model(section: FitSection, unit: str) -> PhysicalModel:

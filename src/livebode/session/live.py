@@ -12,6 +12,7 @@ from livebode.session.axis import Axis
 from livebode.session.fits import Fits
 from livebode.session.plan import live_follower
 from livebode.session.tracking import Draw, Outcome, Progress, record
+from livebode.session.watching import make_watching
 from livebode.sources.live import LiveSource, open_source
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -35,7 +36,11 @@ def run_live(axis: Axis, directory: Path, *, force: bool = False, progress: Prog
             "found": {"format": source.format, "rate_from": "the sender"},
         }
         fits = Fits.of(axis.fit, tracker.settings.loop)
-        return record(source, tracker, directory, about=about, force=force, progress=progress, draw=draw, fits=fits)
+        watching = make_watching(axis.monitoring, tracker.settings)
+        return record(
+            source, tracker, directory, about=about, force=force, progress=progress, draw=draw, fits=fits,
+            watching=watching,
+        )  # fmt: skip
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from livebode.session.follower import Follower
 from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
+from livebode.session.watching import Watching, make_watching
 from livebode.sources import open_log
 from livebode.sources.live import LiveSource
 
@@ -85,9 +86,11 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
     fits = Fits.of(axis.fit, tracker.settings.loop)
+    watching = make_watching(axis.monitoring, tracker.settings)
     return record(
-        log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits
-    )
+        log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits,
+        watching=watching,
+    )  # fmt: skip
 
 
 def record(
@@ -100,6 +103,7 @@ def record(
     progress: Progress,
     draw: Draw,
     watch: Watch | None = None,
+    watching: Watching | None = None,
     started: float | None = None,
     fits: Fits | None = None,
     **delivery: Any,
@@ -107,8 +111,8 @@ def record(
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
     `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
-    opening the source began, where that is to count in the speed; `fits` are made of every response; `delivery` goes to
-    the source's `blocks`.
+    opening the source began, where that is to count in the speed; `fits` are made of every response; `watching` tells
+    changes; `delivery` goes to the source's `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
@@ -118,16 +122,19 @@ def record(
         def publish(responses: Responses) -> None:
             overview.add(responses)
             out.write(responses)
-            if fits is not None:
-                fits.take(responses, out)
+            parameters = None if fits is None else fits.take(responses, out)
+            if watching is not None:
+                watching.follow(responses, parameters, out.write_event)
             if watch is not None and len(responses):
                 watch(responses)
 
-        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
+        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery, watching)
         responses = overview.responses()
         summary = _summary(about, tracker, responses) | {"counts": counts}
         if isinstance(source, LiveSource):
             summary["source"] = asdict(source.health) | {"first_sample": source.first_sample}
+        if watching is not None:
+            summary["monitoring"] = watching.finish(out.write_event)
         summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
         newest = None
         if fits is not None:
@@ -141,7 +148,13 @@ def record(
 
 
 def _track(
-    source: Source, tracker: Follower, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
+    source: Source,
+    tracker: Follower,
+    publish: Watch,
+    out: RunDirectory,
+    progress: Progress,
+    delivery: dict[str, Any],
+    watching: Watching | None,
 ) -> tuple[dict[str, int], float]:
     """Counts of samples and responses, and seconds spent in the tracker."""
     settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
@@ -166,6 +179,8 @@ def _track(
     block: Block | None = None
     for block in source.blocks(wanted, **delivery):
         check.take(block)
+        if watching is not None:
+            watching.take(block, out.write_event)
         tracked_s += follow(partial(tracker.process, block))
         progress(tracker.counts["samples"], source.samples)
     if block is None:

@@ -1,0 +1,32 @@
+"""What the healthy machine is like, and the alarm when it changes."""
+
+from livebode.monitoring.baseline import Baseline, signals_of
+from livebode.monitoring.evidence import Evidence
+from livebode.monitoring.false_alarms import DEFAULT, seconds_between
+from livebode.monitoring.learning import learn_machine
+from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine_detector import MachineDetector
+from livebode.monitoring.machine_monitor import MachineMonitor
+from livebode.monitoring.monitor import Monitor
+from livebode.monitoring.rows import Apart, Rows
+from livebode.monitoring.table import Table
+from livebode.monitoring.table_learning import learn_table
+from livebode.monitoring.table_monitor import TableMonitor
+
+__all__ = [
+    "DEFAULT",
+    "Apart",
+    "Baseline",
+    "Evidence",
+    "Machine",
+    "MachineDetector",
+    "MachineMonitor",
+    "Monitor",
+    "Rows",
+    "Table",
+    "TableMonitor",
+    "learn_machine",
+    "learn_table",
+    "seconds_between",
+    "signals_of",
+]

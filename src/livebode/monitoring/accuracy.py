@@ -1,0 +1,61 @@
+"""How well a change is known from healthy windows, beyond what independent noise would say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_BATCHES = (2, 4, 8)
+_STRETCH = 24  # windows, over which what the baseline does not know is judged
+_APART = 4.0  # a change is at least this many scatters
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Of a change of each component, as healthy windows show it, each of shape (components,).
+
+    Attributes
+    ----------
+    inflation
+        Variance of the mean over neighbouring windows, against what independent windows would have; at least 1.
+    scatter
+        Standard deviation of a change that was not there, over stretches of healthy motion: what speeds, directions
+        and friction leave that the baseline does not know.
+    smallest
+        The smallest change that an alarm is for, of the logarithm.
+    """
+
+    inflation: Floats
+    scatter: Floats
+    smallest: Floats
+
+    @property
+    def allowed(self) -> Floats:
+        """How far a healthy machine may lie off the model."""
+        return 2 * self.scatter
+
+
+def accuracy(score: Floats, information: Floats, smallest: Floats) -> Accuracy:
+    """From healthy windows in order, shape (windows, components) each; `smallest` as asked for, (components,)."""
+    inflation = np.ones(smallest.shape)
+    for size in _BATCHES:
+        sums, total = _batched(score, size), _batched(information, size)
+        inflation = np.maximum(inflation, _mean(sums**2) / np.maximum(_mean(total), 1e-300))
+    sums, total = _batched(score, _STRETCH), _batched(information, _STRETCH)
+    known = total > 0
+    rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
+    scatter = np.sqrt(np.maximum(_mean(rest), 0.0))
+    return Accuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
+
+
+def _mean(rows: Floats) -> Floats:
+    return np.asarray(rows.mean(axis=0) if len(rows) else np.zeros(rows.shape[1]))
+
+
+def _batched(rows: Floats, size: int) -> Floats:
+    whole = len(rows) // size * size
+    return np.asarray(rows[:whole].reshape(-1, size, rows.shape[1]).sum(axis=1))

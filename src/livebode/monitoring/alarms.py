@@ -1,0 +1,110 @@
+"""Alarms that stand, and the newest windows, over which a change is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.naming import Change, Segment
+from livebode.monitoring.offset import Offset, Place
+
+Floats = NDArray[np.float64]
+
+
+@dataclass
+class Alarm:
+    """A change that was named, and has not gone.
+
+    Attributes
+    ----------
+    change, rival
+        What it was named, and what would have explained it nearly as well (None where nothing would).
+    since_sample, since_s
+        When it began.
+    way_m
+        From where to where the cart went while it was named.
+    now, bound
+        Its amount over the newest windows, of the logarithm, and the half-width that holds the truth with 95 %.
+    height
+        The sum that it is held by, between 0 and the threshold: at 0 it has gone.
+    announced
+        Whether its Event is out.
+    """
+
+    change: Change
+    rival: Change | None
+    since_sample: int
+    since_s: float
+    way_m: tuple[float, float]
+    now: float
+    bound: float
+    height: float
+    announced: bool = False
+    score: float = 0.0
+    information: float = 0.0
+
+    def row(self) -> list[float]:
+        """As numbers, for a snapshot."""
+        rest = [self.since_sample, self.since_s, *self.way_m, self.now, self.bound, self.height, self.announced]
+        return [*_numbers(self.change), *_numbers(self.rival), *rest, self.score, self.information]
+
+    @classmethod
+    def of(cls, row: NDArray[Any]) -> Alarm:
+        """From a snapshot's numbers."""
+        change, rival = _change(row[:_NUMBERS]), _change(row[_NUMBERS : 2 * _NUMBERS])
+        assert change is not None
+        sample, since_s, low, high, now, bound, height, announced, *sums = (float(n) for n in row[2 * _NUMBERS :])
+        return cls(change, rival, int(sample), since_s, (low, high), now, bound, height, bool(announced), *sums)
+
+
+_NUMBERS = 6
+
+
+def _numbers(change: Change | None) -> list[float]:
+    if change is None:
+        return [-1.0] * _NUMBERS
+    place = change.place or Place(np.nan, np.nan)
+    return [change.direction, change.amount, change.bound, change.evidence, place.centre_m, place.width_m]
+
+
+def _change(numbers: NDArray[Any]) -> Change | None:
+    direction, amount, bound, evidence, centre_m, width_m = (float(n) for n in numbers)
+    place = Place(centre_m, width_m) if np.isfinite(centre_m) else None
+    return Change(int(direction), amount, bound, evidence, place) if direction >= 0 else None
+
+
+@dataclass
+class Recent:
+    """The newest windows, as many as an alarm may look back over; scores are of changes from the baseline."""
+
+    rows: int
+    score: list[Floats] = field(default_factory=list)
+    information: list[Floats] = field(default_factory=list)
+    moment: list[tuple[float, float, float]] = field(default_factory=list)
+    """Position, newest sample and time of each."""
+
+    def add(self, score: Floats, information: Floats, moment: tuple[float, float, float]) -> None:
+        """A window."""
+        self.score = [*self.score[-self.rows + 1 :], score]
+        self.information = [*self.information[-self.rows + 1 :], information]
+        self.moment = [*self.moment[-self.rows + 1 :], moment]
+
+    def segment(self, first: int, offset: Offset) -> Segment:
+        """Windows from position `first` on, which counts from the end, as evidence of changes beyond the offset."""
+        position_m = np.array([m[0] for m in self.moment[first:]])
+        information = np.array(self.information[first:])
+        return Segment(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        return {
+            "score": np.array(self.score),
+            "information": np.array(self.information),
+            "moment": np.array(self.moment),
+        }
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        self.score, self.information = list(state["score"]), list(state["information"])
+        self.moment = [(float(a), float(b), float(c)) for a, b, c in state["moment"]]

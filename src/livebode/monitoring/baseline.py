@@ -1,0 +1,92 @@
+"""Baseline: the healthy machine, as it was learned, and what a run must share with those that it was learned from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from livebode.estimation import Settings
+from livebode.monitoring.machine import Machine
+from livebode.monitoring.table import Table
+from livebode.nouns import InputError, Lines
+
+_SAME_RATE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """What the healthy machine is like over a scheduling signal.
+
+    Attributes
+    ----------
+    lines
+        Of the runs that it was learned from.
+    signals
+        Channel names of output, input, excitation and schedule, None where there is none.
+    estimator, quantity
+        As in `Settings`; what the tables speak of.
+    tables
+        Mean and covariance of lines, and of parameters where there were any.
+    machine
+        A model that moves; None where the runs held no motion along a schedule, or no two masses fit.
+    runs
+        Where it was learned from.
+    remark
+        Why there is no machine; empty where there is one.
+    """
+
+    lines: Lines
+    signals: dict[str, str | None]
+    estimator: str
+    quantity: str
+    tables: tuple[Table, ...]
+    machine: Machine | None
+    runs: tuple[str, ...] = ()
+    remark: str = ""
+
+    def check(self, settings: Settings) -> None:
+        """InputError where a run with these settings cannot be held against it."""
+        mine, lines = self.lines, settings.lines
+        signals = signals_of(settings)
+        for name, learned, here in (
+            ("rate", f"{mine.rate_hz:g} Hz", f"{lines.rate_hz:g} Hz"),
+            ("window", f"{mine.window} samples", f"{lines.window} samples"),
+            ("lines", _named(mine), _named(lines)),
+            ("estimator", self.estimator, settings.estimator),
+            ("quantity", self.quantity, settings.quantity),
+            *((role, str(self.signals[role]), str(signals[role])) for role in signals),
+        ):
+            if learned != here:
+                raise InputError(
+                    f"the baseline was learned with {name} {learned}, and this run has {here}; take the same {name}, "
+                    "or learn a baseline from such runs"
+                )
+
+    @classmethod
+    def load(cls, path: Path) -> Baseline:
+        """The baseline in a file; InputError where it cannot be read or is none."""
+        from livebode.monitoring.baseline_file import load
+
+        return load(path)
+
+    def save(self, path: Path) -> None:
+        """Write it to a file, whole or not at all; see docs/monitoring.md for what is in it."""
+        from livebode.monitoring.baseline_file import save
+
+        save(self, path)
+
+
+def signals_of(settings: Settings) -> dict[str, str | None]:
+    """Channel names by role."""
+    return {
+        "output": settings.output,
+        "input": settings.input,
+        "excitation": settings.excitation,
+        "schedule": settings.schedule,
+    }
+
+
+def _named(lines: Lines) -> str:
+    f = lines.frequency_hz
+    few = ", ".join(f"{x:g}" for x in f) if len(f) <= 12 else f"{f[0]:g} … {f[-1]:g} ({len(f)})"
+    return f"{few} Hz"

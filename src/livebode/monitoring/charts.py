@@ -1,0 +1,72 @@
+"""Many two-sided CUSUMs at once: the sequential test that every kind of evidence goes through."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+UP, DOWN = 0, 1
+
+
+class Charts:
+    """Page's CUSUM of log-likelihood ratios, one up and one down for each component.
+
+    A step brings for a component the score s and the information I of its change δ: for small δ the log-likelihood of
+    the samples is δ·s − δ²·I/2, so that s/I estimates δ with the variance 1/I. A healthy machine may lie by `allowed`
+    off the baseline, which was learned from finite data; a change is at least `smallest`. The ratio of the two is
+
+        (smallest − allowed)·(±s − I·(smallest + allowed)/2),
+
+    its sum is held between 0 and `threshold`, so that a change that has gone is seen as fast as one that came.
+
+    Parameters
+    ----------
+    smallest, allowed
+        Of each component, shape (components,).
+    threshold
+        h, in nats; see `false_alarms.threshold`.
+
+    Examples
+    --------
+    >>> charts = Charts(np.array([0.02]), np.array([0.0]), threshold=10.0)
+    >>> for window in range(4):
+    ...     charts.step(np.array([300.0]), np.array([1e4]), window)
+    >>> charts.sums.round(1)
+    array([[10.],
+           [ 0.]])
+    """
+
+    def __init__(self, smallest: Floats, allowed: Floats, threshold: float) -> None:
+        self.threshold = threshold
+        self.sums = np.zeros((2, smallest.size))
+        """Of every component, up and down, shape (2, components)."""
+        self.since = np.full((2, smallest.size), -1)
+        """Mark of the step at which each sum last left zero: when the change began, if there is one."""
+        self._gain = smallest - allowed
+        self._middle = (smallest + allowed) / 2
+
+    def step(self, score: Floats, information: Floats, mark: int, judged: NDArray[np.bool_] | None = None) -> None:
+        """Take a step's evidence, shape (components,) each; components that are not `judged` stay as they are."""
+        ratio = self._gain * np.stack([score, -score]) - self._gain * self._middle * information
+        if judged is not None:
+            ratio = np.where(judged, ratio, 0.0)
+        leaves = (self.sums == 0) & (ratio > 0)
+        self.since[leaves] = mark
+        self.sums = np.clip(self.sums + ratio, 0.0, self.threshold)
+
+    @property
+    def raised(self) -> NDArray[np.bool_]:
+        """Which have reached the threshold, shape (2, components)."""
+        return np.asarray(self.sums >= self.threshold)
+
+    def reset(self) -> None:
+        self.sums[:] = 0.0
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"sums": self.sums.copy(), "since": self.since.copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self.sums = np.array(state["sums"], dtype=np.float64)
+        self.since = np.array(state["since"], dtype=np.int64)

@@ -1,0 +1,61 @@
+"""Evidence: what a stretch of windows says about a change of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
+"""Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Score and information of a change in each direction, of windows that do not overlap.
+
+    To second order the log-likelihood of a window under the change δ is δ·score − δ·information·δ/2.
+
+    Attributes
+    ----------
+    score, information
+        Shapes (rows, directions), (rows, directions, directions).
+    power, quiet_power
+        |E|² of what the model leaves unexplained, at the lines and at the quiet bins, (rows, bins).
+    position_m, speed_m_per_s, time_s
+        Of the window's centre; speed over the window, negative on the way back.
+    sample
+        Newest sample of the window.
+    status
+        "judged", or why not.
+    """
+
+    score: Floats
+    information: Floats
+    power: Floats
+    quiet_power: Floats
+    position_m: Floats
+    speed_m_per_s: Floats
+    time_s: Floats
+    sample: NDArray[np.int64]
+    status: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        return np.asarray(self.status == JUDGED)
+
+    def rows(self, chosen: NDArray[np.bool_]) -> Evidence:
+        """Some of the windows."""
+        return Evidence(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+
+    @classmethod
+    def join(cls, parts: Sequence[Evidence]) -> Evidence:
+        """Parts in order as one; at least one."""
+        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))

@@ -1,0 +1,71 @@
+"""Samples in, Events out: a Machine held against what it does now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.evidence import Evidence
+from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.machine import Machine
+from livebode.monitoring.machine_detector import CHARTS, MachineDetector
+from livebode.monitoring.model_evidence import ModelEvidence
+from livebode.monitoring.sentences import about
+from livebode.monitoring.stretches import Stretch, Stretches
+from livebode.nouns import Block, Event, Lines
+
+Look = Callable[[Evidence], object]
+
+
+class MachineMonitor:
+    """Judges every steady window of a recording by a learned Machine.
+
+    Delay: an Event comes at the latest with the first sample of the twelfth window behind the one that it speaks of.
+    Wherever Blocks are cut, the Events are the same.
+    """
+
+    def __init__(self, machine: Machine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
+        self._stretches = Stretches(names, lines.window, lines.rate_hz)
+        self._evidence = ModelEvidence(machine, lines)
+        self.detector = MachineDetector(machine, threshold(mean_s, lines.window / lines.rate_hz, CHARTS))
+
+    def process(self, block: Block, look: Look | None = None) -> list[Event]:
+        """Events of the windows that this Block completes; InputError where a channel is missing.
+
+        `look` is called with the Evidence of every stretch, to show or keep it.
+        """
+        return self._judged(self._stretches.process(block), look)
+
+    def rest(self, look: Look | None = None) -> list[Event]:
+        """Events of the windows that are left; the next Block starts anew."""
+        return self._judged(self._stretches.finish(), look)
+
+    def finish(self, look: Look | None = None) -> list[Event]:
+        """The same, and a change that was found but not yet told apart from others."""
+        return self.rest(look) + self.detector.finish()
+
+    def standing(self) -> list[dict[str, Any]]:
+        """Changes that stand, as plain data."""
+        return [about(alarm) for alarm in self.detector.standing.alarms if alarm.announced]
+
+    def _judged(self, stretches: list[Stretch], look: Look | None) -> list[Event]:
+        events: list[Event] = []
+        for stretch in stretches:
+            seen = self._evidence.process(stretch, self.detector.standing.offset)
+            if look is not None:
+                look(seen)
+            events += self.detector.process(seen)
+        return events
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        stretches = {f"stretches.{k}": v for k, v in self._stretches.state().items()}
+        detector = {f"detector.{k}": v for k, v in self.detector.state().items()}
+        return stretches | detector | {"level": np.array(self._evidence.level)}
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        for name, part in (("stretches.", self._stretches), ("detector.", self.detector)):
+            part.load({k.removeprefix(name): v for k, v in state.items() if k.startswith(name)})
+        self._evidence.level = float(state["level"])

@@ -1,0 +1,136 @@
+"""Evidence of a change from samples and a baseline's model: nothing is fitted, at any speed and in any direction."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring import evidence as word
+from livebode.monitoring.evidence import Evidence
+from livebode.monitoring.machine import Machine
+from livebode.monitoring.offset import Offset
+from livebode.monitoring.sensitivity import Replay
+from livebode.monitoring.stretches import LEAD_S, Stretch
+from livebode.motion.replay import without_drift
+from livebode.nouns import Lines
+
+Floats = NDArray[np.float64]
+
+_UNEVEN = 0.1  # of a window's travel, against the window before it
+_SPEED_MARGIN = 0.1
+_LEVEL_MEMORY = 0.9  # per window, of the noise's level
+_LEVEL_RISE_MAX = 4.0
+_DISTURBED = 20.0  # the mean of six quiet bins is that much above its own level once in 1e40 windows
+
+
+class ModelEvidence:
+    """Stretches in, Evidence out: what the baseline's model leaves unexplained, window by window.
+
+    The model is driven by the measured torque along the measured way. E is the spectrum of the measured velocity less
+    the model's, Ψ that of the model's slope by the logarithm of Keff, mL, bs, Js, each at the lines; then with the
+    noise's power P at a line
+
+        score = Σ 2·Re(Ψ*·E)/P,    information = Σ 2·Re(Ψ*·Ψ)/P.
+
+    Without a change E is the sensor's noise alone, so windows that do not overlap are independent. P is the
+    baseline's, or higher by as much as the quiet bins have become louder.
+
+    With an Offset, E is what is left once the model is changed by it.
+    """
+
+    def __init__(self, machine: Machine, lines: Lines) -> None:
+        self._machine, self._lines = machine, lines
+        self._replay = Replay(machine.model, lines.rate_hz)
+        self.level = 1.0
+        """How much louder than when it was learned the noise is, at least 1."""
+
+    def process(self, stretch: Stretch, offset: Offset) -> Evidence:
+        """Evidence of every window of the stretch, in order."""
+        lines, machine = self._lines, self._machine
+        bad = missing(stretch.data)
+        u, y, x = held(stretch.data, bad)
+        velocity, slopes = self._replay(u, x, offset)
+        rest = y - without_drift(velocity, y, lines.window)
+        begin = np.arange(stretch.first, stretch.last) * lines.window - stretch.start
+        cut = begin[:, np.newaxis] + np.arange(lines.window)
+        unexplained = rest[cut] @ wave((*lines.bins, *lines.quiet), lines.window)
+        slope = slopes[:, cut] @ wave(lines.bins, lines.window)
+        power = unexplained.real**2 + unexplained.imag**2
+        quiet = power[:, len(lines) :]
+        centre, speed, status = self._way(x, begin, stretch, bad)
+        level = self._levels(quiet, status)
+        weight = 2 / (machine.noise_power * level[:, np.newaxis])
+        e = unexplained[:, : len(lines)]
+        return Evidence(
+            score=np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real,
+            information=np.einsum("jwl,kwl,wl->wjk", slope.conj(), slope, weight).real,
+            power=power[:, : len(lines)],
+            quiet_power=quiet,
+            position_m=centre,
+            speed_m_per_s=speed,
+            time_s=np.asarray(stretch.origin_s + (stretch.start + begin + (lines.window - 1) / 2) / lines.rate_hz),
+            sample=stretch.start + begin + lines.window - 1,
+            status=status,
+        )
+
+    def _way(
+        self, x: Floats, begin: NDArray[np.int64], stretch: Stretch, bad: NDArray[np.bool_]
+    ) -> tuple[Floats, Floats, NDArray[np.str_]]:
+        """Position and speed at the windows' centres, and which windows are judged."""
+        window, machine = self._lines.window, self._machine
+        centre, speed, even = way(x, begin, window, self._lines.rate_hz)
+        count = np.concatenate([[0], np.cumsum(bad)])
+        since = (begin + stretch.start - stretch.settled < 0) | (
+            count[begin + window] > count[(begin - round(LEAD_S * self._lines.rate_hz)).clip(0)]
+        )
+        reasons = {
+            word.DISTURBED: since,
+            word.SLOW: np.abs(speed) < (1 - _SPEED_MARGIN) * machine.slowest_m_per_s,
+            word.UNEVEN: ~even,
+            word.FAST: np.abs(speed) > (1 + _SPEED_MARGIN) * machine.fastest_m_per_s,
+            word.PLACE: ~machine.known(centre),
+        }
+        return centre, speed, np.select(list(reasons.values()), list(reasons), word.JUDGED)
+
+    def _levels(self, quiet: Floats, status: NDArray[np.str_]) -> Floats:
+        """How much louder than when it was learned the noise is at each window, at least 1; marks what is disturbed."""
+        levels = np.ones(len(quiet))
+        if not quiet.size:
+            return levels
+        now = np.mean(quiet / self._machine.quiet_power, axis=1)
+        for i in np.flatnonzero(status == word.JUDGED):
+            if now[i] > _DISTURBED * self.level:
+                status[i] = word.DISTURBED
+            rise = min(now[i], _LEVEL_RISE_MAX * self.level)
+            self.level = max(1.0, _LEVEL_MEMORY * self.level + (1 - _LEVEL_MEMORY) * rise)
+            levels[i] = max(self.level, now[i])
+        return levels
+
+
+def missing(data: Floats) -> NDArray[np.bool_]:
+    """Where a sample of any signal is not finite, shape (samples,)."""
+    return np.asarray(~np.isfinite(data).all(axis=0))
+
+
+def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
+    """A sample that is not finite is as the last one before it, or zero."""
+    if not bad.any():
+        return data
+    last = np.maximum.accumulate(np.where(bad, -1, np.arange(bad.size)))
+    return np.where(last >= 0, data[:, last.clip(0)], 0.0)
+
+
+def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
+    """From a window's samples to its spectrum at these bins, shape (window, bins)."""
+    return np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
+
+
+def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Position and speed at the centre of the windows that begin there, and whether they and the ones before are even.
+
+    Where the speed changes, friction lets go or takes hold, which is not in the model.
+    """
+    here, there, before = x[begin], x[begin + window - 1], x[(begin - window + 1).clip(0)]
+    travel = there - here
+    even = (begin >= window - 1) & (np.abs(travel - (here - before)) <= _UNEVEN * np.abs(travel))
+    return (here + there) / 2, travel * rate_hz / (window - 1), even

@@ -1,0 +1,136 @@
+"""Monitor: a run held against a Baseline, whatever the Baseline knows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import Settings, snapshots
+from livebode.monitoring.baseline import Baseline
+from livebode.monitoring.false_alarms import DEFAULT, seconds_between
+from livebode.monitoring.machine_monitor import MachineMonitor
+from livebode.monitoring.rows import Apart
+from livebode.monitoring.table_monitor import TableMonitor
+from livebode.nouns import Block, Event, Parameters, Responses
+
+
+class Monitor:
+    """Events of changes, from the samples of a run and the responses that a Tracker made of them.
+
+    With a model of the moving machine in the Baseline, that judges; else its tables do, of lines and, where parameters
+    are handed in, of these. Wherever Blocks are cut, the Events are the same.
+
+    Parameters
+    ----------
+    baseline
+        What was learned from healthy runs.
+    settings
+        Those of the run.
+    false_alarms
+        How often one may come, in words (see `seconds_between`); shared by all that judges.
+
+    Raises
+    ------
+    InputError
+        If the baseline was learned with other lines or signals, or the words cannot be read.
+    """
+
+    def __init__(self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT) -> None:
+        baseline.check(settings)
+        self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
+        mean_s, lines = seconds_between(false_alarms), settings.lines
+        self._step_s = lines.window / lines.rate_hz
+        self._machine: MachineMonitor | None = None
+        self._tables: dict[str, TableMonitor] = {}
+        if baseline.machine is not None:
+            assert settings.input is not None
+            assert settings.schedule is not None
+            names = settings.input, settings.output, settings.schedule
+            self._machine = MachineMonitor(baseline.machine, lines, names, mean_s)
+        else:
+            share = mean_s * len(baseline.tables)
+            self._tables = {t.what: TableMonitor(t, share, self._step_s) for t in baseline.tables}
+        self._parameters = next((t.names for t in baseline.tables if t.what == "parameters"), ())
+        self._apart = {name: Apart(lines.window, settings.step) for name in self._tables}
+        self._counts = {"change": 0, "change-cleared": 0}
+
+    def process(self, block: Block, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
+        """Events of these samples and of what became of them."""
+        return self.process_samples(block) + self.process_responses(responses, parameters)
+
+    def process_samples(self, block: Block) -> list[Event]:
+        """Events of these samples alone: what the model of the machine says, where there is one."""
+        return self._counted(self._machine.process(block)) if self._machine is not None else []
+
+    def process_responses(self, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
+        """Events of these responses and parameters: what the tables say, where there is no model."""
+        events: list[Event] = []
+        if "lines" in self._tables and len(responses):
+            events += self._tables["lines"].process(self._apart["lines"].of_responses(responses))
+        if "parameters" in self._tables and parameters is not None and len(parameters):
+            events += self._tables["parameters"].process(
+                self._apart["parameters"].of_parameters(parameters.only(self._parameters))
+            )
+        return self._counted(events)
+
+    def finish(self) -> list[Event]:
+        """Events of what is left at the end of a run."""
+        events = self._machine.finish() if self._machine is not None else []
+        return self._counted(events + [e for table in self._tables.values() for e in table.finish()])
+
+    def _counted(self, events: list[Event]) -> list[Event]:
+        for event in events:
+            if event.kind in self._counts:
+                self._counts[event.kind] += 1
+        return events
+
+    def summary(self) -> dict[str, Any]:
+        """What the run comes to: how much was judged, how many alarms came and cleared, and what stands now."""
+        standing = (
+            self._machine.standing() if self._machine else [name for name, t in self._tables.items() if t.standing]
+        )
+        judged = self._machine.detector.judged if self._machine else max(t.judged for t in self._tables.values())
+        summary = {
+            "false_alarms": self.false_alarms,
+            "judged_by": "model" if self._machine else "tables",
+            "judged_s": judged * self._step_s,
+            "changes": self._counts["change"],
+            "cleared": self._counts["change-cleared"],
+            "standing": standing,
+        }
+        return summary | {"message": _message(summary)}
+
+    def snapshot(self) -> bytes:
+        """Everything that the next Event depends on, exact; see `restore`."""
+        parts: dict[str, dict[str, NDArray[Any]]] = {"counts": {k: np.array(v) for k, v in self._counts.items()}}
+        if self._machine is not None:
+            parts["machine"] = self._machine.state()
+        for name in self._tables:
+            parts[name], parts[f"{name} apart"] = self._tables[name].state(), self._apart[name].state()
+        return snapshots.pack(parts, self._owner())
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot of a Monitor with the same baseline and settings; InputError where it is another's."""
+        parts = snapshots.unpack(snapshot, self._owner())
+        self._counts = {name: int(count) for name, count in parts["counts"].items()}
+        if self._machine is not None:
+            self._machine.load(parts["machine"])
+        for name in self._tables:
+            self._tables[name].load(parts[name])
+            self._apart[name].load(parts[f"{name} apart"])
+
+    def _owner(self) -> str:
+        judges = "machine" if self._machine else ", ".join(self._tables)
+        return f"{self._settings.identity} {self.false_alarms} {judges}"
+
+
+def _message(summary: dict[str, Any]) -> str:
+    judged = f"{summary['judged_s']:.1f} s of the run judged"
+    if not summary["judged_s"]:
+        return "Nothing of the run could be judged: the baseline knows nothing of what the machine did."
+    if not summary["changes"]:
+        return f"No change against the baseline ({judged})."
+    alarms = f"{summary['changes']} change{'s' * (summary['changes'] > 1)} against the baseline"
+    return f"{alarms}, {len(summary['standing']) or 'none'} of them standing at the end ({judged})."

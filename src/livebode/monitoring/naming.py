@@ -1,0 +1,137 @@
+"""What changed: of all changes of one kind, everywhere or at one place, the one that the windows speak for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.offset import Place
+from livebode.monitoring.sensitivity import DIRECTIONS
+
+Floats = NDArray[np.float64]
+
+# Standard deviations of a place, and the grid of its centre, as shares of the way that was learned.
+_WIDTHS = np.array([0.015, 0.026, 0.045])
+_GRID = 0.004
+_STIFFNESS = DIRECTIONS.index("stiffness")
+_CONFIDENCE = 1.96
+_SHAPE = 0.3  # of a place's depth, which depends on the shape that it is taken to have
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of one kind.
+
+    Attributes
+    ----------
+    direction
+        Number in `DIRECTIONS`.
+    amount, bound
+        Of the logarithm, and the half-width that holds the truth with 95 %.
+    place
+        Where, None for a change of the whole way.
+    evidence
+        By how many nats the windows speak for it against none.
+    """
+
+    direction: int
+    amount: float
+    bound: float
+    evidence: float
+    place: Place | None = None
+
+    def share(self, position_m: Floats) -> Floats:
+        """How much of the change there is at these positions, 0 … 1."""
+        return np.ones(position_m.shape) if self.place is None else self.place.share(position_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Windows since a change seems to have begun: score (rows, 4), information (rows, 4, 4), position (rows,)."""
+
+    score: Floats
+    information: Floats
+    position_m: Floats
+
+    def without(self, known: list[int]) -> Segment:
+        """The same with changes of these directions allowed for, whatever their size."""
+        if not known:
+            return self
+        inverse = np.linalg.inv(self.information[:, known][:, :, known])
+        gain = self.information[:, :, known] @ inverse
+        score = self.score - np.einsum("rjk,rk->rj", gain, self.score[:, known])
+        information = self.information - gain @ self.information[:, known]
+        for i in known:
+            score[:, i], information[:, i], information[:, :, i] = 0.0, 0.0, 0.0
+        return Segment(score, information, self.position_m)
+
+
+def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = True) -> list[Change]:
+    """Every single change, the likeliest first; what is `known` of the healthy machine widens the bounds.
+
+    `way_m` is the way that was learned; with `local`, places of a few hundredths of it are looked for too.
+    """
+    score = segment.score.sum(axis=0)
+    information = np.einsum("rjj->j", segment.information)
+    found = [
+        Change(
+            j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j])
+        )
+        for j in range(len(DIRECTIONS))
+        if information[j] > 0
+    ]
+    if local and way_m > 0 and information[_STIFFNESS] > 0:
+        found.append(_place(segment, known, way_m))
+    return sorted(found, key=lambda change: -change.evidence)
+
+
+def bound(known: Accuracy, direction: int, information: float) -> float:
+    """Half-width that holds the truth with 95 %, from windows with this information together."""
+    noise = np.sqrt(known.inflation[direction] / information)
+    return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
+
+
+def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
+    """The likeliest bell-shaped place of changed stiffness."""
+    x, widths = segment.position_m, _WIDTHS * way_m
+    centres = np.arange(x.min(), x.max() + _GRID * way_m, _GRID * way_m)
+    bell = np.exp(-((x[:, np.newaxis, np.newaxis] - centres[:, np.newaxis]) ** 2) / (2 * widths**2))
+    score = np.einsum("r,rcw->cw", segment.score[:, _STIFFNESS], bell)
+    information = np.einsum("r,rcw->cw", segment.information[:, _STIFFNESS, _STIFFNESS], bell**2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        evidence = np.where(information > 0, score**2 / (2 * information), 0.0)
+    c, w = np.unravel_index(int(np.argmax(evidence)), evidence.shape)
+    amount = float(score[c, w] / information[c, w])
+    return Change(
+        _STIFFNESS,
+        amount,
+        float(np.hypot(bound(known, _STIFFNESS, float(information[c, w])), _SHAPE * amount)),
+        # One of many places, chosen by the data: as likely as it looks, less what the choice is worth.
+        float(evidence[c, w] - np.log(max(np.ptp(x) / widths[0], 1.0) * len(widths))),
+        Place(float(centres[c]), float(widths[w])),
+    )
+
+
+def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float:
+    """By how many nats the windows prefer one change to the other, allowing for what the model does not know.
+
+    What tells two directions apart is how much of the one is left with the other free; and that much is known of a
+    healthy machine too, in `free`.
+    """
+    ahead, b, r = best.evidence - rival.evidence, best.direction, rival.direction
+    if best.place is not None or rival.place is not None:
+        return ahead
+    information = segment.information.sum(axis=0)
+    left = information[b, b] - information[b, r] ** 2 / information[r, r]
+    return float(ahead / (free.inflation[b] + left * free.scatter[b] ** 2))
+
+
+def begin_of(segment: Segment, change: Change) -> int:
+    """Row from which on the windows speak for the change most: the likeliest moment at which it began."""
+    amount = change.amount * change.share(segment.position_m)
+    score, information = segment.score[:, change.direction], segment.information[:, change.direction, change.direction]
+    gain = amount * score - amount**2 * information / 2
+    return int(np.argmax(np.cumsum(gain[::-1])[::-1]))

@@ -1,0 +1,40 @@
+"""Offset: how far the machine is taken to be from the baseline by now, so that what is left stays small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A bell-shaped change of ln Keff: its centre and standard deviation, m, and its depth."""
+
+    centre_m: float
+    width_m: float
+    amount: float = 1.0
+
+    def share(self, position_m: Floats) -> Floats:
+        """How much of it there is at these positions, 0 … 1.
+
+        >>> Place(1.0, 0.05).share(np.array([1.0, 1.05])).round(3)
+        array([1.   , 0.607])
+        """
+        return np.asarray(np.exp(-(((position_m - self.centre_m) / self.width_m) ** 2) / 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """Changes that stand: of the logarithms of stiffness, load, damping, inertia, (4,), and of places."""
+
+    logarithms: Floats = field(default_factory=lambda: np.zeros(4))
+    places: tuple[Place, ...] = ()
+
+    def stiffness(self, position_m: Floats) -> Floats:
+        """Change of ln Keff at these positions."""
+        local = [place.amount * place.share(position_m) for place in self.places]
+        return np.asarray(self.logarithms[0] + np.sum(local, axis=0) * np.ones(position_m.shape))

@@ -1,0 +1,89 @@
+"""Events of the monitoring, in sentences that a maintenance person understands."""
+
+from __future__ import annotations
+
+from math import expm1
+from typing import TYPE_CHECKING, Any
+
+from livebode.monitoring import evidence as word
+from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.nouns import Event
+
+if TYPE_CHECKING:
+    from livebode.monitoring.alarms import Alarm
+    from livebode.monitoring.machine import Machine
+    from livebode.monitoring.naming import Change
+
+WHAT = {
+    "stiffness": "the belt's stiffness",
+    "load": "the moved mass",
+    "damping": "the belt's damping",
+    "inertia": "the motor's inertia",
+}
+
+
+def changed(alarm: Alarm, sample: int, time_s: float) -> Event:
+    """Something changed, as is known at this sample and time."""
+    message = f"Since {alarm.since_s:.1f} s {_amount(alarm.change, alarm.now, alarm.bound)} than in the baseline"
+    if (rival := alarm.rival) is not None:
+        message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
+    return Event("change", sample, time_s, message + ".", about(alarm))
+
+
+def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
+    """A change that was alarmed has gone."""
+    where = _where(alarm.change)
+    name = WHAT[DIRECTIONS[alarm.change.direction]]
+    message = (
+        f"At {time_s:.1f} s {name}{where} is as in the baseline again; it had changed since {alarm.since_s:.1f} s."
+    )
+    return Event("change-cleared", sample, time_s, message, about(alarm))
+
+
+def unknown(
+    status: str, machine: Machine, position_m: float, speed_m_per_s: float, sample: int, time_s: float
+) -> Event:
+    """The machine does what was not learned."""
+    if status == word.FAST:
+        message = (
+            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis goes at "
+            f"{abs(speed_m_per_s):.3g}; such motion is not judged. Learn from a run that holds it."
+        )
+    else:
+        message = (
+            f"The baseline does not know the axis at position {position_m:.3g}; it is not judged there. "
+            "Learn from a run that goes there."
+        )
+    details = {"reason": status, "position_m": position_m, "speed_m_per_s": speed_m_per_s}
+    return Event("baseline-unknown", sample, time_s, message, details)
+
+
+def about(alarm: Alarm) -> dict[str, Any]:
+    """An alarm as plain data; amounts in percent."""
+    place, rival = alarm.change.place, alarm.rival
+    return {
+        "what": DIRECTIONS[alarm.change.direction],
+        "amount_percent": percent(alarm.now),
+        "bound_percent": 100 * alarm.bound,
+        "since_s": alarm.since_s,
+        "since_sample": alarm.since_sample,
+        "place_m": place.centre_m if place else None,
+        "place_width_m": 2.355 * place.width_m if place else None,  # at half its depth
+        "named_from_m": alarm.way_m[0],
+        "named_to_m": alarm.way_m[1],
+        "may_also_be": DIRECTIONS[rival.direction] if rival else None,
+    }
+
+
+def percent(log_amount: float) -> float:
+    return 100 * expm1(log_amount)
+
+
+def _amount(change: Change, amount: float, bound: float) -> str:
+    digits = 2 if bound < 1e-3 else 1
+    size = f"{abs(percent(amount)):.{digits}f} ± {100 * bound:.{digits}f} %"
+    return f"{WHAT[DIRECTIONS[change.direction]]}{_where(change)} is {size} {'less' if amount < 0 else 'more'}"
+
+
+def _where(change: Change) -> str:
+    return f" around position {change.place.centre_m:.3g}" if change.place else ""

@@ -1,0 +1,87 @@
+"""Samples cut into stretches of whole windows, with what lies before and behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block
+
+Floats = NDArray[np.float64]
+
+WINDOWS = 10  # of a stretch: what lies before is then half of the work, and an alarm at most a second late
+LEAD_S = 0.5  # for a model to come to the machine's state; a Q of 10 at 50 Hz forgets in 0.06 s
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Whole windows on the grid of sample numbers, the lead before them and up to a window behind them.
+
+    `data` (signals, samples) begins with sample number `start`, `first` and `last` are numbers of windows: window i
+    has the samples i·N … i·N + N − 1. Samples before `settled` may come from a machine whose state is not known.
+    """
+
+    data: Floats
+    start: int
+    first: int
+    last: int
+    settled: int
+    origin_s: float
+
+
+class Stretches:
+    """Cuts Blocks at places that depend on sample numbers alone; a gap ends a stretch."""
+
+    def __init__(self, names: tuple[str, ...], window: int, rate_hz: float) -> None:
+        self._names, self._window = names, window
+        self._lead = max(round(LEAD_S * rate_hz), 2 * window)
+        self._parts: list[Floats] = []
+        self._start, self._stop, self._next, self._settled, self._origin_s = 0, -1, 0, 0, 0.0
+
+    def process(self, block: Block) -> list[Stretch]:
+        """Stretches that this Block completes."""
+        data = block.data[[block.index(name) for name in self._names]]
+        done = self.finish() if self._stop >= 0 and (block.gap or block.start != self._stop) else []
+        if self._stop < 0:
+            self._start = block.start
+            self._next = -(-block.start // self._window)
+            self._settled = block.start + self._lead
+        self._parts.append(data)
+        self._stop, self._origin_s = block.stop, block.origin_s
+        while self._stop >= (self._end() + 1) * self._window:
+            done.append(self._cut(self._end()))
+        return done
+
+    def finish(self) -> list[Stretch]:
+        """What is left, but for a last window that has none behind it; the next Block starts anew."""
+        last = self._stop // self._window - 1
+        done = [self._cut(last)] if self._stop >= 0 and last > self._next else []
+        self._parts, self._stop = [], -1
+        return done
+
+    def _end(self) -> int:
+        return (self._next // WINDOWS + 1) * WINDOWS
+
+    def _cut(self, last: int) -> Stretch:
+        data = np.concatenate(self._parts, axis=1)
+        begin = max(self._start, self._next * self._window - self._lead)
+        end = min((last + 1) * self._window, self._stop)
+        cut = data[:, begin - self._start : end - self._start]
+        stretch = Stretch(cut, begin, self._next, last, self._settled, self._origin_s)
+        self._next = last
+        keep = max(self._start, last * self._window - self._lead)
+        self._parts, self._start = [data[:, keep - self._start :].copy()], keep
+        return stretch
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        data = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((len(self._names), 0))
+        numbers = [self._start, self._stop, self._next, self._settled]
+        return {"data": data, "numbers": np.array(numbers), "origin_s": np.array(self._origin_s)}
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        self._parts = [np.array(state["data"])] if state["data"].size else []
+        self._start, self._stop, self._next, self._settled = (int(n) for n in state["numbers"])
+        self._origin_s = float(state["origin_s"])

@@ -1,0 +1,100 @@
+"""Table: the healthy machine over a scheduling signal, without a model of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.rows import Rows
+
+Floats = NDArray[np.float64]
+
+WAYS = 3
+BACK, STILL, FORTH = range(WAYS)
+"""Which way the schedule goes: what a machine in motion shows depends on it."""
+
+WINDOWS_MIN = 8
+KNOWN = 4.0  # a change is at least so many standard deviations of the mean that it is held against
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Mean and covariance of rows of numbers in every bin of a schedule, apart for each way of going.
+
+    A row is what a window says: its response at the lines, or the parameters that were fitted to it. Deviations are
+    relative to the mean, so that they are shares of a magnitude or of a parameter, and radians of a phase.
+
+    Attributes
+    ----------
+    what
+        "lines" or "parameters".
+    names
+        Of the columns, (columns,): "20 Hz", or the parameter.
+    low, step
+        Where the first bin begins, and how wide a bin is, in the schedule's unit; the step is 0 without a schedule.
+    still
+        A schedule that moves less than that from window to window stands still.
+    mean
+        (bins, ways, columns); complex for lines. NaN where there is nothing.
+    covariance
+        Of the relative deviation, for lines of real and imaginary part (bins, ways, lines, 2, 2), for parameters
+        (bins, ways, 1, parameters, parameters).
+    variance
+        Mean of what the rows themselves said of their variance, relative, (bins, ways, columns).
+    count
+        Windows learned, (bins, ways).
+    accuracy
+        Of each component: real and imaginary part of each line, or each parameter.
+    """
+
+    what: str
+    names: tuple[str, ...]
+    low: float
+    step: float
+    still: float
+    mean: NDArray[np.complex128]
+    covariance: Floats
+    variance: Floats
+    count: NDArray[np.int64]
+    accuracy: Accuracy
+
+    def place(self, rows: Rows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Flat number of the cell (bin and way) of each row, and whether it is one that was learned."""
+        cell, inside = cells(rows, self.low, self.step, self.still, len(self.count))
+        return cell, inside & (self.count.ravel()[cell] >= WINDOWS_MIN)
+
+    def deviation(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Relative deviation of every component, and its variance, (rows, components) each.
+
+        Where a row says that it is noisier than those that were learned, so is its deviation. A mean of n windows is
+        itself off by a variance/n; a component of a cell whose mean is known less well than the change that is looked
+        for has an infinite variance, and counts nothing.
+        """
+        cells = self.count.size
+        mean, learned = self.mean.reshape(cells, -1)[cell], self.variance.reshape(cells, -1)[cell]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            relative = rows.value / mean - 1
+            more = np.maximum(rows.variance / np.abs(mean) ** 2 - learned, 0.0)
+        own = np.einsum("...ii->...i", self.covariance).reshape(cells, -1)[cell]
+        if self.what == "lines":
+            deviation = np.stack([relative.real, relative.imag], axis=2).reshape(len(rows), 2 * mean.shape[1])
+            variance = own + np.repeat(more / 2, 2, axis=1)
+        else:
+            deviation, variance = relative.real, own + more
+        count = self.count.ravel()[cell][:, np.newaxis]
+        unknown = KNOWN**2 * own / np.maximum(count, 1) > self.accuracy.smallest**2
+        return deviation, np.where(unknown | ~np.isfinite(deviation), np.inf, variance)
+
+
+def cells(rows: Rows, low: float, step: float, still: float, bins: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Flat number of the cell of each row, and whether it is inside of the bins; without a schedule all are in one."""
+    if step == 0:
+        return np.full(len(rows), STILL, dtype=np.intp), np.ones(len(rows), dtype=bool)
+    with np.errstate(invalid="ignore"):
+        number = np.floor((rows.schedule - low) / step)
+        way = np.where(rows.step > still, FORTH, np.where(rows.step < -still, BACK, STILL))
+    inside = np.isfinite(number) & (number >= 0) & (number < bins) & np.isfinite(rows.step)
+    return np.where(inside, number, 0).astype(np.intp) * WAYS + way, inside

@@ -1,0 +1,102 @@
+"""From healthy rows to a Table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.accuracy import Accuracy, accuracy
+from livebode.monitoring.rows import Rows
+from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+_BINS = 24
+_SMALLEST = 0.01  # of a magnitude or a parameter; radians of a phase
+_STILL = 0.05  # of the fastest usual step
+_ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
+
+
+def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows]) -> Table:
+    """Mean and covariance in 24 bins of the schedule, apart for each way.
+
+    The runs should hold what is usual: speeds, directions, temperatures. What windows in a row have in common, and
+    whole stretches of them, is learned with it, and makes alarms as much slower.
+
+    Raises
+    ------
+    InputError
+        If there are too few rows, or no cell has enough of them.
+    """
+    rows = Rows.join(runs)
+    rows = rows.some(rows.ok)
+    if len(rows) < 3 * WINDOWS_MIN:
+        raise InputError(
+            f"the runs hold {len(rows)} windows with valid {what} that do not overlap, less than the {3 * WINDOWS_MIN} "
+            "that a baseline needs; give longer runs"
+        )
+    low, step, still, bins = _grid(rows)
+    cell, inside = cells(rows, low, step, still, bins)
+    rows, cell = rows.some(inside), cell[inside]
+    table = _moments(what, tuple(names), (low, step, still), bins, rows, cell)
+    if not np.any(table.count >= WINDOWS_MIN):
+        raise InputError(
+            f"no bin of the schedule holds {WINDOWS_MIN} windows of {what}; give longer runs over the whole way"
+        )
+    table = replace(table, accuracy=replace(table.accuracy, smallest=_smallest(table)))
+    deviation, variance = table.deviation(rows, cell)
+    known = np.isfinite(variance)
+    information = np.where(known, 1 / variance, 0.0)
+    score = np.where(known, deviation, 0.0) * information
+    return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest))
+
+
+def _grid(rows: Rows) -> tuple[float, float, float, int]:
+    if not np.isfinite(rows.schedule).any():
+        return 0.0, 0.0, 0.0, 1
+    low, high = float(np.nanmin(rows.schedule)), float(np.nanmax(rows.schedule))
+    step = (high - low) / _BINS * (1 + 1e-9) or max(abs(low), 1.0) * 1e-3
+    moved = np.abs(rows.step[np.isfinite(rows.step)])
+    return low, step, _STILL * float(np.quantile(moved, 0.99)) if moved.size else 0.0, _BINS if high > low else 1
+
+
+def _moments(
+    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: Rows, cell: NDArray[np.intp]
+) -> Table:
+    number, columns = bins * WAYS, rows.value.shape[1]
+    lines = what == "lines"
+    parts = (columns, 2) if lines else (1, columns)
+    mean = np.full((number, columns), complex(np.nan, np.nan))
+    covariance = np.full((number, parts[0], parts[1], parts[1]), np.nan)
+    variance, count = np.full((number, columns), np.nan), np.bincount(cell, minlength=number)
+    for i in np.flatnonzero(count >= WINDOWS_MIN):
+        value = rows.value[cell == i]
+        mean[i] = value.mean(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = value / mean[i] - 1
+            variance[i] = np.mean(rows.variance[cell == i], axis=0) / np.abs(mean[i]) ** 2
+        part = np.stack([relative.real, relative.imag], axis=2) if lines else relative.real[:, np.newaxis, :]
+        covariance[i] = np.einsum("rgi,rgj->gij", part, part) / (count[i] - 1)
+    components = 2 * columns if lines else columns
+    return Table(
+        what,
+        names,
+        *grid,
+        mean.reshape(bins, WAYS, columns),
+        covariance.reshape(bins, WAYS, *covariance.shape[1:]),
+        variance.reshape(bins, WAYS, columns),
+        count.reshape(bins, WAYS),
+        Accuracy(np.ones(components), np.zeros(components), np.full(components, _SMALLEST)),
+    )
+
+
+def _smallest(table: Table) -> Floats:
+    """What most cells know well enough, and at least a hundredth."""
+    own = np.einsum("...ii->...i", table.covariance).reshape(table.count.size, -1)
+    enough = table.count.ravel() >= WINDOWS_MIN
+    known = KNOWN * np.sqrt(own[enough] / table.count.ravel()[enough, np.newaxis])
+    return np.asarray(np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0)))

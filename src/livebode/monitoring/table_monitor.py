@@ -1,0 +1,144 @@
+"""Sequential detection of changes against a Table: which lines, or which parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.charts import Charts
+from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.rows import Rows
+from livebode.monitoring.table import Table
+from livebode.monitoring.table_sentences import cleared, differs, unknown
+from livebode.nouns import Event
+
+Floats = NDArray[np.float64]
+
+_LOOK_WINDOWS = 10  # between finding and telling, so that all that changed has shown itself
+_KEPT = 600  # rows, over which the amount of a change is taken at most
+_CONFIDENCE = 1.96
+_TOLD = 3.0  # standard deviations, from which on a component counts among what changed
+
+
+class TableMonitor:
+    """Every component of a Table has a CUSUM up and one down; one that reaches the threshold raises an alarm for all.
+
+    The alarm names each component that differs by three standard deviations and half of the smallest change, with its
+    amount since the first of them began, and the part of the schedule where it was seen. It clears when every sum of
+    what was named is back at zero, of rows in the cells where it was seen. A row in a cell that was not learned is not
+    judged.
+
+    Parameters
+    ----------
+    table
+        What was learned.
+    mean_s, step_s
+        Mean time between false alarms, and between rows, s.
+    """
+
+    def __init__(self, table: Table, mean_s: float, step_s: float) -> None:
+        self._table = table
+        size = table.accuracy.smallest.size
+        self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, threshold(mean_s, step_s, 2 * size))
+        self.judged = 0
+        """Rows judged so far."""
+        self._told_unknown = False
+        self._standing = np.zeros(size, dtype=bool)
+        self._seen_in = np.zeros(table.count.size, dtype=bool)
+        self._found = -1
+        self._forget()
+
+    def _forget(self) -> None:
+        size = self._table.accuracy.smallest.size
+        self._score, self._information = np.zeros((0, size)), np.zeros((0, size))
+        self._moment = np.zeros((0, 4))
+
+    @property
+    def standing(self) -> bool:
+        """Whether an alarm stands."""
+        return bool(self._standing.any())
+
+    def process(self, rows: Rows) -> list[Event]:
+        """Events of these rows."""
+        cell, known = self._table.place(rows)
+        deviation, variance = self._table.deviation(rows, cell)
+        with np.errstate(invalid="ignore"):
+            information = np.where(np.isfinite(variance), 1 / variance, 0.0) / self._table.accuracy.inflation
+        score = np.where(information > 0, deviation, 0.0) * information
+        events: list[Event] = []
+        for i in np.flatnonzero(rows.ok):
+            moment = (float(rows.schedule[i]), int(rows.sample[i]), float(rows.time_s[i]))
+            if known[i]:
+                events += self._row(score[i], information[i], (*moment, float(cell[i])))
+            elif not self._told_unknown:
+                self._told_unknown = True
+                events.append(unknown(*moment))
+        return events
+
+    def finish(self) -> list[Event]:
+        """An alarm that was about to be told."""
+        if self._found < 0 or not len(self._moment):
+            return []
+        return self._tell()
+
+    def _row(self, score: Floats, information: Floats, moment: tuple[float, int, float, float]) -> list[Event]:
+        self.judged += 1
+        if self.standing and not self._seen_in[int(moment[3])]:
+            return []
+        self._charts.step(score, information, self.judged)
+        if self.standing:
+            if np.any(self._charts.sums[:, self._standing] > 0):
+                return []
+            self._standing[:] = False
+            self._charts.reset()
+            return [cleared(self._table, moment[1], moment[2])]
+        if self._found < 0 and not np.any(self._charts.sums > 0):
+            self._forget()
+            return []
+        self._score = np.vstack([self._score, score])[-_KEPT:]
+        self._information = np.vstack([self._information, information])[-_KEPT:]
+        self._moment = np.vstack([self._moment, moment])[-_KEPT:]
+        if self._found < 0 and self._charts.raised.any():
+            self._found = self.judged
+        return self._tell() if 0 <= self._found <= self.judged - _LOOK_WINDOWS else []
+
+    def _tell(self) -> list[Event]:
+        raised = self._charts.sums >= self._charts.threshold
+        since = int(self._charts.since[raised].min()) if raised.any() else self._found
+        first = max(since - 1 - self.judged, -len(self._moment))
+        score, information = self._score[first:].sum(axis=0), self._information[first:].sum(axis=0)
+        accuracy = self._table.accuracy
+        seen = information > 0
+        amount = np.where(seen, score / np.where(seen, information, 1.0), 0.0)
+        sigma = np.where(seen, np.hypot(1 / np.sqrt(np.where(seen, information, 1.0)), accuracy.scatter), np.inf)
+        told = (np.abs(amount) >= np.maximum(_TOLD * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
+        self._standing, self._found = told, -1
+        moment = self._moment[first:]
+        self._seen_in[:] = False
+        self._seen_in[moment[:, 3].astype(int)] = True
+        event = differs(self._table, told, amount, _CONFIDENCE * sigma, moment)
+        # What was named and has no sum of its own any more is held from here on by one.
+        up = np.stack([amount > 0, amount <= 0]) & told
+        self._charts.sums = np.where(up, self._charts.threshold, 0.0)
+        self._forget()
+        return [event]
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        return self._charts.state() | {
+            "score": self._score,
+            "information": self._information,
+            "moment": self._moment,
+            "standing": self._standing.copy(),
+            "seen_in": self._seen_in.copy(),
+            "numbers": np.array([self.judged, self._found, self._told_unknown]),
+        }
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        self._charts.load(state)
+        self._score, self._information = np.array(state["score"]), np.array(state["information"])
+        self._moment, self._standing = np.array(state["moment"]), np.array(state["standing"])
+        self._seen_in = np.array(state["seen_in"])
+        self.judged, self._found, told = (int(n) for n in state["numbers"])
+        self._told_unknown = bool(told)

@@ -1,0 +1,73 @@
+"""Events of a Table's monitoring, in sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.table import Table
+from livebode.nouns import Event
+
+Floats = NDArray[np.float64]
+
+_NAMED = 4
+
+
+def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
+    """What changed; `moment` is schedule, sample and time of every row since it began."""
+    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(told)]
+    items.sort(key=lambda item: -abs(item["amount"]) / item["bound"])
+    named = "; ".join(_phrase(item) for item in items[:_NAMED])
+    more = f"; and {len(items) - _NAMED} more" if len(items) > _NAMED else ""
+    schedule = moment[:, 0][np.isfinite(moment[:, 0])]
+    where = [float(schedule.min()), float(schedule.max())] if schedule.size else None
+    place = f", seen from {where[0]:.3g} to {where[1]:.3g}" if where else ""
+    details = {
+        "what": table.what,
+        "changes": items,
+        "since_s": float(moment[0, 2]),
+        "since_sample": int(moment[0, 1]),
+        "seen_at": where,
+    }
+    message = f"Since {moment[0, 2]:.1f} s the machine differs from the baseline{place}: {named}{more}."
+    return Event("change", int(moment[-1, 1]), float(moment[-1, 2]), message, details)
+
+
+def cleared(table: Table, sample: int, time_s: float) -> Event:
+    """All that had changed is as it was."""
+    message = f"At {time_s:.1f} s the {_KIND[table.what]} are as in the baseline again."
+    return Event("change-cleared", sample, time_s, message, {"what": table.what})
+
+
+def unknown(schedule: float, sample: int, time_s: float) -> Event:
+    """The machine is where, or goes as, it was not learned."""
+    message = (
+        f"The baseline does not know the machine at {schedule:.4g} going this way; it is not judged there. "
+        "Learn from a run that holds it."
+    )
+    return Event("baseline-unknown", sample, time_s, message, {"reason": "place", "schedule": schedule})
+
+
+_KIND = {"lines": "responses", "parameters": "parameters"}
+
+
+def _item(table: Table, component: int, amount: float, bound: float) -> dict[str, Any]:
+    if table.what == "parameters":
+        return {
+            "name": table.names[component],
+            "of": "value",
+            "unit": "%",
+            "amount": 100 * amount,
+            "bound": 100 * bound,
+        }
+    name = table.names[component // 2]
+    if component % 2:
+        return {"name": name, "of": "phase", "unit": "°", "amount": np.degrees(amount), "bound": np.degrees(bound)}
+    return {"name": name, "of": "magnitude", "unit": "%", "amount": 100 * amount, "bound": 100 * bound}
+
+
+def _phrase(item: dict[str, Any]) -> str:
+    size = f"{item['amount']:+.1f} ± {item['bound']:.1f} {item['unit']}"
+    return f"{item['name']} {size}" if item["of"] == "value" else f"{item['of']} at {item['name']} {size}"

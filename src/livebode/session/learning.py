@@ -1,0 +1,130 @@
+"""From finished runs of a healthy machine to its Baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table
+from livebode.nouns import Block, InputError
+from livebode.records import Run
+from livebode.session.axis import Axis, FitSection
+from livebode.session.fits import fitter_of
+from livebode.session.said import said
+from livebode.sources import open_log
+
+_ROLES = ("output", "input", "excitation", "schedule")
+# The belt's parameters as the motor's shaft feels them; what changes is told in percent.
+_RADIUS_M = 1.0
+
+
+def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) -> Baseline:
+    """The Baseline of runs that hold the healthy machine, all with the same lines and signals.
+
+    Tables are learned from the runs' responses. Where there is a torque and a position to schedule by, a model of the
+    moving machine is learned from the recordings that the runs name, too; `say` hears what is being done.
+
+    Raises
+    ------
+    InputError
+        If a run cannot be read, runs do not fit each other, or they hold too little.
+    """
+    if not paths:
+        raise InputError("there is no run to learn from; name at least one run directory")
+    runs = [Run.open(path) for path in paths]
+    axes = [_axis(run) for run in runs]
+    for run, axis in zip(runs, axes):
+        _check_same(runs[0], axes[0], run, axis)
+    say("learning the lines over the schedule")
+    lines, signals = runs[0].lines, axes[0].signals
+    names = [f"{f:g} Hz" for f in lines.frequency_hz]
+    tables = [learn_table("lines", names, [_rows(run) for run in runs])]
+    if axes[0].fit is not None:
+        say("learning the fitted parameters over the schedule")
+        tables.append(_parameters(runs, axes[0].fit))
+    machine, remark = _machine(runs, axes, say)
+    return Baseline(
+        lines,
+        {role: getattr(signals, role) for role in _ROLES},
+        axes[0].tracking.estimator,
+        axes[0].tracking.quantity,
+        tuple(tables),
+        machine,
+        tuple(str(path) for path in paths),
+        remark,
+    )
+
+
+def _axis(run: Run) -> Axis:
+    configuration = said(run.summary)
+    if "source" not in configuration:
+        raise InputError(f"{str(run.path)!r} is not the run of a machine; learn from what `livebode run` leaves")
+    return Axis.of(configuration, str(run.path / "run.json"))
+
+
+def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
+    for name, one, other in (
+        ("lines", first.lines, run.lines),
+        ("hop", first.found["hop"], run.found["hop"]),
+        ("signals", mine.signals, axis.signals),
+        ("tracking options", mine.tracking, axis.tracking),
+        ("motion options", mine.motion, axis.motion),
+        ("fit options", mine.fit, axis.fit),
+    ):
+        if one != other:
+            raise InputError(
+                f"{str(run.path)!r} has other {name} than {str(first.path)!r}; learn from runs that were made alike"
+            )
+
+
+def _rows(run: Run) -> Rows:
+    apart = Apart(run.lines.window, run.found["hop"])
+    return Rows.join([apart.of_responses(batch) for batch in run.batches()])
+
+
+def _parameters(runs: list[Run], section: FitSection) -> Table:
+    """The table of the fits, which are made again: a run's parameters.parquet has no covariance."""
+    model = fitter_of(section, runs[0].found["unit"])
+    names = [name for name in model.model.names if name not in model.held]
+    rows = []
+    for run in runs:
+        fitter, apart = fitter_of(section, run.found["unit"]), Apart(run.lines.window, run.found["hop"])
+        rows.append(Rows.join([apart.of_parameters(fitter.process(b).only(names)) for b in run.batches()]))
+    return learn_table("parameters", names, rows)
+
+
+def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:
+    """A model of the moving machine, or why there is none."""
+    signals = axes[0].signals
+    if signals.input is None or signals.schedule is None:
+        return None, "a model of the machine needs the torque and a position to schedule by"
+    if axes[0].tracking.quantity != "plant":
+        return None, f"a model is of the plant, and the runs are of the {axes[0].tracking.quantity}"
+    if any(axis.source.log is None for axis in axes):
+        return None, "a model is learned from recordings, and not all of these runs are of one"
+    say("learning a model of the moving machine from the recordings")
+    try:
+        return (
+            learn_machine(
+                [_samples(axis) for axis in axes],
+                runs[0].lines,
+                input=signals.input,
+                output=signals.output,
+                schedule=signals.schedule,
+                radius_m=_RADIUS_M,
+            ),
+            "",
+        )
+    except InputError as error:
+        return None, str(error)
+
+
+def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
+    names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule]
+
+    def blocks() -> Iterator[Block]:
+        assert axis.source.log is not None
+        return open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time).blocks(names)
+
+    return blocks

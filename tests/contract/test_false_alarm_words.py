@@ -1,0 +1,35 @@
+"""How often a false alarm may come, in the words of a person."""
+
+from __future__ import annotations
+
+import pytest
+
+from livebode.monitoring import seconds_between
+from livebode.nouns import InputError
+
+DAY_S = 86400.0
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [
+        ("one in 30 days of motion", 30 * DAY_S),
+        ("One false alarm in 30 days", 30 * DAY_S),
+        ("once a year", 365.25 * DAY_S),
+        ("a false alarm a day", DAY_S),
+        ("twice a day", DAY_S / 2),
+        ("2 per week", 3.5 * DAY_S),
+        ("1 in 200 s", 200.0),
+        ("every 3 hours", 10800.0),
+        ("30 days", 30 * DAY_S),
+        ("86400", DAY_S),
+    ],
+)
+def test_words_that_are_read(words: str, seconds: float) -> None:
+    assert seconds_between(words) == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("words", ["", "never", "once in a while", "0 per day", "-3", "nan", "one in 3 parsecs", "0"])
+def test_words_that_are_refused(words: str) -> None:
+    with pytest.raises(InputError, match="false alarms"):
+        seconds_between(words)

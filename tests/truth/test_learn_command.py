@@ -1,0 +1,149 @@
+"""`livebode learn` and `livebode run --baseline` on recordings whose truth is known, as a person uses them."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.excitation import multisine
+from livebode.monitoring import Baseline
+from livebode.nouns import Block, InputError, Lines
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
+from tests.command import Result, livebode, write_parquet
+from tests.monitored import recorded
+
+SIGNALS = ["--excitation", "w", "--input", "u", "--output", "velocity"]
+OPTIONS = [*SIGNALS, "--lines", "20:140:20", "--window", "400", "--noise", "quiet"]
+MOVING = [*OPTIONS, "--schedule", "x"]
+
+
+@cache
+def healthy() -> Block:
+    return recorded((0.3, 0.25, 0.3, 0.2, 0.3, 0.15), seed=60)
+
+
+def write(path: Path, block: Block) -> Path:
+    columns = {"t": np.arange(len(block)) / block.rate_hz} | {name: block[name] for name in block.names}
+    return write_parquet(path, columns)
+
+
+def run(log: Path, out: Path, *options: object) -> Result:
+    return livebode("run", log, *options, "--out", out)
+
+
+def events(directory: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in (directory / "events.jsonl").read_text("utf-8").splitlines()]
+
+
+def test_learn_and_tell(tmp_path: Path) -> None:
+    log, faulty = write(tmp_path / "healthy.parquet", healthy()), tmp_path / "faulty.parquet"
+    write(faulty, recorded((0.3, 0.25), TensionLoss(start_s=6.0, loss=0.02), seed=61))
+    without = run(log, tmp_path / "one", *MOVING)
+    assert "Without a baseline no change can be told" in without.out
+    assert json.loads((tmp_path / "one" / "run.json").read_text("utf-8"))["monitoring"]["baseline"] is None
+
+    learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "healthy.json")
+    assert learned.code == 0, learned.err
+    assert "good for changes from: stiffness 0.5 %" in learned.out
+
+    found = run(faulty, tmp_path / "two", *MOVING, "--baseline", tmp_path / "healthy.json")
+    assert found.code == 0, found.err
+    assert "the belt's stiffness is 2" in found.out or "the belt's stiffness is 1.9" in found.out
+    monitoring = json.loads((tmp_path / "two" / "run.json").read_text("utf-8"))["monitoring"]
+    assert [s["what"] for s in monitoring["standing"]] == ["stiffness"]
+    assert [e["kind"] for e in events(tmp_path / "two")] == ["change"]
+
+    again = run(
+        log, tmp_path / "three", *MOVING, "--baseline", tmp_path / "healthy.json", "--false-alarms", "once a day"
+    )
+    assert "No change against the baseline" in again.out
+    _refusals(tmp_path, log)
+
+
+def standing(path: Path, seed: int, *faults: TensionLoss) -> Path:
+    """A configuration beside the recording of an axis that stands, with a fit and no schedule."""
+    lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
+    axis = BeltAxis(
+        excitation_n_m=multisine(lines), sensor=Sensor(noise_rad_per_s=0.1), faults=faults, seconds=40, run_in_s=5,
+        seed=seed,
+    )  # fmt: skip
+    block, _ = SimulatedAxis(axis).run()
+    write(path, block.cut(0, len(block)))
+    signals = 'excitation = "w"\ninput = "u"\noutput = "velocity"'
+    text = f'[source]\nlog = "{path.name}"\n[signals]\n{signals}\n[lines]\nfrequencies = "20:140:20"\nwindow = 400\n'
+    toml = path.with_suffix(".toml")
+    toml.write_text(text + '[tracking]\nnoise = "quiet"\n[fit]\nmodel = "two-mass"\nradius_m = 0.019\n')
+    return toml
+
+
+def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
+    healthy_run, changed_run, base = tmp_path / "one", tmp_path / "two", tmp_path / "healthy.json"
+    assert livebode("run", standing(tmp_path / "a.parquet", 1), "--out", healthy_run).code == 0
+    learned = livebode("learn", healthy_run, "--out", base)
+    assert learned.code == 0, learned.err
+    assert [table.what for table in Baseline.load(base).tables] == ["lines", "parameters"]
+    loss = TensionLoss(start_s=20.0, loss=0.05)
+    toml = standing(tmp_path / "b.parquet", 2, loss)
+    assert livebode("run", toml, "--baseline", base, "--out", changed_run).code == 0
+    told = {e["details"]["what"]: e for e in events(changed_run) if e["kind"] == "change"}
+    assert set(told) == {"lines", "parameters"}
+    changes = {c["name"]: c["amount"] for c in told["parameters"]["details"]["changes"]}
+    assert changes == {"Keff": pytest.approx(-5, abs=0.5)}
+    assert told["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
+
+
+def _refusals(tmp_path: Path, log: Path) -> None:
+    base = tmp_path / "healthy.json"
+    other = run(log, tmp_path / "four", *MOVING[:-2], "--baseline", base)
+    assert (other.code, "schedule x" in other.err) == (2, True)
+    assert not (tmp_path / "four").exists()
+    words = run(log, tmp_path / "four", *MOVING, "--baseline", base, "--false-alarms", "hardly ever")
+    assert (words.code, "cannot be read; write for example" in words.err) == (2, True)
+    twice = livebode("learn", tmp_path / "one", "--out", base)
+    assert (twice.code, "--force" in twice.err) == (2, True)
+    none = livebode("learn", tmp_path, "--out", tmp_path / "x.json")
+    assert (none.code, "not the directory of a run" in none.err) == (2, True)
+
+
+def test_without_a_schedule_the_lines_are_watched_alone(tmp_path: Path) -> None:
+    still = recorded((0.3, 0.3), seed=62)
+    assert run(write(tmp_path / "a.parquet", still), tmp_path / "one", *OPTIONS).code == 0
+    learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "base.json", "--json")
+    assert json.loads(learned.out)["model"] is None
+    assert "position to schedule by" in json.loads(learned.out)["remark"]
+    baseline = Baseline.load(tmp_path / "base.json")
+    assert baseline.tables[0].count.tolist() == [[0, baseline.tables[0].count.sum(), 0]]
+
+
+def test_axis_toml_names_the_baseline(tmp_path: Path) -> None:
+    write(tmp_path / "a.parquet", recorded((0.3, 0.3), seed=63))
+    assert run(tmp_path / "a.parquet", tmp_path / "one", *OPTIONS).code == 0
+    assert livebode("learn", tmp_path / "one", "--out", tmp_path / "base.json").code == 0
+    (tmp_path / "axis.toml").write_text(
+        '[source]\nlog = "a.parquet"\n[signals]\noutput = "velocity"\ninput = "u"\nexcitation = "w"\n'
+        '[lines]\nfrequencies = "20:140:20"\nwindow = 400\n[tracking]\nnoise = "quiet"\n'
+        '[monitoring]\nbaseline = "base.json"\nfalse_alarms = "one in 7 days"\n',
+        encoding="utf-8",
+    )
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "two").code == 0
+    monitoring = json.loads((tmp_path / "two" / "run.json").read_text("utf-8"))["monitoring"]
+    assert (monitoring["false_alarms"], monitoring["judged_by"]) == ("one in 7 days", "tables")
+
+
+def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    for text, word in (
+        ("{", "is not a baseline"),
+        ("[]", "is not a baseline"),
+        ('{"format": "livebode baseline", "version": 99}', "version 99"),
+        ('{"format": "livebode baseline", "version": 1}', "damaged"),
+    ):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=word):
+            Baseline.load(path)
+    with pytest.raises(InputError, match="there is no baseline"):
+        Baseline.load(tmp_path / "missing.json")

@@ -1,0 +1,124 @@
+"""Changes without a model: lines and parameters in bins of a schedule, against a truth made of numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from livebode.monitoring import Rows, TableMonitor, learn_table, seconds_between
+from livebode.monitoring.charts import Charts
+from livebode.monitoring.false_alarms import threshold
+from livebode.nouns import InputError
+
+NAMES = ("20 Hz", "60 Hz", "100 Hz")
+TRUE = np.array([1.4 + 0.2j, 4.0 - 1.0j, 0.5 - 1.1j])
+SIGMA = 0.02
+
+
+def made(windows: int, seed: int, *, factor: np.ndarray | float = 1.0, louder: float = 1.0, real: bool = False) -> Rows:
+    """Back and forth between 0 and 1 in 50 windows; the mean depends on the place and on the way."""
+    generator = np.random.default_rng(seed)
+    at = np.arange(windows)
+    schedule = 0.5 - 0.5 * np.cos(2 * np.pi * at / 100)
+    step = np.diff(schedule, prepend=np.nan)
+    place = 1 + 0.5 * schedule + 0.02 * np.sign(np.nan_to_num(step))
+    mean = (np.abs(TRUE) if real else TRUE) * place[:, np.newaxis] * factor
+    noise = generator.standard_normal((2, windows, 3))
+    scatter = SIGMA * louder * np.abs(TRUE) * (noise[0] if real else (noise[0] + 1j * noise[1]) / np.sqrt(2))
+    variance = np.ones((windows, 3)) * (SIGMA * louder * np.abs(TRUE)) ** 2
+    ok = np.isfinite(step)
+    return Rows(mean + scatter, variance, schedule, step, 0.1 * at, 400 * at + 399, ok)
+
+
+def monitor(what: str = "lines", asked: str = "one in 30 days of motion") -> TableMonitor:
+    table = learn_table(what, NAMES, [made(6000, 1, real=what == "parameters")])
+    return TableMonitor(table, seconds_between(asked), 0.1)
+
+
+def test_what_is_learned_is_what_was_made() -> None:
+    table = learn_table("lines", NAMES, [made(6000, 1)])
+    cell, known = table.place(made(6000, 2))
+    assert known[1:].mean() > 0.99
+    deviation, variance = table.deviation(made(6000, 2), cell)
+    seen = np.isfinite(variance) & known[:, np.newaxis]
+    assert np.mean((deviation**2 / variance)[seen]) == pytest.approx(1.0, abs=0.05)
+    assert table.accuracy.inflation.max() < 1.2
+
+
+def test_healthy_rows_raise_nothing() -> None:
+    watcher = monitor()
+    assert watcher.process(made(20000, 3)) == []
+    assert watcher.judged > 19000
+
+
+@pytest.mark.parametrize("what", ["lines", "parameters"])
+def test_the_line_that_changed_is_named(what: str) -> None:
+    factor = np.ones((3000, 3))
+    factor[1000:2000, 1] = 0.96
+    watcher = monitor(what)
+    events = watcher.process(made(3000, 4, factor=factor, real=what == "parameters"))
+    assert [e.kind for e in events] == ["change", "change-cleared"]
+    changes = events[0].details["changes"]
+    assert [c["name"] for c in changes] == ["60 Hz"]
+    assert abs(changes[0]["amount"] + 4.0) < 2 * changes[0]["bound"]
+    assert abs(events[0].details["since_s"] - 100.0) < 2.0
+    assert 200.0 < events[1].time_s < 260.0  # five passes of the place where it was seen
+    assert not watcher.standing
+
+
+def test_louder_noise_is_no_change() -> None:
+    assert monitor().process(made(5000, 5, louder=4.0)) == []
+
+
+def test_a_place_that_was_not_learned_is_said_once() -> None:
+    rows = made(600, 6)
+    beyond = Rows(**(vars(rows) | {"schedule": rows.schedule + 0.7}))
+    watcher = monitor()
+    events = watcher.process(beyond)
+    assert [e.kind for e in events if e.kind != "change"] == ["baseline-unknown"]
+
+
+def test_windows_that_hang_together_are_allowed_for() -> None:
+    """Noise that lasts for five windows: as many alarms as asked for at most, and none of them for a month."""
+
+    def slow(seed: int) -> Rows:
+        rows = made(6000, seed)
+        steady = rows.value - made(6000, seed, louder=0.0).value
+        smoothed = np.stack([np.convolve(steady[:, i], np.ones(5) / np.sqrt(5), "same") for i in range(3)], axis=1)
+        return Rows(**(vars(rows) | {"value": rows.value - steady + smoothed}))
+
+    table = learn_table("lines", NAMES, [slow(7)])
+    assert table.accuracy.inflation.min() > 2.0
+    assert TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1).process(slow(8)) == []
+
+
+def test_mean_time_between_false_alarms_of_a_chart() -> None:
+    """At least as long as asked for (Lorden's bound), for small and for large changes a step, over 400 waits each."""
+    generator = np.random.default_rng(9)
+    for size in (0.5, 1.0, 3.0):
+        asked, waits = 200, 400
+        charts = Charts(np.full(waits, size), np.zeros(waits), threshold(asked * 0.1, 0.1, 2))
+        first = np.zeros(waits)
+        for step in range(1, 20 * asked):
+            charts.step(generator.standard_normal(waits), np.ones(waits), step)
+            up = charts.raised.any(axis=0) & (first == 0)
+            first[up] = step
+            if np.all(first):
+                break
+        first[first == 0] = 20 * asked
+        assert first.mean() > asked * (1 - 3 / np.sqrt(waits))
+
+
+def test_a_change_is_found_as_soon_as_information_allows() -> None:
+    """Lorden: h over the information of a step, and some overshoot."""
+    charts, steps = Charts(np.array([1.0]), np.zeros(1), threshold(2592000, 0.1, 2)), 0
+    generator = np.random.default_rng(10)
+    while not charts.raised.any():
+        charts.step(generator.standard_normal(1) + 1.0, np.ones(1), steps)
+        steps += 1
+    assert steps < 2 * charts.threshold / 0.5
+
+
+def test_too_little_is_refused() -> None:
+    with pytest.raises(InputError, match="give longer runs"):
+        learn_table("lines", NAMES, [made(20, 11)])
