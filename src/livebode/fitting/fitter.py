@@ -18,7 +18,7 @@ from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 
-_GROUP = 8  # rows that share a start and an ε, however they arrive
+_GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from
 _KNOWN = 4  # rows that ε is taken from at least
 
@@ -26,7 +26,7 @@ _KNOWN = 4  # rows that ε is taken from at least
 class Fitter:
     """Fits a model to every Response as it comes, from where the last fits ended.
 
-    Rows count in groups of eight: a row starts from the last good fit of the groups before its own, and takes ε from
+    Rows count in groups of sixteen: a row starts from the last good fit of the groups before its own, and takes ε from
     their newest 64 good rows, so that it stands still from row to row; only the rows of the first group find their own.
     However the same responses are cut into batches, the results are the same (to rounding). A row whose fit fails from
     there is scanned anew (docs/fits.md).
@@ -112,7 +112,7 @@ class Fitter:
             parts.append(self._group(problem, responses[first:last], use))
             first = last
         if not parts:
-            parts = [self._parameters(responses, fit_rows(problem, *_measured(responses, use)))]
+            parts = [self._parameters(responses, fit_rows(problem, *measured_of(responses, use)))]
         return Parameters.join(parts)
 
     def derived(self, parameters: Parameters) -> Parameters:
@@ -124,10 +124,12 @@ class Fitter:
         """Parameters that are not fitted, and their values."""
         return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
-    def used_hz(self, responses: Responses) -> Floats:
-        """Lines of the band that are valid in at least one Response."""
-        _, use = self._prepare(responses.lines)
-        return responses.lines.frequency_hz[use & responses.valid.any(axis=0)]
+    @property
+    def grid(self) -> Grid:
+        """The lines of the band; InputError before the first responses, which bring them."""
+        if self._lines is None:
+            raise InputError("the fitter has seen no responses, so that its lines are not known; process some first")
+        return self._prepared[0].grid
 
     def drain_events(self) -> list[Event]:
         """Events since the last call: where fits begin to fail ("fit-failed") and hold again ("fit-resumed")."""
@@ -188,7 +190,7 @@ class Fitter:
 
     def _group(self, problem: Problem, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
         """Rows of one group, or a part of it."""
-        measured, noise_dof = _measured(responses, use)
+        measured, noise_dof = measured_of(responses, use)
         epsilon = None if self._epsilon is None else np.full(len(responses), self._epsilon)
         found = fit_rows(problem, measured, noise_dof, self._start, epsilon)
         good = np.flatnonzero(found.status == OK)
@@ -228,7 +230,8 @@ class Fitter:
             self._events.append(Event(kind, sample, time_s, SENTENCES[self._word], {"status": self._word}))
 
 
-def _measured(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:
+def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:
+    """The lines in use as rows to fit, and the degrees of freedom of their sigmas."""
     value, sigma = responses.value[:, use], responses.sigma[:, use]
     usable = responses.valid[:, use] & np.isfinite(value)
     # A sigma that is known at some lines and not at others would weigh those as if they had no noise.

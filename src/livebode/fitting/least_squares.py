@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-Normal = Callable[[Floats], tuple[Floats, Floats, Floats]]
-"""From parameters (problems, n): cost (problems,), gradient (problems, n), Gauss–Newton matrix (problems, n, n)."""
+Normal = Callable[[Floats], tuple[Any, ...]]
+"""From parameters (problems, n): cost (problems,), gradient (problems, n), Gauss–Newton matrix (problems, n, n), and
+whatever arrays (problems, …) are to be known of the best place."""
 
 _RISE, _FALL = 10.0, 0.2
 _STEP_MAX = 0.7  # of a logarithm: a factor of two
 
 
 class Minimum(NamedTuple):
-    """Where each problem ended: parameters (problems, n), cost (problems,; infinite where there is none), the
-    Gauss–Newton matrix there, and whether it settled."""
+    """Where each problem ended: parameters (problems, n), cost (problems,; infinite where there is none), whether it
+    settled, and what else `Normal` gave."""
 
     parameters: Floats
     cost: Floats
-    matrix: Floats
     settled: NDArray[np.bool_]
+    known: tuple[Any, ...]
 
 
 def minimise(
@@ -41,26 +42,33 @@ def minimise(
 
     A step is taken where it lowers the cost, and its damping falls; elsewhere the damping rises. A problem has settled
     when no parameter would move by more than `tolerance`, or when a step promises to lower the cost by less than
-    `enough`; that last step is still taken, uncounted. Ends when all have, or after `rounds`.
+    `enough`; that last step is still taken, and the rest left as it was before it. Ends when all have, or after
+    `rounds`.
     """
     now = start.copy()
-    cost, gradient, matrix = normal(now)
+    state = normal(now)
     damping = np.full(len(now), 1e-3)
     settled = np.zeros(len(now), dtype=bool)
     for _ in range(rounds):
-        tried, step = _stepped(now, gradient, matrix, damping, low, high)
-        promised = -np.einsum("ri,ri->r", step, gradient) / 2
-        settled |= (np.abs(step).max(axis=1) < tolerance) | ((promised >= 0) & (promised < enough))
+        tried, step = _stepped(now, state[1], state[2], damping, low, high)
+        promised = -np.einsum("ri,ri->r", step, state[1]) / 2
+        last = (np.abs(step).max(axis=1) < tolerance) | ((promised >= 0) & (promised < enough))
+        last &= ~settled
+        now[last] = tried[last]
+        settled |= last
         if settled.all():
-            now = np.where(np.isfinite(tried), tried, now)
             break
         new = normal(tried)
-        better = (new[0] < cost) & ~settled if enough else new[0] < cost
-        now[better] = tried[better]
-        for kept, other in zip((cost, gradient, matrix), new):
-            kept[better] = other[better]
+        better = (new[0] < state[0]) & ~settled
+        if better.all():
+            now, state = tried, new
+        else:
+            now[better] = tried[better]
+            for kept, other in zip(state, new):
+                kept[better] = other[better]
         damping = np.where(better, damping * _FALL, damping * _RISE)
-    return Minimum(now, np.where(np.isfinite(cost), cost, np.inf), matrix, settled & np.isfinite(cost))
+    finite = np.isfinite(state[0])
+    return Minimum(now, np.where(finite, state[0], np.inf), settled & finite, state[3:])
 
 
 def _stepped(

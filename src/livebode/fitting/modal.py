@@ -17,7 +17,7 @@ QUALITY = 10.0
 """Of the scanned resonances; Table I of Nevaranta 2016 has it."""
 
 _SCANNED = {0: 1, 1: 48, 2: 20}
-_TRIED = 4
+_TRIED = {0: 1, 1: 4, 2: 16}
 _LEAST = 1e-3  # of the largest weight, for one that came out negative
 
 
@@ -45,7 +45,7 @@ def scan(
     if modes == 1:
         beside = np.pad(cost, ((1, 1), (0, 0)), constant_values=np.inf)
         cost = np.where((cost <= beside[:-2]) & (cost <= beside[2:]), cost, np.inf)
-    best = np.argsort(cost, axis=0, kind="stable")[:_TRIED]
+    best = np.argsort(cost, axis=0, kind="stable")[: _TRIED[modes]]
     return solved[best, np.arange(len(value))], omegas[sets][best]
 
 

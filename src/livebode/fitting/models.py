@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.fitting.chains import Rigid, ThreeMass, TwoMass
+from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.physical import PhysicalModel
+from livebode.fitting.three_mass import ThreeMass
 from livebode.fitting.unknown_gain import TwoMassGain
 from livebode.nouns import InputError
 

@@ -159,13 +159,22 @@ def fit(
     """
     one = mean_response(measured) if isinstance(measured, Responses) else as_row(measured)
     fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
-    parameters = fitter.process(one)
-    f = fitter.used_hz(one)
+    return fit_of(fitter, fitter.process(one))
+
+
+def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
+    """One row that a Fitter gave, with what it was fitted to."""
+    grid = fitter.grid
     return Fit(
-        model=fitter.model, parameters=parameters, derived=fitter.derived(parameters), held=fitter.held,
-        band_hz=(float(f[0]), float(f[-1])) if f.size else (np.nan, np.nan), lines=f.size,
-        rate_hz=one.lines.rate_hz, hold=hold,
-    )  # fmt: skip
+        model=fitter.model,
+        parameters=parameters,
+        derived=fitter.derived(parameters),
+        held=fitter.held,
+        band_hz=(float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])),
+        lines=grid.frequency_hz.size,
+        rate_hz=grid.rate_hz,
+        hold=grid.hold,
+    )
 
 
 def as_row(response: Response) -> Responses:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -134,7 +135,7 @@ class PhysicalModel:
         """The same values (..., parameters) with frictions that the lines would just show."""
         return values
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
@@ -168,12 +169,14 @@ class PhysicalModel:
     def derived(self, values: Floats) -> Floats:
         """From values (..., parameters): |p|/2π, −Re p/|p| and its half inverse for each pair, (..., derived_names)."""
         transfer = self._transfer(values)
-        pairs = np.concatenate([_paired(transfer.poles()), _paired(transfer.zeros())], axis=-2)
+        found = [_paired(roots) for roots in (transfer.poles(), transfer.zeros())]
+        # A polynomial without parameters in it has roots for one set of values only.
+        pairs = np.concatenate([np.broadcast_to(x, (*values.shape[:-1], *x.shape[-2:])) for x in found], axis=-2)
         size = np.sqrt(np.abs(pairs[..., 0] * pairs[..., 1]))
         with np.errstate(divide="ignore", invalid="ignore"):
             damping = -(pairs[..., 0] + pairs[..., 1]).real / (2 * size)
-            found = np.stack([size / (2 * np.pi), damping, 1 / (2 * damping)], axis=-1)
-        return np.asarray(found.reshape(*found.shape[:-2], -1))
+            quantities = np.stack([size / (2 * np.pi), damping, 1 / (2 * damping)], axis=-1)
+        return np.asarray(quantities.reshape(*values.shape[:-1], -1))
 
     def _pairs(self) -> list[str]:
         transfer = self._transfer(np.array([p.start for p in self.parameters]))
@@ -185,11 +188,17 @@ class PhysicalModel:
         ]
 
     def _transfer(self, p: Floats) -> Transfer:
-        arguments = [p[..., i] for i, name in enumerate(self.names) if name != DELAY]
+        late = self._late
+        arguments = [p[..., i] for i in range(len(self.names)) if i != late]
         return Transfer.of(*self.transfer(*arguments))
 
     def _delay_s(self, p: Floats) -> Floats | float:
-        return np.asarray(p[..., self.names.index(DELAY)]) if DELAY in self.names else 0.0
+        return 0.0 if self._late is None else np.asarray(p[..., self._late])
+
+    @cached_property
+    def _late(self) -> int | None:
+        """Where the delay stands."""
+        return self.names.index(DELAY) if DELAY in self.names else None
 
 
 def delay(held: float | None = 0.0) -> Parameter:

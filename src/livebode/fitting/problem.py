@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _STEP = 1e-7
-_ENOUGH = 1e-5  # of chi²: a step of 0.3 % of sigma
+_ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, and what is left after it far less
 _AT_BOUND = 1e-6
 
 
@@ -35,8 +35,8 @@ class Measured(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Values (rows, parameters), the model's response there (rows, lines), slopes (rows, lines, free), and whether each
-    row settled."""
+    """Values (rows, parameters), the model's response (rows, lines) and slopes (rows, lines, free) there or a hundredth
+    of sigma beside, and whether each row settled."""
 
     values: Floats
     response: Complex
@@ -104,21 +104,23 @@ class Problem:
         value = np.where(measured.use, measured.value, 0.0)
         weight = np.where(measured.use, weight, 0.0)
 
-        def normal(x: Floats) -> tuple[Floats, Floats, Floats]:
+        def normal(x: Floats) -> tuple[Floats, Floats, Floats, Complex, Complex]:
             response, slope = self._slopes(x, start)
-            rest = weight * (response - value)
-            left = weight[..., np.newaxis] * slope
-            matrix = (left.conj().swapaxes(1, 2) @ left).real
-            gradient = (left.conj().swapaxes(1, 2) @ rest[..., np.newaxis])[..., 0].real
-            cost = np.einsum("rl,rl->r", rest.real, rest.real) + np.einsum("rl,rl->r", rest.imag, rest.imag)
-            return np.where(np.isfinite(cost), cost, np.inf), gradient, np.where(np.isfinite(matrix), matrix, 0.0)
+            # One matrix of slopes and, behind them, the residual: its square holds all that is needed.
+            both = np.concatenate([slope, (response - value)[..., np.newaxis]], axis=-1) * weight[..., np.newaxis]
+            square = (both.conj().swapaxes(1, 2) @ both).real
+            if not np.isfinite(square).all():
+                bad = ~np.isfinite(square).all(axis=(1, 2))
+                square[bad] = np.eye(square.shape[-1])
+                square[bad, -1, -1] = np.inf
+            return square[:, -1, -1], square[:, :-1, -1], square[:, :-1, :-1], response, slope
 
         with np.errstate(all="ignore"):
             found: Minimum = minimise(
                 normal, self._inward(start), rounds, 1e-10, enough=_ENOUGH, low=self._low, high=self._high
             )
-            response, slope = self._slopes(found.parameters, start)
         values = self._outward(found.parameters, start)
+        response, slope = found.known
         return Solution(values, response, slope, found.settled), found.cost
 
     def at_bound(self, values: Floats) -> NDArray[np.bool_]:

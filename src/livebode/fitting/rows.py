@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
-from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
+from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
 from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
@@ -37,12 +37,14 @@ SENTENCES = {
 
 EPSILON_MAX = 0.5
 _UNCERTAIN = 0.5  # of a logarithm
+_WORD = "<U20"
 _FIRST_EPSILON = 0.1  # so that no line that is measured far better than the model holds decides a first fit
 _REWEIGHTED, _SAME = 8, 0.01
 _SUSPICIOUS = 4.0  # of a reduced chi², ε and all
 _WARM_ROUNDS = 12
 _DOF_LEAST = 3.0
-_CONDITION_MAX = 1e12
+_CONDITION_MAX = 1e11
+_ROUNDING = 1e-14
 
 
 class Fitted(NamedTuple):
@@ -72,7 +74,31 @@ def fit_rows(
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
     """
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
-    measured = measured._replace(use=measured.use & (dof > 0)[:, np.newaxis])
+    if dof.size and (dof > 0).all():
+        return _fitted(problem, measured, noise_dof, start, epsilon, dof)
+    some = np.flatnonzero(dof > 0)
+    whole = _none(problem, measured, dof)
+    if some.size:
+        eps = None if epsilon is None else epsilon[some]
+        found = _fitted(problem, measured.rows(some), noise_dof[some], start, eps, dof[some])
+        for kept, other in zip(whole, found):
+            kept[some] = other
+    return whole
+
+
+def _none(problem: Problem, measured: Measured, dof: Floats) -> Fitted:
+    """Rows without a fit."""
+    rows, n = len(dof), len(problem.model.names)
+    nan = np.full(rows, np.nan)
+    return Fitted(
+        np.full((rows, n), np.nan), np.full((rows, n, n), np.nan), np.full(rows, NO_RESPONSE, dtype=_WORD), nan,
+        nan.copy(), dof, np.full(measured.value.shape, np.nan, dtype=np.complex128), np.full((rows, n), np.nan),
+    )  # fmt: skip
+
+
+def _fitted(
+    problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
+) -> Fitted:
     eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
     # Before a model is known the measured size stands for the model's.
     size = np.where(measured.use, np.abs(measured.value), 0.0)
@@ -80,6 +106,11 @@ def fit_rows(
     found = _begun(problem, measured, weight, start, dof)
     if epsilon is None:
         found, eps = _reweighted(problem, measured, found, dof)
+    else:
+        # A row that lacks much more than those before it is not known as well as they were.
+        more = own_epsilon(measured, found.response, _SUSPICIOUS * dof) > eps
+        if more.any():
+            eps = np.where(more, own_epsilon(measured, found.response, dof), eps)
     return _judged(problem, measured, noise_dof, found, eps, dof)
 
 
@@ -97,7 +128,7 @@ def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats |
     if start is None:
         return _scanned(problem, measured, weight)
     found, cost = problem.solve(measured, weight, np.repeat(start[np.newaxis], len(dof), axis=0), _WARM_ROUNDS)
-    lost = (~found.settled | (cost > _SUSPICIOUS * dof)) & (dof > 0)
+    lost = ~found.settled | (cost > _SUSPICIOUS * dof)
     if lost.any():
         again = _scanned(problem, measured.rows(lost), weight[lost])
         rest = np.abs(weight[lost] * np.where(measured.use[lost], again.response - measured.value[lost], 0.0)) ** 2
@@ -141,15 +172,13 @@ def _judged(
     with np.errstate(invalid="ignore"):
         uncertain = np.sqrt(np.einsum("rii->ri", small))[:, problem.relative()]
         unseen = ~np.isfinite(small).all(axis=(1, 2)) | ~(uncertain <= _UNCERTAIN).all(axis=1)
-    lacking = own_epsilon(measured, found.response, dof)
-    status = np.full(len(dof), OK, dtype="<U20")
+    status = np.full(len(dof), OK, dtype=_WORD)
     for word, failed in (
-        (FRICTION, held_by_friction(problem, measured, found.values, lacking)),
-        (NO_FIT, lacking > EPSILON_MAX),
+        (FRICTION, held_by_friction(problem, measured, found, dof)),
+        (NO_FIT, lacks_more_than(EPSILON_MAX, measured, found.response, dof)),
         (NOT_SEEN, unseen),
         (BOUND, problem.at_bound(found.values)),
         (NOT_CONVERGED, ~found.settled),
-        (NO_RESPONSE, ~(dof > 0)),
     ):
         status[failed] = word
     failed = status != OK
@@ -160,7 +189,7 @@ def _judged(
     whole[failed] = np.nan
     return Fitted(
         np.where(failed[:, np.newaxis], np.nan, found.values),
-        whole, status, np.where(failed, np.nan, eps), np.where(dof > 0, chi_squared(rest, noise), np.nan), dof,
+        whole, status, np.where(failed, np.nan, eps), chi_squared(rest, noise), dof,
         found.response, found.values,
     )  # fmt: skip
 
@@ -169,7 +198,8 @@ def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floa
     """Of the free parameters in their coordinates, (rows, free, free); not finite where the lines do not hold them.
 
     A sigma that was estimated with d degrees of freedom makes a weight that scatters; weighted least squares then
-    scatter more than the weights say, by d/(d − 2) where noise alone is in the weight.
+    scatter more than the weights say, by d/(d − 2) where noise alone is in the weight and parameters are few; with as
+    many as there are data the weights have no say.
     """
     size = np.abs(found.response)
     weight = np.where(measured.use, _weights(measured, size, eps), 0.0)
@@ -177,14 +207,16 @@ def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floa
     matrix = (left.conj().swapaxes(1, 2) @ left).real
     share = np.where(measured.sigma > 0, measured.sigma * weight, 0.0) ** 2 / 2
     d = np.where(np.isnan(noise_dof), np.inf, np.maximum(noise_dof, _DOF_LEAST))[:, np.newaxis]
-    middle = np.sqrt(1 + share**2 * 2 / (d - 2))[..., np.newaxis] * left
+    data = 2 * np.count_nonzero(measured.use, axis=1)[:, np.newaxis]
+    middle = np.sqrt(1 + share**2 * 2 / (d - 2) * (1 - left.shape[-1] / data))[..., np.newaxis] * left
     scattered = (middle.conj().swapaxes(1, 2) @ middle).real
     with np.errstate(all="ignore"):
         scale = np.sqrt(np.einsum("rii->ri", matrix))
         scaled = matrix / (scale[:, :, np.newaxis] * scale[:, np.newaxis])
-        usable = np.isfinite(scaled).all(axis=(1, 2))
-        usable[usable] = np.linalg.cond(scaled[usable]) < _CONDITION_MAX
-        inverse = np.full(matrix.shape, np.nan)
-        inverse[usable] = np.linalg.inv(scaled[usable])
+        unit = np.eye(matrix.shape[-1])
+        finite = np.isfinite(scaled).all(axis=(1, 2))
+        inverse = np.linalg.inv(np.where(finite[:, np.newaxis, np.newaxis], scaled, unit) + _ROUNDING * unit)
+        held = finite & (np.abs(inverse).max(axis=(1, 2)) < _CONDITION_MAX)
+        inverse[~held] = np.nan
         inverse /= scale[:, :, np.newaxis] * scale[:, np.newaxis]
     return np.asarray(inverse @ scattered @ inverse)

@@ -56,7 +56,7 @@ class Transfer(NamedTuple):
         )
 
     def sampled(self, z: Complex, rate_hz: float, delay_s: ArrayLike = 0.0) -> Complex:
-        """Sampled response behind a zero-order hold and a delay, exact, shape (..., lines).
+        """Sampled response behind a zero-order hold and a delay, exact, shape (..., lines); z (lines,) or (..., lines).
 
         Each pole p with residue r holds and samples to r·(Γ0 + Γ1/z)/(z − e^(pT)), where the input of the tick before
         acts for the share θ of a tick by which the delay exceeds whole ticks: Γ0 = (e^(p(1−θ)T) − 1)/p,
@@ -76,8 +76,8 @@ class Transfer(NamedTuple):
             held = end
             if late is not None:
                 soon = np.expm1(poles * (1 - late))
-                held = soon + (end - soon) / z
-            found = np.sum(residues * held / ((z - 1) - end), axis=-2)
+                held = soon + (end - soon) / z[..., np.newaxis, :]
+            found = np.sum(residues * held / ((z - 1)[..., np.newaxis, :] - end), axis=-2)
         for order, weight in enumerate(self._at_rest(), 1):
             found = found + weight[..., np.newaxis] * _integrated(order, z, tick, late)
         if np.any(whole):

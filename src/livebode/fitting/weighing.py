@@ -10,7 +10,7 @@ from livebode.fitting.problem import Measured
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_HALVINGS = 50
+_STEPS, _CLOSE = 30, 1e-6
 
 
 def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
@@ -29,15 +29,21 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
     Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        # Σ 2·rest/(ε²·size) bounds the left side from above.
-        highest = np.nansum(np.where(rest > 0, 2 * rest / size, 0.0), axis=-1) / dof
-        low, high = np.zeros(len(rest)), highest
-        noisy = _reduced(rest, noise, size, low) <= dof
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            above = _reduced(rest, noise, size, middle) > dof
-            low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return np.where(noisy | ~(dof > 0) | ~np.isfinite(high), 0.0, np.sqrt(high))
+        used = rest > 0
+        # No line has more than all together, which bounds ε² from below; from there the left side is convex and falls,
+        # so that Newton's steps climb to the root and never pass it.
+        least = (2 * rest / dof[:, np.newaxis] - noise) / size
+        square = np.max(np.where(used & np.isfinite(least), least, 0.0), axis=-1, initial=0.0)
+        noisy = _reduced(rest, noise, size, np.zeros(len(rest))) <= dof
+        for _ in range(_STEPS):
+            share = np.where(used, 1 / (noise + square[:, np.newaxis] * size), 0.0)
+            total = 2 * np.einsum("rl,rl->r", rest, share)
+            slope = 2 * np.einsum("rl,rl,rl,rl->r", rest, size, share, share)
+            step = np.where(noisy | ~(slope > 0), 0.0, (total - dof) / slope)
+            square = square + np.maximum(step, 0.0)
+            if not np.any(step > _CLOSE * square):
+                break
+    return np.where(noisy | ~(dof > 0) | ~np.isfinite(square), 0.0, np.sqrt(square))
 
 
 def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:
@@ -50,6 +56,13 @@ def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floa
 def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
     """Each row's ε by its own residuals, (rows,)."""
     return epsilon_for(*squares(measured, response), dof)
+
+
+def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:
+    """Rows whose own ε is larger than this one."""
+    rest, noise, size = squares(measured, response)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _reduced(rest, noise, size, np.full(len(dof), epsilon**2)) > dof
 
 
 def chi_squared(rest: Floats, noise: Floats) -> Floats:

@@ -30,6 +30,8 @@ class Monitor:
         Those of the run.
     false_alarms
         How often one may come, in words (see `seconds_between`); shared by all that judges.
+    corrected
+        Whether the responses are freed from the axis's motion.
 
     Raises
     ------
@@ -37,8 +39,10 @@ class Monitor:
         If the baseline was learned with other lines or signals, or the words cannot be read.
     """
 
-    def __init__(self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT) -> None:
-        baseline.check(settings)
+    def __init__(
+        self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT, *, corrected: bool = False
+    ) -> None:
+        baseline.check(settings, corrected)
         self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
         mean_s, lines = seconds_between(false_alarms), settings.lines
         self._step_s = lines.window / lines.rate_hz
@@ -55,12 +59,14 @@ class Monitor:
         self._apart = {name: Apart(lines.window, settings.step) for name in self._tables}
         self._counts = {"change": 0, "change-cleared": 0}
 
-    def process(self, block: Block, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
-        """Events of these samples and of what became of them."""
+    def process(
+        self, block: Block | None, responses: Responses | None = None, parameters: Parameters | None = None
+    ) -> list[Event]:
+        """Events of these samples and of what became of them; what is not there yet may come later, each in order."""
         events: list[Event] = []
-        if self._machine is not None:
+        if self._machine is not None and block is not None:
             events += self._machine.process(block)
-        if "lines" in self._tables and len(responses):
+        if "lines" in self._tables and responses is not None and len(responses):
             events += self._tables["lines"].process(self._apart["lines"].of_responses(responses))
         if "parameters" in self._tables and parameters is not None and len(parameters):
             events += self._tables["parameters"].process(self._apart["parameters"].of_parameters(parameters))

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
+from livebode.sources.live import SourceSettings
 
 _SAME_RATE = 1e-6
 Ticks = Annotated[int, Field(ge=0)]
@@ -19,14 +20,6 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class SourceSection(_Section):
-    """[source]: the recording. Relative paths are from the file that names them."""
-
-    log: Annotated[Path, Field(strict=False)]
-    rate_hz: Positive | None = None
-    time: str | None = None
 
 
 class SignalsSection(_Section):
@@ -57,6 +50,15 @@ class TrackingSection(_Section):
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []
+    dtype: Literal["float64", "float32"] = "float64"
+
+
+class MotionSection(_Section):
+    """[motion]: responses freed from the axis's motion; see `livebode.motion.MotionCorrection`."""
+
+    radius_m: Positive
+    chunk_s: Positive = 4.0
+    driven_by: Literal["torque", "excitation"] = "torque"
 
 
 class MonitoringSection(_Section):
@@ -148,15 +150,31 @@ class LoopSection(_Section):
         return Gain(-self.entry_gain) * feedback
 
 
+class FitSection(_Section):
+    """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
+
+    model: str = "auto"
+    output: Literal["auto", "velocity", "position"] = "auto"
+    side: Literal["motor", "load"] | None = None
+    radius_m: Positive | None = None
+    inertia_ratio: Positive | None = None
+    fixed: dict[str, float] = {}
+    free: list[str] = []
+    band_hz: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    hold: Literal["zero-order", "none"] = "zero-order"
+
+
 class Axis(_Section):
     """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
 
-    source: SourceSection
+    source: SourceSettings
     signals: SignalsSection
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
     monitoring: MonitoringSection = MonitoringSection()
+    motion: MotionSection | None = None
+    fit: FitSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -179,9 +197,8 @@ class Axis(_Section):
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
         axis = cls.of(data, str(path))
-        log, baseline = path.parent / axis.source.log, axis.monitoring.baseline
-        axis = axis.model_copy(update={"source": axis.source.model_copy(update={"log": log})})
-        if baseline is None:
+        axis = axis.model_copy(update={"source": axis.source.beside(path.parent)})
+        if (baseline := axis.monitoring.baseline) is None:
             return axis
         monitoring = axis.monitoring.model_copy(update={"baseline": path.parent / baseline})
         return axis.model_copy(update={"monitoring": monitoring})
@@ -190,9 +207,12 @@ class Axis(_Section):
     def of(cls, data: dict[str, Any], origin: str) -> Axis:
         """The Axis in plain data; `origin` names it in messages."""
         try:
-            return cls.model_validate(data)
+            axis = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{origin}: {_sentence(error)}") from None
+        if (axis.source.log is None) == (axis.source.url is None):
+            raise InputError(f"{origin}: [source] needs either a log or a url; 'source.log' is a recording")
+        return axis
 
 
 def _sentence(error: ValidationError) -> str:

@@ -46,6 +46,7 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         axes[0].tracking.quantity,
         (table,),
         machine,
+        axes[0].motion is not None,
         tuple(str(path) for path in paths),
         remark,
     )
@@ -64,6 +65,7 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
         ("hop", first.found["hop"], run.found["hop"]),
         ("signals", mine.signals, axis.signals),
         ("tracking options", mine.tracking, axis.tracking),
+        ("motion correction", mine.motion, axis.motion),
     ):
         if one != other:
             raise InputError(
@@ -83,6 +85,8 @@ def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> t
         return None, "a model of the machine needs the torque and a position to schedule by"
     if axes[0].tracking.quantity != "plant":
         return None, f"a model is of the plant, and the runs are of the {axes[0].tracking.quantity}"
+    if any(axis.source.log is None for axis in axes):
+        return None, "a model needs the samples, and a live source has not kept them"
     say("learning a model of the moving machine from the recordings")
     try:
         return (
@@ -104,6 +108,7 @@ def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
     names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule]
 
     def blocks() -> Iterator[Block]:
+        assert axis.source.log is not None
         return open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time).blocks(names)
 
     return blocks
