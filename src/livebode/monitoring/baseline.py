@@ -10,7 +10,7 @@ from livebode.monitoring.machine import Machine
 from livebode.monitoring.table import Table
 from livebode.nouns import InputError, Lines
 
-_SAME_RATE = 1e-9
+_ON = {True: "on", False: "off"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,8 @@ class Baseline:
         Mean and covariance of lines, and of parameters where there were any.
     machine
         A model that moves; None where the runs held no motion along a schedule, or no two masses fit.
+    corrected
+        Whether its responses were freed from the axis's motion.
     runs
         Where it was learned from.
     remark
@@ -41,10 +43,11 @@ class Baseline:
     quantity: str
     tables: tuple[Table, ...]
     machine: Machine | None
+    corrected: bool = False
     runs: tuple[str, ...] = ()
     remark: str = ""
 
-    def check(self, settings: Settings) -> None:
+    def check(self, settings: Settings, corrected: bool = False) -> None:
         """InputError where a run with these settings cannot be held against it."""
         mine, lines = self.lines, settings.lines
         signals = signals_of(settings)
@@ -54,6 +57,7 @@ class Baseline:
             ("lines", _named(mine), _named(lines)),
             ("estimator", self.estimator, settings.estimator),
             ("quantity", self.quantity, settings.quantity),
+            ("motion correction", _ON[self.corrected], _ON[corrected]),
             *((role, str(self.signals[role]), str(signals[role])) for role in signals),
         ):
             if learned != here:

@@ -77,6 +77,7 @@ def _plain(baseline: Baseline) -> dict[str, Any]:
         "signals": baseline.signals,
         "estimator": baseline.estimator,
         "quantity": baseline.quantity,
+        "corrected": baseline.corrected,
         "machine": _machine_plain(baseline.machine) if baseline.machine else None,
         "remark": baseline.remark,
         "tables": [_table_plain(table) for table in baseline.tables],
@@ -92,6 +93,7 @@ def _baseline(data: dict[str, Any]) -> Baseline:
         data["quantity"],
         tuple(_table(table) for table in data["tables"]),
         _machine(data["machine"]) if data["machine"] else None,
+        data["corrected"],
         tuple(data["runs"]),
         data["remark"],
     )

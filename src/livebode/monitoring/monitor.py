@@ -30,6 +30,8 @@ class Monitor:
         Those of the run.
     false_alarms
         How often one may come, in words (see `seconds_between`); shared by all that judges.
+    corrected
+        Whether the responses are freed from the axis's motion.
 
     Raises
     ------
@@ -37,8 +39,10 @@ class Monitor:
         If the baseline was learned with other lines or signals, or the words cannot be read.
     """
 
-    def __init__(self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT) -> None:
-        baseline.check(settings)
+    def __init__(
+        self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT, *, corrected: bool = False
+    ) -> None:
+        baseline.check(settings, corrected)
         self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
         mean_s, lines = seconds_between(false_alarms), settings.lines
         self._step_s = lines.window / lines.rate_hz

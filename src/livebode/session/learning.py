@@ -51,6 +51,7 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         axes[0].tracking.quantity,
         tuple(tables),
         machine,
+        axes[0].motion is not None,
         tuple(str(path) for path in paths),
         remark,
     )

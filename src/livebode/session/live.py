@@ -36,7 +36,7 @@ def run_live(axis: Axis, directory: Path, *, force: bool = False, progress: Prog
             "found": {"format": source.format, "rate_from": "the sender"},
         }
         fits = Fits.of(axis.fit, tracker.settings.loop)
-        watching = make_watching(axis.monitoring, tracker.settings)
+        watching = make_watching(axis, tracker.settings)
         return record(
             source, tracker, directory, about=about, force=force, progress=progress, draw=draw, fits=fits,
             watching=watching,

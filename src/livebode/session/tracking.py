@@ -86,7 +86,7 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
     fits = Fits.of(axis.fit, tracker.settings.loop)
-    watching = make_watching(axis.monitoring, tracker.settings)
+    watching = make_watching(axis, tracker.settings)
     return record(
         log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits,
         watching=watching,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.estimation import Settings
 from livebode.nouns import Block, Event, Parameters, Responses
-from livebode.session.axis import MonitoringSection
+from livebode.session.axis import Axis
 
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
@@ -49,11 +49,14 @@ class Watching:
         self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_KEPT]
 
 
-def make_watching(section: MonitoringSection, settings: Settings) -> Watching:
+def make_watching(axis: Axis, settings: Settings) -> Watching:
     """For these settings; InputError where the baseline cannot be read or does not fit."""
+    section = axis.monitoring
     if section.baseline is None:
         return Watching(None, None)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
-    monitor = Monitor(Baseline.load(section.baseline), settings, section.false_alarms)
+    monitor = Monitor(
+        Baseline.load(section.baseline), settings, section.false_alarms, corrected=axis.motion is not None
+    )
     return Watching(monitor, str(section.baseline))
