@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -80,10 +80,11 @@ class RunDirectory:
         with _disk_errors(self.path):
             self._events.write(to_json(asdict(event)) + "\n")
 
-    def write_summary(self, summary: dict[str, Any]) -> None:
-        """Write run.json."""
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        """Write run.json, and let `draw` add pictures to the directory it is called with."""
         with _disk_errors(self.path):
             (self.partial / "run.json").write_text(to_json(summary, indent=2) + "\n", encoding="utf-8")
+            draw(self.partial)
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
 
 _SAME_RATE = 1e-6
+BUDGET_BYTES_MIN = 16 << 20
 Ticks = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -141,6 +142,14 @@ class LoopSection(_Section):
         return Gain(-self.entry_gain) * feedback
 
 
+class RecordSection(_Section):
+    """[record]: where it stands, the run is kept in segments that outlast a kill (docs/run-directory.md)."""
+
+    samples: bool = False
+    budget_bytes: Annotated[int, Field(ge=BUDGET_BYTES_MIN)] | None = None
+    segment_s: Annotated[float, Field(gt=0, le=86400)] = 300.0
+
+
 class Axis(_Section):
     """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
 
@@ -149,6 +158,7 @@ class Axis(_Section):
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
+    record: RecordSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:

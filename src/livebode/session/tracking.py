@@ -8,23 +8,28 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from livebode.estimation import Settings, Tracker
+from livebode.estimation import Settings, Tracker, response_unit
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RunDirectory
-from livebode.session.axis import Axis
+from livebode.session.axis import Axis, RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.overview import Overview
 from livebode.session.plan import make_settings
+from livebode.session.tally import Tally
 from livebode.sources import open_log
+
+if TYPE_CHECKING:
+    from livebode.session.segmented import SegmentedRun
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
 Draw = Callable[[Responses, Path, str], None]
+Tell = Callable[[Event], None]
 
 
 class Source(Protocol):
@@ -49,7 +54,15 @@ class Outcome:
     responses: Responses
 
 
-def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
+def run(
+    axis: Axis,
+    directory: Path,
+    *,
+    force: bool = False,
+    progress: Progress,
+    draw: Draw,
+    tell: Tell = lambda _: None,
+) -> Outcome:
     """Track a recording and leave a run directory.
 
     Parameters
@@ -57,7 +70,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     axis
         Recording, signals, lines and options.
     directory
-        Where the run is to stand; appears only when whole.
+        Where the run is to stand; appears only when whole, unless [record] asks for segments: then it is there from
+        the beginning, and an unfinished one of this axis is gone on with.
     force
         Replace an earlier run there.
     progress
@@ -65,18 +79,32 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     draw
         Called with the thinned responses, the directory before it is put in place, and the scheduling signal's name
         with its unit, to add pictures.
+    tell
+        Called with what the record in segments itself has to say: that it goes on, pauses or removes what is oldest.
 
     Raises
     ------
     InputError
-        For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
+        For anything in the recording or the configuration that cannot be; nothing is left in `directory` then, or in
+        segments all that was recorded so far.
     """
     started = time.perf_counter()
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     settings = make_settings(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    return record(log, settings, directory, about=about, force=force, progress=progress, draw=draw, started=started)
+    return record(
+        log,
+        settings,
+        directory,
+        about=about,
+        force=force,
+        progress=progress,
+        draw=draw,
+        started=started,
+        kept=axis.record,
+        tell=tell,
+    )
 
 
 def record(
@@ -90,60 +118,101 @@ def record(
     draw: Draw,
     watch: Watch | None = None,
     started: float | None = None,
+    kept: RecordSection | None = None,
+    again: bool = True,
+    tell: Tell = lambda _: None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
     `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
-    that is to count in the speed; `delivery` goes to the source's `blocks`.
+    that is to count in the speed; `kept` asks for a record in segments, which goes on where it ended, and which `tell`
+    hears of; `again` says whether the source begins with the same samples each time; `delivery` goes to its `blocks`.
     """
     started = time.perf_counter() if started is None else started
     _keep_freed_memory()
     tracker, overview = Tracker(settings), Overview()
-    with RunDirectory(directory, force=force) as out:
+    signals = [name for role in settings.roles if (name := settings.channel(role))]
+    wanted = list(dict.fromkeys(signals + ([settings.schedule] if settings.schedule else [])))
+    blocks = source.blocks(wanted, **delivery)
+    channels = {channel.name: channel for channel in source.channels}
+    tally = Tally(ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or ""), started)
+    about = _summary(about, settings, response_unit(source.channels, settings))
 
-        def publish(responses: Responses) -> None:
-            overview.add(responses)
-            out.write(responses)
-            if watch is not None:
-                watch(responses)
+    def publish(responses: Responses) -> None:
+        overview.add(responses)
+        out.write(responses)
+        if watch is not None:
+            watch(responses)
 
-        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery)
-        responses = overview.responses()
-        summary = _summary(about, tracker, responses) | {"counts": counts}
-        summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
-        out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(source, settings.schedule))
-    return Outcome(directory, summary, responses)
+    def drawn(into: Path) -> None:
+        draw(overview.responses(), into, _schedule_label(source, settings.schedule))
+
+    out: RunDirectory | SegmentedRun
+    if kept is None:
+        out = RunDirectory(directory, force=force)
+    else:
+        from livebode.session.segmented import SegmentedRun  # needs a POSIX system
+
+        out = SegmentedRun(
+            directory,
+            kept,
+            summary=about,
+            channels=[channels[name] for name in wanted],
+            rate_hz=settings.lines.rate_hz,
+            parts={"tracker": tracker, "tally": tally},
+            force=force,
+            again=again,
+            ends=source.samples is not None,
+            tell=tell,
+        )
+    with out:
+        if not isinstance(out, RunDirectory):
+            for responses in out.before():
+                overview.add(responses)
+            blocks = out.feed(blocks)
+        _track(source, blocks, tracker, tally, publish, out, progress)
+        _judge(tracker, tally, None if kept is None else out.write_event)
+        summary = about | _done(tracker, tally)
+        out.finish(summary, drawn)
+    return Outcome(directory, summary, overview.responses())
 
 
 def _track(
-    source: Source, tracker: Tracker, publish: Watch, out: RunDirectory, progress: Progress, delivery: dict[str, Any]
-) -> tuple[dict[str, int], float]:
-    """Counts of samples and responses, and seconds spent in the tracker."""
-    settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
-    channels = [name for role in settings.roles if (name := settings.channel(role))]
-    check = ChannelCheck(tuple(channels), settings.channel(settings.method.reference) or "")
-    wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
-    block: Block | None = None
-    for block in source.blocks(wanted, **delivery):
-        check.take(block)
+    source: Source,
+    blocks: Iterator[Block],
+    tracker: Tracker,
+    tally: Tally,
+    publish: Watch,
+    out: RunDirectory | SegmentedRun,
+    progress: Progress,
+) -> None:
+    """Every block through the tracker into the record."""
+    for block in blocks:
+        tally.check.take(block)
         before = time.perf_counter()
         responses = tracker.process(block)
-        tracked_s += time.perf_counter() - before
-        totals += len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
+        tally.take(block, responses, time.perf_counter() - before)
         publish(responses)
         for event in tracker.drain_events():
             out.write_event(event)
         progress(tracker.counts["samples"], source.samples)
-    if block is None:
+    if not tally.stop:
         raise InputError("the recording holds no samples")
-    check.finish()
-    check_length(block.stop, settings.lines.window)
-    check_excitation(tracker, check.variance)
-    total, invalid, valid = (int(n) for n in totals)
-    check_some_valid(total, valid, tracker.counts, settings.lines.window)
-    return tracker.counts | {"responses": total, "invalid_responses": invalid}, tracked_s
+
+
+def _judge(tracker: Tracker, tally: Tally, say: Tell | None) -> None:
+    """InputError where the responses mean nothing; with `say` an Event, since what was recorded stays."""
+    lines = tracker.settings.lines
+    try:
+        tally.check.finish()
+        check_length(tally.stop, lines.window)
+        check_excitation(tracker, tally.check.variance)
+        check_some_valid(tally.responses, tally.valid_lines, tracker.counts, lines.window)
+    except InputError as error:
+        if say is None:
+            raise
+        say(Event("check", tally.stop, tally.stop / lines.rate_hz, str(error)))
 
 
 def _keep_freed_memory() -> None:
@@ -157,8 +226,9 @@ def _schedule_label(source: Source, name: str | None) -> str:
     return f"{name} in {unit}" if name and unit else name or ""
 
 
-def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> dict[str, Any]:
-    settings, lines = tracker.settings, tracker.settings.lines
+def _summary(about: dict[str, Any], settings: Settings, unit: str) -> dict[str, Any]:
+    """What run.json says from the beginning."""
+    lines = settings.lines
     found = {
         "rate_hz": lines.rate_hz,
         "window": lines.window,
@@ -166,8 +236,8 @@ def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> d
         "bins": list(lines.bins),
         "quiet_bins": list(lines.quiet),
         "hop": settings.step,
-        "quantity": responses.quantity,
-        "unit": responses.unit,
+        "quantity": settings.quantity,
+        "unit": unit,
     }
     versions = {
         "livebode": version("livebode"),
@@ -178,13 +248,16 @@ def _summary(about: dict[str, Any], tracker: Tracker, responses: Responses) -> d
     return about | {"found": about.get("found", {}) | found, "versions": versions}
 
 
-def _speed(tracker: Tracker, tracked_s: float, whole_s: float) -> dict[str, float]:
-    samples = tracker.counts["samples"]
+def _done(tracker: Tracker, tally: Tally) -> dict[str, Any]:
+    """What run.json says at the end."""
+    samples, run_s = tracker.counts["samples"], tally.run_s
     recorded_s = samples / tracker.settings.lines.rate_hz
-    return {
+    speed = {
         "recorded_s": recorded_s,
-        "run_s": whole_s,
-        "tracking_s": tracked_s,
-        "times_real_time": recorded_s / whole_s,
-        "samples_per_s": samples / tracked_s,
+        "run_s": run_s,
+        "tracking_s": tally.tracked_s,
+        "times_real_time": recorded_s / run_s,
+        "samples_per_s": samples / tally.tracked_s,
     }
+    counts = tracker.counts | {"responses": tally.responses, "invalid_responses": tally.invalid}
+    return {"counts": counts, "speed": speed}
