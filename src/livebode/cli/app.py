@@ -13,6 +13,7 @@ import typer
 
 from livebode.cli.demo_command import demo_command
 from livebode.cli.inspect_command import inspect_command
+from livebode.cli.query_command import query_command
 from livebode.cli.run_command import run_command
 from livebode.nouns import InputError
 
@@ -27,6 +28,7 @@ app = typer.Typer(
 app.command("run")(run_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
+app.command("query")(query_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -110,6 +110,17 @@ class Run:
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None
 
+    def parts(self, name: str) -> tuple[list[Path], list[pa.Table]]:
+        """The Parquet files of a table, and the rows that are in none yet."""
+        try:
+            if not reading.in_segments(self.path):
+                file = self.path / f"{name}.parquet"
+                return ([file] if file.exists() else []), []
+            segments, rows = reading.parts(self.path, name)
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"the {name} of {str(self.path)!r} cannot be read: {error}") from None
+        return [self.path / segment.name for segment in segments], rows
+
     def events(self) -> list[Event]:
         """What is in events.jsonl; of a run that is not finished, up to the first line that is not whole."""
         name = self.path / "events.jsonl"

@@ -14,8 +14,6 @@ _WORDS = {
     errno.EFBIG: "the file may grow no further",
     errno.EROFS: "the disk can only be read",
 }
-# Without it a new length is written at the next fsync only by a journalling file system.
-_sync_data = getattr(os, "fdatasync", os.fsync)
 
 
 def why(error: OSError) -> str:
@@ -87,7 +85,7 @@ class AppendFile:
 
     def sync(self) -> None:
         """See that what was written outlasts a power cut; OSError where that is not known."""
-        _sync_data(self._file)
+        getattr(os, "fdatasync", os.fsync)(self._file)  # macOS has none
 
     def append_synced(self, data: bytes) -> None:
         """Both; after an OSError neither counts as done."""

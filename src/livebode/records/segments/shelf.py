@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import errno
 import hashlib
 import os
 from collections.abc import Mapping
@@ -43,6 +43,7 @@ class Shelf:
         self._file = AppendFile(run / manifest.NAME, found.length)
         self._segments = list(found.segments)
         self._sealed = list(sealed)
+        self._unwanted: list[Path] = []
 
     @property
     def used_bytes(self) -> int:
@@ -55,6 +56,7 @@ class Shelf:
 
     def close_journals(self) -> None:
         """Turn the sealed journals into segments; OSError leaves those that are not turned as they were."""
+        self.discard()
         while self._sealed:
             self._turn(self._sealed[0])
             del self._sealed[0]
@@ -72,9 +74,12 @@ class Shelf:
         if gone:
             self._file.append_synced(manifest.removal_line(gone))
             self._segments = [segment for segment in self._segments if segment not in gone]
-            for segment in gone:
-                _remove(self._run / segment.name)
+            self.discard(*(self._run / segment.name for segment in gone))
         return gone
+
+    def discard(self, *paths: Path) -> None:
+        """Remove files that nobody counts; those that cannot be removed now are tried again the next time."""
+        self._unwanted = [path for path in (*self._unwanted, *paths) if not _removed(path)]
 
     def close(self) -> None:
         """Close the manifest."""
@@ -86,7 +91,7 @@ class Shelf:
         segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in rows.items()]
         self._file.append_synced(manifest.closing_line(number, segments))
         self._segments += segments
-        _remove(path)
+        self.discard(path)
 
     def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
         folder = self._run / table
@@ -117,13 +122,15 @@ def sweep(run: Path, found: Manifest) -> None:
     known = {segment.name for segment in found.segments}
     for path in [*run.glob(".*.partial"), *run.glob("*/.*.partial"), *run.glob("*/[0-9]*.parquet")]:
         if path.relative_to(run).as_posix() not in known:
-            _remove(path)
+            _removed(path)
     for number in journal.numbers(run):
         if number in found.closed:
-            _remove(journal.path_of(run, number))
+            _removed(journal.path_of(run, number))
 
 
-def _remove(path: Path) -> None:
-    # What cannot be removed now goes when the run is opened next.
-    with contextlib.suppress(OSError):
+def _removed(path: Path) -> bool:
+    try:
         os.unlink(path)
+    except OSError as error:
+        return error.errno == errno.ENOENT
+    return True

@@ -188,7 +188,7 @@ class Store:
             self._not_paused()
             self._write_summary(summary, finished=finished)
             if finished:
-                os.unlink(journal.path_of(self.path, self._number))
+                self._shelf.discard(journal.path_of(self.path, self._number))
 
     def _not_paused(self) -> None:
         if self._pause is not None:
