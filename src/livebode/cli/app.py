@@ -50,8 +50,8 @@ def main() -> None:
             app()
         finally:  # it ends by SystemExit, and what is still to be written may fail
             sys.stdout.flush()
-    except KeyboardInterrupt as stop:
-        _stop(f"livebode: stopped; {stop or 'nothing was left'}", 130)
+    except KeyboardInterrupt:
+        _stop("livebode: stopped; nothing was left", 130)
     except BrokenPipeError:
         # Who read our output has gone; what was to be done is done.
         _discard_output()

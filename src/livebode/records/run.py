@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from livebode.nouns import Event, InputError, Lines, Responses
 from livebode.records.response_table import SCHEMA
 from livebode.records.segments import json_lines, reading
+from livebode.records.segments.manifest import Manifest, Segment
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
 
@@ -109,6 +110,11 @@ class Run:
                     yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The closed segments that stand, by age; none where the run is not kept in segments."""
+        return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
 
     def parts(self, name: str) -> tuple[list[Path], list[pa.Table]]:
         """The Parquet files of a table, and the rows that are in none yet."""

@@ -103,8 +103,10 @@ class SegmentedRun:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._undo.close()
-        if kind is KeyboardInterrupt:
-            raise KeyboardInterrupt(f"the same command goes on with {str(self.path)!r}") from None
+        if kind in (KeyboardInterrupt, SystemExit) and self._store.last is not None:
+            last = self._store.last
+            message = f"stopped at sample {last.sample}; the same command goes on with the run in {str(self.path)!r}"
+            self._tell(Event("record-stopped", last.sample, last.time_s, message))
 
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
