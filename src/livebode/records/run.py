@@ -104,7 +104,7 @@ class Run:
         file = self.path / name
         try:
             if reading.in_segments(self.path):
-                yield from reading.tables(self.path, name, size_bytes_max)
+                yield from reading.tables(self.path, name, size_bytes_max, finished=self.finished)
             elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
                 with pq.ParquetFile(file) as parquet:
                     yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
@@ -122,7 +122,7 @@ class Run:
             if not reading.in_segments(self.path):
                 file = self.path / f"{name}.parquet"
                 return ([file] if file.exists() else []), []
-            segments, rows = reading.parts(self.path, name)
+            segments, rows = reading.parts(self.path, name, finished=self.finished)
         except (OSError, pa.ArrowException) as error:
             raise InputError(f"the {name} of {str(self.path)!r} cannot be read: {error}") from None
         return [self.path / segment.name for segment in segments], rows

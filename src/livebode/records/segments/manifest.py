@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -44,17 +44,23 @@ class Segment:
 
 @dataclass
 class Manifest:
-    """What manifest.jsonl says: the segments that stand, by age, the journals that are closed, and its whole length."""
+    """What manifest.jsonl says.
+
+    `segments` are those that stand, by age, `closed` the numbers of the journals that they came from; `length` is that
+    of its whole lines, and `torn` what is behind them.
+    """
 
     segments: list[Segment] = field(default_factory=list)
     closed: set[int] = field(default_factory=set)
     length: int = 0
+    torn: bytes = b""
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
         """Up to the first damaged line; OSError where there is none."""
-        lines, length = whole_lines((run / NAME).read_bytes())
-        found = cls(length=length)
+        data = (run / NAME).read_bytes()
+        lines, length = whole_lines(data)
+        found = cls(length=length, torn=data[length:])
         for line in lines:
             if "closed" in line:
                 found.closed.add(line["closed"])
@@ -63,6 +69,16 @@ class Manifest:
                 gone = set(line["removed"])
                 found.segments = [segment for segment in found.segments if segment.name not in gone]
         return found
+
+    def check(self, run: Path, journals: Sequence[int], *, finished: bool) -> None:
+        """InputError where a line is missing that was written whole once: what it names would be forgotten.
+
+        `journals` are the numbers of those that are there. A line may be torn at the end, where the journal that it was
+        to close is still there.
+        """
+        whole = not self.torn if finished else self.torn.count(b"\n") < 2
+        if not whole or min(journals, default=0) > max(self.closed, default=0) + 1:
+            raise InputError(f"{str(run / NAME)!r} is damaged after byte {self.length}; restore it")
 
 
 def closing_line(journal: int, segments: Iterable[Segment]) -> bytes:

@@ -17,12 +17,13 @@ def in_segments(run: Path) -> bool:
     return (run / journal.FOLDER).is_dir()
 
 
-def parts(run: Path, table: str) -> tuple[list[Segment], list[pa.Table]]:
+def parts(run: Path, table: str, *, finished: bool) -> tuple[list[Segment], list[pa.Table]]:
     """Closed segments of a table, by age, and the rows behind them that are still in a journal."""
     # The newest first: what is before a journal that is there is complete. And before the manifest: a journal that is
     # closed in between is then in both, and not in neither.
     journals = {number: _read(run, number) for number in reversed(journal.numbers(run))}
     found = Manifest.read(run)
+    found.check(run, list(journals), finished=finished)
     rows = [
         pa.Table.from_batches(journals[number].rows[table])
         for number in sorted(journals)
@@ -31,17 +32,17 @@ def parts(run: Path, table: str) -> tuple[list[Segment], list[pa.Table]]:
     return [segment for segment in found.segments if segment.table == table], rows
 
 
-def tables(run: Path, table: str, size_bytes_max: int | None = None) -> Iterator[pa.Table]:
+def tables(run: Path, table: str, size_bytes_max: int | None, *, finished: bool) -> Iterator[pa.Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, and at least one part.
 
     Raises
     ------
     InputError
-        If a segment is not what the manifest says.
+        If a segment is not what the manifest says, or the manifest is damaged.
     OSError
         If something cannot be read.
     """
-    segments, rows = parts(run, table)
+    segments, rows = parts(run, table, finished=finished)
     for segment in segments if size_bytes_max is None else _newest(segments, size_bytes_max):
         try:
             yield segment.read(run)

@@ -50,6 +50,7 @@ def recover(run: Path) -> Found | None:
     if not (run / manifest.NAME).exists() or json.loads((run / RUN).read_text("utf-8"))["record"]["finished"]:
         raise InputError(f"the run in {str(run)!r} is finished; take another --out, or --force to replace it")
     found = Manifest.read(run)
+    found.check(run, journal.numbers(run), finished=False)
     sweep(run, found)
     left = [number for number in journal.numbers(run) if number not in found.closed]
     while left:
