@@ -48,7 +48,7 @@ class Limits:
     segment_samples: int
     interval_s: float = 0.5
     budget_bytes: int | None = None
-    journal_bytes: int = 64 << 20
+    journal_bytes: int = 32 << 20
     held_bytes: int = 32 << 20
 
     @property
