@@ -57,17 +57,16 @@ def kill_often(directory: Path, whole_s: float, rng: np.random.Generator) -> int
         time.sleep(rng.uniform(0, whole_s))
         process.kill()
         process.join()
-        # It has ended before the kill where it was quick.
         tracked = max([tracked, *_received(said)])
         if (directory / "run.json").exists():
             check_beginning(directory, SAMPLES, tracked - RATE_HZ)
         else:
             assert tracked == 0
-        if process.exitcode == 0:
+        assert process.exitcode in (0, -signal.SIGKILL)
+        kills += process.exitcode != 0
+        if not unfinished(directory):
             break
-        assert process.exitcode == -signal.SIGKILL
-        kills += 1
-    if unfinished(directory):
+    else:
         record_machine(machine(SAMPLES), directory)
     check_whole(directory, SAMPLES)
     return kills

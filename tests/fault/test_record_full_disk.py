@@ -16,7 +16,8 @@ import pytest
 from livebode.nouns import Block, Channel, Event
 from livebode.records import Run
 from livebode.records.sample_table import as_rows, samples_of
-from livebode.records.segments.store import Limits, Store
+from livebode.records.segments.limits import Limits
+from livebode.records.segments.store import Store
 from tests.starved import on_a_limited_file
 
 ROOT = Path(__file__).parents[2]

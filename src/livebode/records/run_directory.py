@@ -89,6 +89,8 @@ class RunDirectory:
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():
             return
+        if not self._force and (self.path / "open").is_dir():
+            raise InputError(f"{str(self.path)!r} is kept in segments; --continue goes on with it, --force replaces it")
         if not self._force:
             raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
         if not (self.path / "run.json").is_file() and (not self.path.is_dir() or any(self.path.iterdir())):

@@ -15,8 +15,9 @@ from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RESPONSES, Run, as_batch, to_json
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
+from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
-from livebode.records.segments.store import Limits, Store
+from livebode.records.segments.store import Store
 from livebode.session.axis import RecordSection
 from livebode.session.continuing import begun_anew, in_pieces, offered_again
 
@@ -110,7 +111,11 @@ class SegmentedRun:
 
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
-        return Run.open(self.path).batches(_SEEN_AGAIN_BYTES) if self._continued else iter(())
+        if self._continued:
+            run = Run.open(self.path)
+            newest = run.batches(_SEEN_AGAIN_BYTES)
+            yield next(newest, None) or run.responses()  # none are told from no run by their lines
+            yield from newest
 
     def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
         """The Blocks that are still to be tracked; when one is asked for, all that came of the one before is recorded.

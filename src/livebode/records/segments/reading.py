@@ -33,7 +33,7 @@ def parts(run: Path, table: str, *, finished: bool) -> tuple[list[Segment], list
 
 
 def tables(run: Path, table: str, size_bytes_max: int | None, *, finished: bool) -> Iterator[pa.Table]:
-    """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, and at least one part.
+    """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it.
 
     Raises
     ------

@@ -6,7 +6,6 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,45 +15,15 @@ from livebode.nouns import Event, InputError
 from livebode.records.plain_json import to_json
 from livebode.records.segments import journal
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
+from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
-from livebode.records.segments.json_lines import to_line
+from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
 from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.waiting import Waiting
 from livebode.records.table import Table
-
-_EVENTS_HELD = 100_000
-
-
-@dataclass(frozen=True)
-class Limits:
-    """How a record is cut.
-
-    Attributes
-    ----------
-    interval_samples, interval_s
-        A commit is due when either has gone by since the last one; every `interval_s` one is synced to the disk.
-    segment_samples
-        A segment is closed after so many samples, or when the journal has `journal_bytes`.
-    budget_bytes
-        What the record may use, but for events, which are never removed; None for no bound.
-    held_bytes
-        Rows that are kept in memory while the disk takes none; above it they are given up and counted.
-    """
-
-    interval_samples: int
-    segment_samples: int
-    interval_s: float = 0.5
-    budget_bytes: int | None = None
-    journal_bytes: int = 32 << 20
-    held_bytes: int = 32 << 20
-
-    @property
-    def journal_bytes_max(self) -> int:
-        """An eighth of the budget at most, so that a journal and its segment stand side by side within it."""
-        return self.journal_bytes if self.budget_bytes is None else min(self.journal_bytes, self.budget_bytes // 8)
 
 
 class Store:
@@ -91,9 +60,7 @@ class Store:
         self.last: Commit | None = None
         self._tables = dict(tables)
         self._waiting = Waiting(tuple(self._tables))
-        self._events_waiting: list[bytes] = []
-        self._events_given_up = 0
-        self._own_events: list[Event] = []
+        self._log = EventLog()
         self._pause: Event | None = None
         self._committed_s = self._synced_s = 0.0
 
@@ -129,15 +96,11 @@ class Store:
 
     def write_event(self, event: Event) -> None:
         """Append an event with the next commit."""
-        if len(self._events_waiting) < _EVENTS_HELD:
-            self._events_waiting.append(to_line(asdict(event)))
-        else:
-            self._events_given_up += 1
+        self._log.add(event)
 
     def drain_events(self) -> list[Event]:
         """What the record itself has to say since the last call; it is written already, or will be."""
-        events, self._own_events = self._own_events, []
-        return events
+        return self._log.drain()
 
     def due(self, sample: int) -> bool:
         """Whether it is time for a commit, when the next sample has this number."""
@@ -153,7 +116,7 @@ class Store:
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
         try:
-            self._write_events()
+            self._log.write(self._events)
             commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             self._waiting.written()
@@ -206,7 +169,7 @@ class Store:
         self._safe_bytes = found.length
         self._began = self._committed = found.commit.sample
         away_s = max(0.0, time.time() - found.commit.unix_s)
-        self._say(
+        self._log.say(
             "record-continued",
             found.commit.sample,
             found.commit.time_s,
@@ -232,11 +195,6 @@ class Store:
         self._safe_bytes = self._journal.length
         self._began = self._committed = commit.sample
 
-    def _write_events(self) -> None:
-        if self._events_waiting:
-            self._events.append_synced(b"".join(self._events_waiting))
-            self._events_waiting.clear()
-
     def _sync(self) -> None:
         self._journal.sync()
         self._synced_s, self._safe_bytes = time.monotonic(), self._journal.length
@@ -260,7 +218,7 @@ class Store:
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
-            self._say(
+            self._log.say(
                 "record-removed",
                 self.last.sample,
                 self.last.time_s,
@@ -272,7 +230,7 @@ class Store:
         self._journal.back_to(self._safe_bytes)
         self._waiting.failed(self.limits.held_bytes)
         if self._pause is None:
-            self._pause = self._say(
+            self._pause = self._log.say(
                 "record-paused",
                 sample,
                 time_s,
@@ -283,27 +241,21 @@ class Store:
     def _go_on_after_pause(self, sample: int, time_s: float) -> None:
         if self._pause is None:
             return
-        lost, events = self._waiting.take_lost(), self._events_given_up
+        lost = self._waiting.take_lost()
         what = ", ".join(
             f"{sums['rows']} rows of {table} of samples {sums['first_sample']} to {sums['last_sample']}"
             for table, sums in lost.items()
         )
-        self._say(
+        self._log.say(
             "record-resumed",
             sample,
             time_s,
             f"recording goes on at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
             paused_at=self._pause.sample,
             lost=lost,
-            lost_events=events,
+            lost_events=self._log.take_given_up(),
         )
-        self._pause, self._events_given_up = None, 0
-
-    def _say(self, kind: str, sample: int, time_s: float, message: str, **details: Any) -> Event:
-        event = Event(kind, sample, time_s, message, details)
-        self._own_events.append(event)
-        self.write_event(event)
-        return event
+        self._pause = None
 
 
 @contextlib.contextmanager
