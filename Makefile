@@ -38,13 +38,13 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench --job
+	$(BIN)/python -m bench.fits
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
 	$(BIN)/python -m studies.peers
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
-	$(BIN)/python -m studies.motion
 
 fuzz: $(BUILT)   ## a long campaign of damaged files against the readers
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from studies import STUDIES
-from studies.common import Result, Study
 from studies.page import write_page
+from studies.result import Result, Study
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images" / "studies"

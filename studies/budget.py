@@ -10,14 +10,12 @@ from livebode.simulation import BeltAxis, Mechanics, Standstill, Strokes
 from studies.common import (
     EXCITATION,
     RATE_HZ,
+    RUN_IN_S,
     STROKE,
+    WINDOW,
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     error_db,
     lines,
     rms,
@@ -27,6 +25,7 @@ from studies.common import (
 )
 from studies.drawing import LIGHT, figure_of
 from studies.fig10 import standing
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,7 +70,8 @@ def linearisation(at_m: Floats, **options: object) -> Floats:
     positions_m = np.linspace(0.3, 1.55, 6)
     truth, db = Local()(positions_m), []
     for x, local in zip(positions_m, truth):
-        block = standing(EXCITATION, 12.0, 0, sigma=0.0, motion=Standstill(position_m=float(x)))
+        still = Standstill(position_m=float(x))
+        block = standing(EXCITATION, 2 * WINDOW / RATE_HZ, 0, sigma=0.0, motion=still, run_in_s=RUN_IN_S)
         db.append(error_db(track(block, **options)[-1:], local))
     return over_way(np.concatenate(db), positions_m, at_m)
 

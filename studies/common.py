@@ -1,9 +1,8 @@
-"""What the studies share: the stroke, its truth, the errors, and the form of a result."""
+"""What the studies share: the stroke, its truth and the errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from livebode import Block, Lines, Responses, Settings, Tracker, multisine
+from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Strokes
 
 Floats = NDArray[np.float64]
@@ -19,8 +19,8 @@ Complex = NDArray[np.complex128]
 RATE_HZ = 4000.0
 WINDOW = 400  # 100 ms: the paper's N = 100 at 1 ms
 SIGMA = 0.1  # rad/s on the velocity, as in the paper
-# Long enough at rest for the loop to be in its periodic state (to 3e-4) before it moves.
-STROKE = Strokes(start_m=0.25, end_m=1.6, speed_m_per_s=0.38, dwell_s=3.0)
+STROKE = Strokes(start_m=0.25, end_m=1.6, speed_m_per_s=0.38, dwell_s=0.5)
+RUN_IN_S = 10.0  # the loop is then in its periodic state to 1e-8
 
 
 def lines(window: int = WINDOW, rate_hz: float = RATE_HZ) -> Lines:
@@ -45,17 +45,27 @@ class Recording:
 def stroke(sigma: float = SIGMA, seed: int = 0, motion: Strokes = STROKE, **options: Any) -> Recording:
     """One stroke of the paper's simulation; `options` are those of the axis."""
     ticks = len(motion.cycle(RATE_HZ)[0]) // 2
-    options = {"mechanics": Mechanics(), "excitation_n_m": EXCITATION} | options
+    options = {"mechanics": Mechanics(), "excitation_n_m": EXCITATION, "run_in_s": RUN_IN_S} | options
     axis = BeltAxis(motion=motion, sensor=Sensor(noise_rad_per_s=sigma), seconds=ticks / RATE_HZ, seed=seed, **options)
     block, _ = SimulatedAxis(axis).run()
     moving = np.flatnonzero(block["velocity_reference"])
     return Recording(axis, block, int(moving[0]), int(moving[-1]))
 
 
-def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
+def settings(rate_hz: float = RATE_HZ, window: int = WINDOW, **options: Any) -> Settings:
     """The joint estimate at 20:20:140 Hz, plotted over the cart's position."""
     signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
-    return Tracker(Settings(**({"lines": lines(window, block.rate_hz)} | signals | options))).process(block)
+    return Settings(**({"lines": lines(window, rate_hz)} | signals | options))
+
+
+def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
+    return Tracker(settings(block.rate_hz, window, **options)).process(block)
+
+
+def correct(axis: BeltAxis, block: Block, chunk: int, told: Settings, **options: Any) -> Responses:
+    """The same through a MotionCorrection that fits `chunk` samples at a time."""
+    correction = MotionCorrection(told, radius_m=axis.mechanics.radius_m, chunk_samples=chunk, **options)
+    return Responses.join([correction.process(block), correction.finish()])
 
 
 def within_stroke(found: Responses, recording: Recording) -> Responses:
@@ -90,74 +100,3 @@ def decibels(value: Complex | Floats) -> Floats:
 
 def rms(values: Floats, axis: int | None = None) -> Any:
     return np.sqrt(np.mean(np.square(values), axis=axis))
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """A target and what was measured; `why` is the reason, measured too, and is said where the target is missed.
-
-    >>> print(Verdict("dated at the centre, dB", 0.24, 0.28))
-    reached  dated at the centre, dB: 0.24 ≤ 0.28
-    >>> print(Verdict("dated at the centre, dB", 0.3, 0.28, why="the axis moves"))
-    SHORT    dated at the centre, dB: 0.3 > 0.28: the axis moves
-    """
-
-    claim: str
-    value: float | None
-    target: float
-    at_least: bool = False
-    why: str = ""
-
-    @property
-    def reached(self) -> bool | None:
-        """None where it was not measured."""
-        if self.value is None:
-            return None
-        return bool(self.value >= self.target if self.at_least else self.value <= self.target)
-
-    @property
-    def word(self) -> str:
-        return {None: "open", True: "reached", False: "SHORT"}[self.reached]
-
-    def __str__(self) -> str:
-        sign = {(True, True): "≥", (True, False): "<", (False, True): "≤", (False, False): ">"}
-        if self.value is None:
-            return f"{self.word:8} {self.claim}: {'≥' if self.at_least else '≤'} {self.target:.4g}: {self.why}"
-        line = (
-            f"{self.word:8} {self.claim}: {self.value:.3g} {sign[self.at_least, bool(self.reached)]} {self.target:.4g}"
-        )
-        return line if self.reached else f"{line}: {self.why}"
-
-
-@dataclass(frozen=True)
-class Table:
-    """Numbers with a caption; a cell is a number or a word."""
-
-    caption: str
-    header: tuple[str, ...]
-    rows: list[tuple[Any, ...]]
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a study found. `curves` are for its figure alone and are not written."""
-
-    tables: list[Table]
-    verdicts: list[Verdict]
-    curves: dict[str, Any] = field(default_factory=dict)
-
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        verdicts = [{**asdict(v), "verdict": v.word, "sentence": str(v)} for v in self.verdicts]
-        return {"tables": [asdict(t) for t in self.tables], "verdicts": verdicts}
-
-
-@dataclass(frozen=True)
-class Study:
-    """One script: how it measures, how it draws, and what the paper says."""
-
-    name: str
-    title: str
-    paper: str
-    measure: Callable[[bool], Result]  # True: a short version, for tests
-    draw: Callable[[Result], Any]

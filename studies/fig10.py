@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import islice
 from math import expm1
 from typing import TYPE_CHECKING
 
@@ -13,29 +12,15 @@ from scipy.signal import chirp
 from examples.loop_costs import LOOPS
 from livebode import Block, Response, welch
 from livebode.simulation import BeltAxis, BeltResponse, Mechanics, Sensor, SimulatedAxis, Standstill
-from studies.common import (
-    EXCITATION,
-    RATE_HZ,
-    SIGMA,
-    WINDOW,
-    Complex,
-    Floats,
-    Result,
-    Study,
-    Table,
-    Verdict,
-    decibels,
-    lines,
-    rms,
-    track,
-)
+from studies.common import EXCITATION, RATE_HZ, RUN_IN_S, SIGMA, WINDOW, Complex, Floats, decibels, lines, rms, track
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POSITION_M = 0.8
-SETTLED_S, SECONDS = 10.0, 5.0
+SECONDS = 5.0
 THREE_SIGMA = 2.43  # the c at which a bound of a complex number promises 99.7 %
 PROMISES = {1.0: -expm1(-1.0), 2.0: -expm1(-4.0), THREE_SIGMA: -expm1(-(THREE_SIGMA**2))}
 BAND_HZ = (10.0, 150.0)
@@ -79,11 +64,11 @@ def online(runs: int, mechanics: Mechanics | None = None) -> list[Response]:
         mechanics=mechanics or Mechanics(),
         sensor=Sensor(noise_rad_per_s=SIGMA),
         excitation_n_m=EXCITATION,
-        seconds=SETTLED_S + runs * SECONDS,
+        seconds=runs * SECONDS,
+        run_in_s=RUN_IN_S,
     )
     stretches = SimulatedAxis(axis).blocks(block_samples=int(SECONDS * RATE_HZ))
-    settled = islice(stretches, int(SETTLED_S / SECONDS), None)
-    return [track(block, hop=WINDOW, average=True, forgetting=1.0)[-1] for block in settled]
+    return [track(block, hop=WINDOW, average=True, forgetting=1.0)[-1] for block in stretches]
 
 
 def coverage(found: list[Response]) -> list[Floats]:
@@ -101,8 +86,8 @@ def bias(found: list[Response]) -> Floats:
 @cache
 def periodic() -> Block:
     """Two periods of the linear machine, without noise, when it has settled to rounding."""
-    block = standing(EXCITATION, 40.0, 0, sigma=0.0, mechanics=Mechanics(frozen_position_m=POSITION_M))
-    return block.cut(len(block) - 3 * WINDOW, len(block))
+    frozen = Mechanics(frozen_position_m=POSITION_M)
+    return standing(EXCITATION, 3 * WINDOW / RATE_HZ, 0, sigma=0.0, mechanics=frozen, run_in_s=2 * RUN_IN_S)
 
 
 def exactness() -> dict[str, float]:

@@ -15,10 +15,6 @@ from studies.common import (
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     decibels,
     error_db,
     lines,
@@ -29,6 +25,7 @@ from studies.common import (
 )
 from studies.drawing import LIGHT, figure_of
 from studies.fig10 import offline
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

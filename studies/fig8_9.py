@@ -2,81 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode import Block, Responses
+from livebode import Responses
 from livebode.simulation import Mechanics
 from studies.common import (
     RATE_HZ,
     STROKE,
-    WINDOW,
     Floats,
     Local,
     Recording,
-    Result,
-    Study,
-    Table,
-    Verdict,
     decibels,
     error_db,
     lines,
     rms,
     stroke,
-    track,
-    within_stroke,
 )
 from studies.drawing import LIGHT, figure_of, spread
+from studies.result import Result, Study, Table, Verdict
+from studies.ways import Way, by_model, by_model_under_w, centre, hann, newest, newest_at_1_ms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Found = tuple[Responses, Floats]  # and the position that each is dated at
-Way = Callable[[Recording], Found]
-
-
-def newest_at_1_ms(recording: Recording) -> Found:
-    """The paper's way: every fourth sample, N = 100, dated at the newest sample."""
-    block = recording.block
-    slow = Block(block.data[:, ::4], block.channels, block.rate_hz / 4)
-    found = track(slow, WINDOW // 4, hop=5)
-    shown = (found.first * 4 >= recording.first) & (found.sample * 4 <= recording.last)
-    found = found[int(np.flatnonzero(shown)[0]) : int(np.flatnonzero(shown)[-1]) + 1]
-    return found, slow["x"][found.sample]
-
-
-def newest(recording: Recording) -> Found:
-    found = within_stroke(track(recording.block), recording)
-    return found, recording.block["x"][found.sample]
-
-
-def centre(recording: Recording, **options: object) -> Found:
-    found = within_stroke(track(recording.block, **options), recording)
-    return found, found.schedule
-
-
-def hann(recording: Recording) -> Found:
-    return centre(recording, hann=True)
-
-
-# Name, what it does (None: has its place here, but is not built yet), and the target in dB.
-WAYS: list[tuple[str, Way | None, float | None]] = [
+# Name, what it does, and the target in dB.
+WAYS: list[tuple[str, Way, float | None]] = [
     ("the paper's: 1 ms, newest sample", newest_at_1_ms, None),
     ("loop's rate, newest sample", newest, None),
     ("loop's rate, window's centre", centre, 0.28),
     ("the same with Hann", hann, 0.23),
-    ("with the reference model", None, 0.15),
+    ("with the reference model, driven by u", by_model, 0.15),
+    ("with the reference model, driven by w", by_model_under_w, None),
 ]
 PAPER = "|G| tracked along the stroke, line by line, with noise of 0.1 rad/s, against (14) at each position."
 
 
-# Parts of the stroke, each of the windows wholly within it.
-PARTS = ("whole stroke", "constant speed", "beyond 0.45 m")
+# Parts of the stroke, each of the windows wholly within it: from this long after the acceleration on (None: with it).
+AFTER_S = (None, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+PARTS = ("whole stroke", "constant speed", "beyond 0.45 m", "0.5 s after acceleration")
 
 
 @dataclass(frozen=True)
@@ -85,20 +52,28 @@ class Errors:
 
     db: Floats
     position_m: Floats
-    steady: NDArray[np.bool_]
+    after_s: Floats  # from the acceleration's end to the window's begin; negative, or NaN where it brakes
 
     @classmethod
-    def of(cls, way: Way, truth: Local, records: list[Recording]) -> Errors:
+    def of(cls, way: Way, records: list[Recording], *truths: Local) -> list[Errors]:
+        """Those against each truth."""
         found = [(way(record), record) for record in records]
-        db = np.concatenate([error_db(responses, truth(at)) for (responses, at), _ in found])
-        steady = np.concatenate([at_constant_speed(responses, record) for (responses, _), record in found])
-        return cls(db, np.concatenate([at for (_, at), _ in found]), steady)
+        after_s = np.concatenate([after_acceleration_s(responses, record) for (responses, _), record in found])
+        position_m = np.concatenate([at for (_, at), _ in found])
+        each = [[error_db(responses, truth(at)) for (responses, at), _ in found] for truth in truths]
+        return [cls(np.concatenate(db), position_m, after_s) for db in each]
 
     @property
     def parts(self) -> dict[str, float]:
         """Rms over each part of the stroke."""
-        chosen = (np.full(len(self.db), True), self.steady, self.steady & (self.position_m > 0.45))
+        every, steady, settled = np.full(len(self.db), True), self.after_s >= 0, self.after_s >= AFTER_S[-1]
+        chosen = (every, steady, steady & (self.position_m > 0.45), settled)
         return {name: float(rms(self.db[rows])) for name, rows in zip(PARTS, chosen)}
+
+    @property
+    def after(self) -> list[float]:
+        """Rms by how much after the acceleration is left out."""
+        return [float(rms(self.db if t is None else self.db[self.after_s >= t])) for t in AFTER_S]
 
     def along(self, edges_m: Floats) -> Floats:
         """Rms over the lines between positions."""
@@ -106,48 +81,61 @@ class Errors:
         return np.array([rms(self.db[at == i]) if np.any(at == i) else np.nan for i in range(1, len(edges_m))])
 
 
-def at_constant_speed(found: Responses, recording: Recording) -> NDArray[np.bool_]:
-    """Whether the reference's speed is the same in a row's whole window."""
+def after_acceleration_s(found: Responses, recording: Recording) -> Floats:
     step = round(RATE_HZ / found.lines.rate_hz)
     speed = recording.block["velocity_reference"]
     flat = np.flatnonzero(speed > 0.9999 * speed.max())
-    return np.asarray((found.first * step >= flat[0]) & (found.sample * step <= flat[-1]))
+    return np.where(found.sample * step <= flat[-1], (found.first * step - flat[0]) / RATE_HZ, np.nan)
 
 
 def measure(short: bool = False) -> Result:
-    seeds = range(2 if short else 12)
+    seeds = range(1 if short else 12)
     records, quiet = [stroke(seed=seed) for seed in seeds], [stroke(sigma=0.0)]
-    truth, rows, verdicts, found = Local(), [], [], {}
+    truth, rows, verdicts, found, left_out = Local(), [], [], {}, []
     for name, way, target in WAYS:
-        if way is None:
-            verdicts += [Verdict(f"{name}, rms dB", None, target or 0.0, why="not measured by this study yet")]
-            continue
-        errors, without = Errors.of(way, truth, records), Errors.of(way, truth, quiet)
+        (errors,), (without,) = Errors.of(way, records, truth), Errors.of(way, quiet, truth)
         found[name] = errors
         rows.append((name, *errors.parts.values(), *without.parts.values()))
         if target:
             verdicts += judged(name, errors.parts, without.parts, target)
+        left_out.append((name, *errors.after, *without.after))
     header = ("way", *PARTS, *(f"{part}, no noise" for part in PARTS))
     caption = f"Two masses, {len(seeds)} strokes: error of \\|G\\|, rms over all lines in dB"
-    per_line = [(name, *rms(errors.db[errors.steady], axis=0)) for name, errors in found.items()]
+    per_line = [(name, *rms(errors.db[errors.after_s >= 0], axis=0)) for name, errors in found.items()]
     of_lines = Table(
         "The same by line, constant speed", ("way", *(f"{f:g} Hz" for f in lines().frequency_hz)), per_line
     )
+    heads = ["all" if t is None else f"{t:g} s" for t in AFTER_S]
+    of_time = Table(
+        "The same by what is left out: windows that begin this long after the acceleration, up to braking; all targets "
+        f"hold {held_from([(errors.after, target) for errors, (_, _, target) in zip(found.values(), WAYS)])}",
+        ("way", *heads, *(f"{head}, no noise" for head in heads)),
+        left_out,
+    )
     curves = {"record": records[0], "errors": found, "truth": truth}
-    return Result([Table(caption, header, rows), of_lines, three_masses(list(seeds))], verdicts, curves)
+    return Result([Table(caption, header, rows), of_time, of_lines, three_masses(list(seeds))], verdicts, curves)
+
+
+def held_from(measured: list[tuple[list[float], float | None]]) -> str:
+    """From which of AFTER_S on no target is missed."""
+    judged = [np.array(values) <= target for values, target in measured if target is not None]
+    missed = np.flatnonzero(~np.all(judged, axis=0))
+    first = missed[-1] + 1 if missed.size else 0
+    return f"from {AFTER_S[first]:g} s on" if 0 < first < len(AFTER_S) else "nowhere" if first else "everywhere"
 
 
 def judged(name: str, errors: dict[str, float], without: dict[str, float], target: float) -> list[Verdict]:
-    """The target on the whole stroke, and on the part where the stiffness changes slowly."""
-    whole, steady, beyond = PARTS
-    why = (
-        f"{without[whole]:.3g} without noise; {errors[steady]:.3g} at constant speed, where the window neither "
-        f"accelerates nor brakes; {errors[beyond]:.3g} beyond 0.45 m, for the stiffness changes fastest near the motor"
-    )
-    later = f"{without[beyond]:.3g} without noise: the axis changes within the window, and the error budget splits that"
+    """The target on each part of the stroke."""
+    whole, steady, beyond, settled = PARTS
+    why = {
+        whole: "windows that accelerate or brake are in it, with what they leave ringing",
+        steady: "the acceleration still rings, and near the motor the stiffness changes fastest",
+        beyond: "the axis changes within the window, and the error budget splits that",
+        settled: "the axis changes within the window",
+    }
     return [
-        Verdict(f"{name}, {whole}, rms dB", errors[whole], target, why=why),
-        Verdict(f"{name}, {beyond}, rms dB", errors[beyond], target, why=later),
+        Verdict(f"{name}, {part}, rms dB", errors[part], target, why=f"{without[part]:.3g} without noise; {why[part]}")
+        for part in PARTS
     ]
 
 
@@ -158,8 +146,7 @@ def three_masses(seeds: list[int]) -> Table:
     own, two = Local(mechanics), Local()
     rows = []
     for name, way, _ in WAYS:
-        if way is not None:
-            rows.append((name, *(e for truth in (own, two) for e in Errors.of(way, truth, records).parts.values())))
+        rows.append((name, *(e for errors in Errors.of(way, records, own, two) for e in errors.parts.values())))
     header = (f"{part}, against {truth}" for truth in ("their own", "(14)") for part in PARTS)
     apart = float(rms(decibels(own(np.linspace(0.3, 1.55, 51)) / two(np.linspace(0.3, 1.55, 51)))))
     caption = (
@@ -176,9 +163,9 @@ def draw(result: Result) -> Figure:
     ) as figure:
         left, middle, right = figure.subplots(1, 3)
         middle.sharey(left)
-        for axes, (name, way, _) in zip((left, middle), (WAYS[0], WAYS[3])):
+        for axes, (name, way, _) in zip((left, middle), (WAYS[0], WAYS[4])):
             _along(axes, result, way)
-            axes.set_title("loop's rate, centre, Hann" if way is hann else name, size=10, loc="left")
+            axes.set_title(name, size=10, loc="left")
         left.set_ylabel("|G|, dB of 1 rad/s per N m")
         left.set_ylim(-32, 17)
         _errors(right, result)
@@ -210,6 +197,7 @@ def _errors(axes: Axes, result: Result) -> None:
     axes.set_xlabel("cart position, m")
     axes.set_ylabel("error of |G|, rms over lines and strokes, dB")
     axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(0.06, 120)
     axes.legend(loc="upper center")
 
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.common import Study
+from studies.result import Study
 
 HEAD = """# The studies: the paper's experiments, measured
 
 Written by `make studies`; each study alone by `python -m studies NAME`. Figures and numbers (JSON) lie in
 `docs/images/studies/`. The axis is that of [axis.md](axis.md), the estimates are those of
 [estimators.md](estimators.md), and the paper is Nevaranta et al. 2016, whose equations are cited as (1) … (28).
-A target that is missed says SHORT, with the reason; one that no study measures yet says open.
+A target that is missed says SHORT, with the reason.
 """
 
 

@@ -67,7 +67,7 @@ def record_machine(
 ) -> Outcome:
     """Record the machine until its end, from where its record ends."""
     return record(
-        source, SETTINGS, directory, about={"configuration": {"record": kept.model_dump()}}, force=False,
+        source, Tracker(SETTINGS), directory, about={"configuration": {"record": kept.model_dump()}}, force=False,
         progress=progress, draw=lambda *_: None, kept=kept, again=again, tell=tell,
     )  # fmt: skip
 

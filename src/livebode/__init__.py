@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
     from livebode.excitation import Excitation, multisine, recognise
+    from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
     from livebode.kernel import SlidingDFT
+    from livebode.motion import MotionCorrection
     from livebode.nouns import (
         PID,
         Block,
@@ -21,16 +23,20 @@ if TYPE_CHECKING:
         Lines,
         Loop,
         Model,
+        Parameters,
         PositionPD,
         Response,
         Responses,
     )
+    from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
 
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
     "excitation": ("Excitation", "multisine", "recognise"),
+    "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
     "kernel": ("SlidingDFT",),
+    "motion": ("MotionCorrection",),
     "nouns": (
         "PID",
         "Block",
@@ -42,33 +48,47 @@ _HOME = {
         "Lines",
         "Loop",
         "Model",
+        "Parameters",
         "PositionPD",
         "Response",
         "Responses",
     ),
+    "simulation": ("BeltAxis", "SimulatedAxis", "Strokes"),
     "sources": ("Log", "open_log"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "BeltAxis",
     "Block",
     "Cascade",
     "Channel",
     "Event",
     "Excitation",
+    "Fit",
+    "Fitter",
     "GridError",
     "InputError",
     "Lines",
     "Log",
     "Loop",
     "Model",
+    "MotionCorrection",
+    "Parameter",
+    "Parameters",
+    "PhysicalModel",
     "PositionPD",
+    "Rational",
     "Response",
     "Responses",
     "Settings",
+    "SimulatedAxis",
     "SlidingDFT",
+    "Strokes",
     "Tracker",
+    "fit",
+    "fit_rational",
     "multisine",
     "open_log",
     "recognise",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from studies.peers.recording import Recording
 class Estimates:
     """Responses at some newest samples, each speaking for the moment `delay` samples before.
 
+    An answer that is given for a whole stretch at once comes up to `waits` samples after its newest sample.
     `parameters` are Js, mL, Keff, bs, shape (rows, 4), of a peer that finds them itself; else they are fitted.
     """
 
@@ -21,13 +22,15 @@ class Estimates:
     delay: float
     value: np.ndarray  # (rows, lines)
     parameters: np.ndarray | None = None
+    waits: float = 0.0
 
     def at(self, sample: np.ndarray) -> Estimates:
         """The rows of these newest samples."""
         row = np.searchsorted(self.sample, sample)
         if not np.array_equal(self.sample[row], sample):
             raise ValueError("a judged sample has no estimate")
-        return Estimates(sample, self.delay, self.value[row], None if self.parameters is None else self.parameters[row])
+        parameters = None if self.parameters is None else self.parameters[row]
+        return replace(self, sample=sample, value=self.value[row], parameters=parameters)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ WANDER = np.array([1e-9, 1e-4, 1e-6, 3e-3, 1e-1, 1e-3, 1e-3, 10.0, 0.2])  # of t
 STATES, DRIFT = 9, 8
 TERMS = 4  # of the exponential series over a tick: 1e-6 at 90 Hz
 RADIUS_M = two_mass.RADIUS_M
+NONE = np.empty((0, STATES, STATES))
 
 
 @compiled
@@ -79,8 +80,8 @@ def spread(covariance, slope, tick_s, wander):
 
 
 @compiled
-def filtered(u, y, start, doubt, wander, noise, tick_s):
-    """States after each sample's correction, shape (samples, 9)."""
+def filtered(u, y, start, doubt, wander, noise, tick_s, covariances):
+    """States after each sample's correction, shape (samples, 9), and into `covariances`, where not empty, theirs."""
     x, covariance, found = start.copy(), np.diag(doubt**2), np.empty((len(u), STATES))
     for n in range(len(u)):
         gain = covariance[:, 1].copy()
@@ -91,6 +92,8 @@ def filtered(u, y, start, doubt, wander, noise, tick_s):
             for j in range(STATES):
                 covariance[i, j] -= gain[i] * gain[j] / total
         found[n] = x
+        if len(covariances):
+            covariances[n] = covariance
         new, slope = moved(x, u[n], tick_s)
         x[:3] = new
         x[3] += tick_s * x[DRIFT]
@@ -101,6 +104,6 @@ def filtered(u, y, start, doubt, wander, noise, tick_s):
 def tuned(recording: Recording) -> Estimates:
     u, y = recording.block["u"], recording.block["velocity"]
     newest, _ = rows(len(y))
-    states = filtered(u, y, START, DOUBT, WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ)[newest]
+    states = filtered(u, y, START, DOUBT, WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ, NONE)[newest]
     parameters = np.exp(states[:, [5, 6, 3, 4]])
     return Estimates(newest, 0.0, two_mass.response(parameters, LINES.frequency_hz, RATE_HZ), parameters)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from functools import partial
 
-from studies.peers import kalman, least_squares, rls, sliding_welch
+from studies.peers import kalman, least_squares, moving, rls, sliding_welch, smoother
 from studies.peers.compiled import LANGUAGE
 from studies.peers.estimates import Peer
 from studies.peers.tracked import by, track
 
 _DATED = "how late it is"
 _ARX = f"the band, a rate, an order, a memory, {_DATED}"
+_FILTER = (
+    "that there are two masses and dry friction, the radius, starting values, the noise, how fast each of nine states "
+    "may wander"
+)
 _LINES = "the lines and their window"
+_POSITION = "that there are two masses, how long a stroke is, the cart's position as a signal"
 
 PEERS = (
     Peer("RLS, textbook", rls.textbook, "an order, a memory", LANGUAGE),
@@ -21,10 +26,10 @@ PEERS = (
     Peer(
         "EKF, two masses, tuned",
         kalman.tuned,
-        "that there are two masses and dry friction, the radius, starting values, the noise, how fast each of nine "
-        "states may wander",
+        _FILTER,
         LANGUAGE,
     ),
+    Peer("EKF, smoothed over the stroke", smoother.by_stroke, f"{_FILTER}, how long a stroke is", LANGUAGE),
     Peer("livebode", by(track), _LINES, "C"),
     Peer("livebode, Hann", by(partial(track, hann=True)), _LINES, "C"),
     Peer("livebode, Hann, dated as it fits best", by(partial(track, hann=True), 260.0), f"{_LINES}, {_DATED}", "C"),
@@ -34,6 +39,8 @@ PEERS = (
         f"{_LINES}, {_DATED}",
         "C",
     ),
+    Peer("livebode, corrected", moving.corrected, f"{_LINES}, {_POSITION}", "C, NumPy"),
+    Peer("livebode, moving model", moving.model, f"{_LINES}, {_POSITION}, the radius", "C, NumPy"),
 )
 TEXTBOOK, TUNED, FILTER = "RLS, textbook", "RLS, tuned", "EKF, two masses, tuned"
 OURS = "livebode"

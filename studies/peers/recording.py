@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from livebode import Block, Lines, multisine
+from livebode import Block, multisine
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes, Truth
+from studies.common import RATE_HZ, lines
+from studies.common import SIGMA as NOISE_RAD_PER_S
 from studies.peers import two_mass
 
-RATE_HZ = 4000.0
-LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
+LINES = lines()
 HOP = 20
-NOISE_RAD_PER_S = 0.1
 STROKES = Strokes()  # 0.25 … 1.6 m and back at 0.38 m/s
 
 
@@ -30,6 +30,8 @@ class Case:
     name: str
     settled_s: float = 0.5
     backward: bool = False
+    strokes: Strokes = STROKES
+    encoder_counts_per_turn: int = 0
     options: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -42,6 +44,9 @@ CASES = (
     MAIN,
     Case("There and back, from the acceleration on", settled_s=0.1, backward=True),
     Case("15 N of friction at the cart", options={"friction": Friction(load_coulomb_n=15.0)}),
+    Case("A 20-bit encoder", encoder_counts_per_turn=1 << 20),
+    Case("0.2 m/s", strokes=Strokes(speed_m_per_s=0.2)),
+    Case("0.8 m/s", strokes=Strokes(speed_m_per_s=0.8)),
     Case("Three masses", options={"mechanics": Mechanics(masses=3)}),
 )
 
@@ -54,6 +59,11 @@ class Recording:
     block: Block
     truth: Truth
     judged: np.ndarray  # numbers of the newest samples at which everybody is asked
+
+    @property
+    def stroke_samples(self) -> int:
+        """One way, with the rest before it."""
+        return len(self.case.strokes.cycle(RATE_HZ)[0]) // 2
 
     @cached_property
     def true_stiffness(self) -> np.ndarray:
@@ -76,12 +86,12 @@ class Recording:
 
 def record(seed: int, case: Case = MAIN, noise_rad_per_s: float = NOISE_RAD_PER_S) -> Recording:
     """A cycle for the loop and everybody's memory to settle, then the cycle in which all are judged."""
-    cycle = len(STROKES.cycle(RATE_HZ)[0])
+    cycle = len(case.strokes.cycle(RATE_HZ)[0])
     axis = BeltAxis(
-        motion=STROKES,
+        motion=case.strokes,
         excitation_n_m=multisine(LINES),
         seconds=2 * cycle / RATE_HZ,
-        sensor=Sensor(noise_rad_per_s=noise_rad_per_s),
+        sensor=Sensor(noise_rad_per_s=noise_rad_per_s, encoder_counts_per_turn=case.encoder_counts_per_turn),
         seed=seed,
         **case.options,
     )
@@ -91,8 +101,8 @@ def record(seed: int, case: Case = MAIN, noise_rad_per_s: float = NOISE_RAD_PER_
 
 def judged(case: Case, cycle: int) -> np.ndarray:
     """Rows of the second cycle before which the reference ran at full speed for `settled_s`."""
-    _, speed = STROKES.cycle(RATE_HZ)
-    full = np.abs(speed) > STROKES.speed_m_per_s * (1 - 1e-9)
+    _, speed = case.strokes.cycle(RATE_HZ)
+    full = np.abs(speed) > case.strokes.speed_m_per_s * (1 - 1e-9)
     if not case.backward:
         full &= speed > 0
     busy = np.concatenate([[0], np.cumsum(np.tile(full, 2))])

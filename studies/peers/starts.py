@@ -26,7 +26,7 @@ def beginning(seed: int) -> Block:
 
 
 def diverges(block: Block, doubt: np.ndarray) -> bool:
-    told = kalman.START, doubt, kalman.WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ
+    told = kalman.START, doubt, kalman.WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ, kalman.NONE
     with np.errstate(all="ignore"):
         logs = kalman.filtered(block["u"], block["velocity"], *told)[:, 3:7]
     return not bool(np.all(np.abs(logs - kalman.START[3:7]) < np.log(FACTOR_MAX)))

@@ -26,14 +26,16 @@ def errors(scores: Scores) -> str:
     return _rows(("", *COLUMNS), [[name, *map(_number, astuple(score))] for name, score in scores.items()])
 
 
-def terms(costs_s: Mapping[str, float], delays: Mapping[str, float]) -> str:
+def terms(costs_s: Mapping[str, float], delays: Mapping[str, tuple[float, float]]) -> str:
     """What each costs and has to be told."""
     heads = ("", "delay, ms", "cost, ns a sample", "in", "must be told")
     return _rows(heads, [_term(peer, costs_s[peer.name], delays[peer.name]) for peer in PEERS])
 
 
-def _term(peer: Peer, cost_s: float, delay: float) -> list[str]:
-    return [peer.name, f"{1e3 * delay / RATE_HZ:.0f}", f"{1e9 * cost_s:.0f}", peer.language, peer.told]
+def _term(peer: Peer, cost_s: float, delay: tuple[float, float]) -> list[str]:
+    known, waits = (1e3 * samples / RATE_HZ for samples in delay)
+    late = f"{known:.0f}" + (f", with the stroke up to {known + waits:.0f}" if waits else "")
+    return [peer.name, late, f"{1e9 * cost_s:.0f}", peer.language, peer.told]
 
 
 def targets(scores: Scores) -> str:

@@ -64,6 +64,31 @@ def test_blocks_have_the_channels_asked_for_and_their_units() -> None:
             busy().pairs(wrong)
 
 
+def test_a_run_in_is_what_an_axis_that_stood_longer_goes_on_with() -> None:
+    options = {"excitation_n_m": MULTISINE, "friction": Friction(load_coulomb_n=15.0)}
+    longer, _ = SimulatedAxis(BeltAxis(seconds=0.5, **options)).run()
+    # 0.3999 s are made whole repetitions of the position loop: 1600 ticks, four periods of the excitation.
+    block, truth = SimulatedAxis(BeltAxis(seconds=0.1, run_in_s=0.3999, **options)).run()
+    assert np.array_equal(block.data, longer.data[:, 1600:])
+    assert (block.start, truth.start) == (0, 0)
+
+
+def test_a_run_in_has_noise_of_its_own() -> None:
+    noise = []
+    for run_in_s in (0.0, 0.1):
+        axis = BeltAxis(run_in_s=run_in_s, seconds=0.1, seed=3, sensor=Sensor(noise_rad_per_s=0.1))
+        block, truth = SimulatedAxis(axis).run()
+        noise.append(block["velocity"] - truth.states[1])
+        assert (abs(truth.states[1, 0]) > 0) == (run_in_s > 0)
+    assert np.allclose(noise[0], noise[1], atol=1e-14)
+
+
+@pytest.mark.parametrize("value", [-1.0, inf, 1e4])
+def test_a_run_in_has_a_limit(value: float) -> None:
+    with pytest.raises(InputError, match="run_in_s"):
+        BeltAxis(run_in_s=value)
+
+
 def test_a_seed_is_one_noise_and_every_iteration_starts_anew() -> None:
     source = busy()
     assert np.array_equal(source.run()[0].data, source.run()[0].data)

@@ -57,7 +57,7 @@ def record_until(sample: int, directory: Path, **options: object) -> None:
 def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
     record(
-        machine(SAMPLES), SETTINGS, tmp_path / "piece", about={}, force=False, progress=lambda *_: None,
+        machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={}, force=False, progress=lambda *_: None,
         draw=lambda *_: None,
     )  # fmt: skip
     check_whole(tmp_path / "segments", SAMPLES)

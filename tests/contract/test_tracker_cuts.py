@@ -24,6 +24,8 @@ OPTIONS = [
     {"hann": True},
     {"differenced": ("y",), "spikes": ("u", "y"), "average": True},
     {"estimator": "direct"},
+    {"dtype": "float32"},
+    {"dtype": "float32", "differenced": ("y",), "hann": True},
 ]
 ARRAYS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
 

@@ -49,6 +49,15 @@ def test_a_sample_that_is_not_finite_is_gone_after_one_window(value: float, chan
     assert found.counts["non-finite"] == 1
 
 
+def test_a_sample_too_large_for_float32_is_missing_there() -> None:
+    found = tracker(dtype="float32")
+    responses = found.process(changed(record(), "y", 333, 1e39))
+    n = np.arange(1000)
+    assert np.array_equal(responses.valid.all(axis=1), (n >= 99) & ((n < 333) | (n >= 333 + WINDOW)))
+    assert np.allclose(responses.value[responses.valid], 2, rtol=1e-5)
+    assert found.counts["non-finite"] == 1
+
+
 @pytest.mark.parametrize("size", [1e10, 1e30, 1e300])
 @pytest.mark.parametrize("hop", [1, 7, 100])
 def test_a_giant_sample_is_gone_after_one_window(size: float, hop: int) -> None:
@@ -132,6 +141,7 @@ def test_a_line_without_excitation_is_not_valid() -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
+        ({"dtype": "float16"}, "dtype='float16' is not known; choose 'float64' or 'float32'"),
         ({"estimator": "jiont"}, "estimator='jiont' is not known; choose 'direct' or 'joint' or 'indirect'"),
         ({"excitation": None}, "the joint estimator of the plant needs the excitation signal"),
         ({"hop": 0}, "hop=0 is not between 1 and the window of 100 samples"),

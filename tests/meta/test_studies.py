@@ -13,8 +13,10 @@ import pytest
 from livebode.simulation import Mechanics
 from studies import STUDIES
 from studies.__main__ import main, write
-from studies.common import Local, Result, Study, Verdict, error_db, lines, rms, stroke, track, within_stroke
+from studies.common import Local, error_db, lines, rms, stroke, track, within_stroke
+from studies.fig8_9 import held_from
 from studies.page import write_page
+from studies.result import Result, Study, Verdict
 
 ROOT = Path(__file__).parents[2]
 FROZEN = Mechanics(frozen_position_m=0.8)
@@ -43,7 +45,7 @@ def test_a_short_version_runs_draws_and_writes(name: str, tmp_path: Path) -> Non
     assert study.title in page
     assert study.paper in page
     for verdict in result.verdicts:
-        assert verdict.value is None or math.isfinite(verdict.value)
+        assert math.isfinite(verdict.value)
         assert f"**{verdict.word}** {verdict.claim}" in page
 
 
@@ -61,10 +63,9 @@ def test_the_committed_page_is_that_of_the_committed_numbers(name: str, tmp_path
         (1.1, False, "SHORT"),
         (1.0, True, "reached"),
         (0.9, True, "SHORT"),
-        (None, False, "open"),
     ],
 )
-def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float | None, at_least: bool, word: str) -> None:
+def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float, at_least: bool, word: str) -> None:
     verdict = Verdict("claim", value, 1.0, at_least, why="the reason")
     assert verdict.word == word
     assert str(verdict).startswith(word)
@@ -75,6 +76,14 @@ def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float | None, a
 def test_an_unknown_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fig99"]) == 2
     assert "fig8_9" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("errors", "words"),
+    [([9, 9, 9, 1, 9, 1, 1], "from 0.4 s on"), ([1] * 7, "everywhere"), ([1] * 6 + [9], "nowhere")],
+)
+def test_targets_hold_from_where_none_is_missed_later(errors: list[float], words: str) -> None:
+    assert held_from([(errors, 2.0), ([9.0] * 7, None), ([1.0] * 7, 2.0)]) == words
 
 
 def test_the_error_of_a_frozen_machine_long_after_the_start_is_none() -> None:

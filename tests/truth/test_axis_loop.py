@@ -26,16 +26,15 @@ from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import engine_settings
 from tests.axes import LINES, MULTISINE, RATE_HZ
 
-SETTLED_S = 40.0
+SETTLED_S = 20.0
 F_HZ = LINES.frequency_hz
 
 
 def settled(**options: object) -> tuple[Block, Truth]:
     """Three periods in the periodic state at standstill, on the linear machine."""
     options.setdefault("mechanics", Mechanics(frozen_position_m=0.8))
-    axis = BeltAxis(excitation_n_m=MULTISINE, seconds=SETTLED_S, **options)
-    *_, (block, truth) = SimulatedAxis(axis).pairs(block_samples=1600)
-    return block.cut(400, 1600), truth
+    axis = BeltAxis(excitation_n_m=MULTISINE, seconds=0.3, run_in_s=SETTLED_S, **options)
+    return SimulatedAxis(axis).run()
 
 
 def error(block: Block, truth: np.ndarray, **options: object) -> float:

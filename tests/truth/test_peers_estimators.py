@@ -11,9 +11,10 @@ from scipy.signal import lfilter
 
 from livebode import multisine
 from livebode.simulation import BeltAxis, Mechanics, Sensor, SimulatedAxis, Standstill
-from studies.peers import kalman, least_squares, rls, sliding_welch, starts, two_mass
+from studies.peers import kalman, least_squares, moving, rls, sliding_welch, smoother, starts, two_mass
 from studies.peers.arx import Order, Prepared, rows
-from studies.peers.recording import HOP, LINES, MAIN, RATE_HZ, Recording
+from studies.peers.recording import HOP, LINES, MAIN, RATE_HZ, Recording, record
+from studies.peers.score import score
 from studies.peers.tracked import CENTRE, by, track
 
 THETA = np.array([-1.5, 0.8, -0.1, 0.3, 1.0, 0.5])  # a1 … a3, b1 … b3
@@ -56,7 +57,7 @@ def test_the_fit_finds_what_made_the_responses_far_from_its_start() -> None:
     factors = np.random.default_rng(0).uniform(0.6, 1.6, (50, 4))
     true = two_mass.NOMINAL * factors
     measured = two_mass.response(true, LINES.frequency_hz, RATE_HZ)
-    found = two_mass.fit(measured, LINES.frequency_hz, RATE_HZ, iterations=40)
+    found = two_mass.fit(measured, LINES.frequency_hz, RATE_HZ)
     assert apart(found, true) < 1e-6
     measured[3, 2] = np.nan
     assert np.isnan(two_mass.fit(measured, LINES.frequency_hz, RATE_HZ)).any(axis=1).tolist() == [
@@ -160,6 +161,37 @@ def test_the_filter_knows_the_slope_of_its_model_and_spreads_by_it() -> None:
     noise = np.diag(kalman.WANDER**2 / RATE_HZ)
     spread = kalman.spread(root @ root.T, slope, 1 / RATE_HZ, kalman.WANDER)
     assert np.allclose(spread, whole @ root @ root.T @ whole.T + noise)
+
+
+def test_the_moving_model_and_what_it_corrects_are_the_machine_without_noise() -> None:
+    recording = record(0, noise_rad_per_s=0.0)
+    for peer in (moving.corrected, moving.model):
+        found = score([recording], [peer(recording)])
+        assert found.magnitude_db < 0.02
+        assert found.stiffness_percent < 0.1
+        assert found.inertia_percent < 0.02
+
+
+def test_the_smoother_goes_back_as_rauch_tung_and_striebel_wrote_it() -> None:
+    block, tick_s = starts.beginning(0), 1 / RATE_HZ
+    u, y, count = block["u"], block["velocity"], 300
+    covariances = np.empty((len(y), 9, 9))
+    told = kalman.START, kalman.DOUBT, kalman.WANDER, 0.1, tick_s
+    states = kalman.filtered(u, y, *told, covariances)
+    found = smoother.backwards(u, states, covariances, 0, count - 1, kalman.WANDER, tick_s)
+    assert np.array_equal(found[-1], states[count - 1])
+    later = states[count - 1]
+    for n in range(count - 2, -1, -1):
+        new, slope = kalman.moved(states[n], u[n], tick_s)
+        step = np.eye(9)
+        step[:3, :8], step[3, 8] = slope, tick_s
+        foretold = step @ states[n]
+        foretold[:3] = new
+        after = step @ covariances[n] @ step.T + np.diag(kalman.WANDER**2 * tick_s)
+        size = np.sqrt(np.diag(after))
+        inverse = np.linalg.inv(after / np.outer(size, size)) / np.outer(size, size)
+        later = states[n] + covariances[n] @ step.T @ inverse @ (later - foretold)
+        assert np.allclose(found[n], later, rtol=1e-6, atol=1e-9)
 
 
 def test_a_row_that_was_not_estimated_is_refused(quiet: Recording) -> None:

@@ -53,7 +53,7 @@ def test_a_late_answer_that_calls_itself_new_is_wrong(recording: Recording) -> N
 
 
 def test_three_masses_are_judged_by_their_response_alone() -> None:
-    recording = record(0, CASES[3])
+    recording = record(0, CASES[-1])
     few = Recording(recording.case, recording.block, recording.truth, recording.judged[::100])
     exact = few.true_response(few.judged)
     found = score([few], [Estimates(few.judged, 0.0, 1.1 * exact)])

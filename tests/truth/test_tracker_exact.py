@@ -39,6 +39,21 @@ def test_joint_and_direct_are_the_sampled_plant(record: Block, options: dict) ->
     assert error(last(record, **options)) < 1e-12
 
 
+@pytest.mark.parametrize("offset", [0.0, 100.0])
+def test_float32_is_off_by_no_more_than_its_kernel_promises(record: Block, offset: float) -> None:
+    block = Block(record.data + offset, record.channels, RATE_HZ)
+    ours = last(block, dtype="float32")
+    # 1e-6·√N·‖x‖₂ of the window for each spectrum, and half a unit of the last digit of each sample besides.
+    share = 0.0
+    for name in ("y", "u"):
+        x = block[name][-LINES.window :]
+        promised = (1e-6 + 2.0**-24) * np.sqrt(LINES.window) * np.linalg.norm(x)
+        share = share + promised / np.abs(np.fft.fft(x)[list(LINES.bins)])
+    relative = np.abs(ours.value / last(block).value - 1)
+    assert np.all(relative < share)
+    assert np.all(relative > 1e-12)
+
+
 def test_indirect_is_the_sampled_plant(record: Block) -> None:
     # What remains is the image of the position loop, which runs at half the rate.
     assert error(last(record, estimator="indirect", loop=LOOP)) < 5e-6

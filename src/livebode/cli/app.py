@@ -1,4 +1,4 @@
-"""The command line: `livebode run`, `livebode inspect`. Exit codes: 0 done, 2 the user's mistake, 1 ours."""
+"""The command line: run, fit, inspect, demo, export. Exit codes: 0 done, 2 the user's mistake, 1 ours."""
 
 from __future__ import annotations
 
@@ -12,9 +12,13 @@ import traceback
 import typer
 
 from livebode.cli.demo_command import demo_command
+from livebode.cli.export_command import export_command
+from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
+from livebode.cli.margins_command import margins_command
 from livebode.cli.query_command import query_command
 from livebode.cli.run_command import run_command
+from livebode.cli.validate_command import validate_command
 from livebode.nouns import InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -26,9 +30,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("run")(run_command)
+app.command("fit")(fit_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
 app.command("query")(query_command)
+app.command("export")(export_command)
+app.command("margins")(margins_command)
+app.command("validate")(validate_command)
 
 
 @app.callback(invoke_without_command=True)

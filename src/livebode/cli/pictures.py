@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
+from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
+from typing import Any
 
-from livebode.nouns import Responses
+from livebode.fitting import Fit
+from livebode.nouns import Model, Responses
 from livebode.session import Draw, Outcome
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:
     """Draws bode.png and tracking.png."""
 
-    def draw(responses: Responses, into: Path, schedule: str) -> None:
+    def draw(responses: Responses, into: Path, schedule: str, fitted: Model | None) -> None:
         from livebode.report import save_pictures  # with Matplotlib half a second to import
 
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names)
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
 
     return draw
 
@@ -44,6 +47,29 @@ def show(outcome: Outcome) -> None:
         f"from {counts['samples']} samples{gaps}: "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
     )
+    if "fit" in outcome.summary:
+        _show_statuses(outcome.summary["fit"])
+    if outcome.fit is not None:
+        show_fit(outcome.fit, f"newest fit, at {outcome.fit.parameters.time_s[0]:.6g} s")
+
+
+def _show_statuses(summary: dict[str, Any]) -> None:
+    """How many fits hold, and why the others do not."""
+    why = "".join(f"; {count} not: {word}" for word, count in summary["statuses"].items() if word != "ok")
+    print(f"\n{_many(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model hold{why}")
+
+
+def show_fit(found: Fit, of: str) -> None:
+    """What was fitted, with its bounds."""
+    low, high = found.band_hz
+    print(f"{found.model.name} model, {of}; {_many(found.lines, 'line')}, {low:g} … {high:g} Hz")
+    if found.status != "ok":
+        print(f"  no numbers ({found.status}): {found.sentence}")
+        return
+    for name, value, bound, unit in found.rows():
+        print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
+    chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
+    print(f"  ± holds 95 %; the model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
 
 
 def _many(number: int, noun: str) -> str:

@@ -45,6 +45,9 @@ class Settings:
         Whether lines come from three bins as by a Hann window.
     spikes
         Channels that are watched for spikes; windows that hold one are left out. See `SpikeGate`.
+    dtype
+        "float64", or "float32" for what the kernel gives on a drive without double precision: samples are rounded to it
+        as they come, and the DFT's tables and sums are in it. An error that grows with a constant offset on a channel.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class Settings:
     differenced: tuple[str, ...] = ()
     hann: bool = False
     spikes: tuple[str, ...] = ()
+    dtype: Literal["float64", "float32"] = "float64"
 
     def __post_init__(self) -> None:
         self._check_words()
@@ -97,6 +101,7 @@ class Settings:
             ("estimator", tuple(ESTIMATORS)),
             ("quantity", QUANTITIES),
             ("noise", ("periods", "quiet")),
+            ("dtype", ("float64", "float32")),
         ):
             if (word := getattr(self, name)) not in known:
                 raise InputError(f"{name}={word!r} is not known; choose {' or '.join(map(repr, known))}")
@@ -130,7 +135,7 @@ class Settings:
         """
         logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
         names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
-        options = ("noise", "differenced", "hann", "spikes")
+        options = ("noise", "differenced", "hann", "spikes", "dtype")
         return repr((*(getattr(self, name) for name in names + options), logged))
 
     def channel(self, role: Role) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import gcd
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,8 @@ class LineSpectra:
         For each signal, ticks by which its spectrum is advanced (z^ticks).
     spikes
         Gate that names samples to leave out, or None.
+    dtype
+        Of the samples and of the DFT; what is done to a signal before and after it is in float64.
     """
 
     def __init__(
@@ -65,8 +68,9 @@ class LineSpectra:
         differenced: NDArray[np.bool_],
         advanced: NDArray[np.int64],
         spikes: SpikeGate | None,
+        dtype: Literal["float64", "float32"] = "float64",
     ) -> None:
-        self._window, self._bins, self._hop = window, bins, hop
+        self._window, self._bins, self._hop, self._dtype = window, bins, hop, np.dtype(dtype)
         self._step = gcd(hop, window)
         self._differenced = differenced
         self._spikes = spikes
@@ -82,7 +86,7 @@ class LineSpectra:
         self._started = False
 
     def _fresh(self) -> SlidingDFT:
-        return SlidingDFT(self._window, self._bins, channels=self._differenced.size)
+        return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype)
 
     def restart(self, sample: int) -> None:
         """Forget every sample; the next one has this number."""
@@ -114,7 +118,8 @@ class LineSpectra:
 
     def process(self, data: Floats) -> Rows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
-        finite, not_finite = self._prepare(data)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large for the dtype is not finite there
+            finite, not_finite = self._prepare(data)
         implausible = self._range.process(finite)
         if implausible.size:
             finite = finite.copy()
@@ -133,6 +138,8 @@ class LineSpectra:
         return rows
 
     def _prepare(self, data: Floats) -> tuple[Floats, NDArray[np.intp]]:
+        if self._dtype != data.dtype:
+            data = data.astype(self._dtype).astype(np.float64)
         if self._differenced.any():
             if not self._started:  # the first sample has none before it, and so belongs to no whole window
                 self._before = data[:, 0].copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,9 @@ class Tracker:
             self._named(settings.differenced),
             np.array([settings.loop.advance_ticks(role) for role in self._roles]),
             SpikeGate(self._named(settings.spikes), lines.window) if settings.spikes else None,
+            settings.dtype,
         )
+        self._nothing: Responses | None = None
         self._places = lines.window // settings.step
         self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)
         self._centre = Centre(lines.window)
@@ -91,6 +94,18 @@ class Tracker:
     def counts(self) -> dict[str, int]:
         """How many samples came, were missing, and were left out for each reason."""
         return self._watch.counts
+
+    def found(self) -> dict[str, Any]:
+        """What the responses stand on, as plain data for a record: rate, window, lines, hop."""
+        lines = self.settings.lines
+        return {
+            "rate_hz": lines.rate_hz,
+            "window": lines.window,
+            "frequency_hz": lines.frequency_hz.tolist(),
+            "bins": list(lines.bins),
+            "quiet_bins": list(lines.quiet),
+            "hop": self.settings.step,
+        }
 
     def excitation_power(self) -> Floats:
         """Mean |R|² of the reference at each line over the remembered windows, shape (lines,); NaN before the first."""
@@ -141,7 +156,13 @@ class Tracker:
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         moment = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
         with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
-            return self._responses(rows, moment, response_unit(block.channels, s))
+            responses = self._responses(rows, moment, response_unit(block.channels, s))
+        self._nothing = responses[0:0]
+        return responses
+
+    def finish(self) -> Responses | None:
+        """What is held back at the end of the samples: nothing, every response has come; None without samples."""
+        return self._nothing
 
     def snapshot(self) -> bytes:
         """Everything that the next sample's result depends on, exact; see `restore`."""

@@ -3,54 +3,60 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.estimation import Settings, Tracker
-from livebode.motion import two_masses
+from livebode.estimation import Settings, Tracker, snapshots
+from livebode.motion.checks import check
+from livebode.motion.chunk import Chunk, Recorded
 from livebode.motion.drive import drive_of
-from livebode.motion.fit import Fit, Rows
+from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
-from livebode.motion.replay import by_excitation, by_torque, without_drift
-from livebode.motion.steady import steady_rows
-from livebode.nouns import Block, Channel, InputError, Responses
+from livebode.motion.replay import by_excitation
+from livebode.motion.residual import Scatter, residual
+from livebode.motion.standstill import Standstill, without
+from livebode.motion.waiting import Waiting
+from livebode.nouns import Block, Channel, Event, InputError, Responses
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 _LEAD_S = 0.5  # before a chunk, for the model to come to the machine's state; a Q of 10 at 50 Hz forgets in 0.06 s
-_ROWS_MIN = 12
-_FLAT_M = 1e-3  # a chunk that travels less has no curves to fit
 
 
 class MotionCorrection:
     """A Tracker whose Responses are those of the machine held at each window's centre.
 
     A window sees a machine that changes, and its resonance rings on from where the machine was: in motion a response
-    is off, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses,
-    started by themselves from a scan of ten stiffnesses; the fitted model is driven as the machine was, along the
-    measured positions; its signals go through the same windows; what the motion did to the model is taken off the
-    machine:
+    is off, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses, the
+    first time from a scan of ten stiffnesses, later from the model before; the model is driven as the machine was,
+    along the measured positions; what it leaves of the output, r = y − y_model, goes through the same windows; and
 
-        Ĝ = Y/U + G_frozen(x_centre) − Y_model/U_model
+        Ĝ = G_frozen(x_centre) + R/U = Y/U + G_frozen(x_centre) − Y_model/U
 
-    with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ, `passes` times. Only
-    w, u, y, x, the radius and (driven by the excitation) the loop's description are used.
+    with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ. Only w, u, y, x, the
+    radius and (driven by the excitation) the loop's description are used.
 
     Driven by "torque", the model moves under the measured u, so that whatever rings from accelerations, and the answer
-    of the controllers to noise, is in Y_model as in Y, and U_model is U. Driven by "excitation", the described loop is
-    simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
+    of the controllers to noise, is in y_model as in y. Driven by "excitation", Ĝ = Y/U + G_frozen − Y_model/U_model
+    with the described loop simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
 
     To first order the same is (Y/U)·G_frozen/(Y_model/U_model) (`quotient`); at a line near the antiresonance, where
     the model's window sees much less than it has at its centre, that multiplies the noise.
 
-    Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
-    its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same.
+    `sigma` is that of the corrected response: it comes from how R scatters between periods (or from the quiet bins of
+    r), and the motion, which is in y_model too, is not in it. Windows in which the axis stands, reverses or creeps
+    while dry friction holds it are not valid, and an Event of kind "held" says so; a standing axis without dry friction
+    stays valid. See docs/motion.md for what that finds.
 
-    Bias: where the machine is not two masses, only what it shares with them is corrected. Dry friction at standstill,
-    and a window within 0.5 s of a start or a gap, are not; nor is an acceleration's onset where friction lets go.
-    `sigma` is the Tracker's (of a quotient, scaled with it); with noise = "periods" it counts the motion as noise.
+    Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
+    its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same, and a
+    restored correction goes on as if it had never stopped. It keeps chunk + window + 0.5 s of samples.
+
+    Bias: where the machine is not two masses, only what it shares with them is corrected. A window within 0.5 s of a
+    gap, or of a start in motion, is not.
 
     Parameters
     ----------
@@ -65,7 +71,7 @@ class MotionCorrection:
     quotient
         Correct by a quotient instead of a difference.
     passes
-        How often model and correction are repeated.
+        How often model and correction are repeated after a scan; from the model before two less.
     stiffness_splines, damping_splines
         How freely ln Keff(x) and ln bs(x) move over a chunk: 1 for a constant, else 4 or more B-splines.
 
@@ -101,29 +107,61 @@ class MotionCorrection:
         stiffness_splines: int = 8,
         damping_splines: int = 4,
     ) -> None:
-        _check(settings, radius_m, passes, stiffness_splines, damping_splines)
-        if driven_by not in ("torque", "excitation"):
-            raise InputError(f"{driven_by=} is not known; choose 'torque' or 'excitation'")
         lines = settings.lines
+        self._chunk = round(4 * lines.rate_hz) if chunk_samples is None else chunk_samples
+        splines = (stiffness_splines, damping_splines)
+        check(settings, radius_m, self._chunk, driven_by, passes, splines)
         self.settings = settings
-        self.model: MovingModel | None = None
-        """The fit of the newest chunk; None before the first."""
         self._drive = drive_of(settings.loop, lines.rate_hz) if driven_by == "excitation" else None
         self._quotient = quotient
-        self._passes, self._splines, self._radius_m = passes, (stiffness_splines, damping_splines), radius_m
-        self._chunk = round(4 * lines.rate_hz) if chunk_samples is None else chunk_samples
-        if self._chunk < 2 * lines.window:
-            raise InputError(f"chunk_samples={self._chunk} is less than two windows of {lines.window}; take a stroke")
         self._lead = max(round(_LEAD_S * lines.rate_hz), 2 * lines.window)
+        self._identity = repr((settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines))
+        names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
+        self._names = [name for name in names if name]
         self._tracker = Tracker(settings)
-        self._names = [n for n in (settings.excitation or settings.input, settings.input, settings.output) if n]
-        self._names.append(settings.schedule or "")
-        self._forget()
+        self._recorded = Recorded(self._names, lines)
+        self._waiting = Waiting(lines)
+        self._learner = Learner(settings, radius_m, splines, passes)
+        self._scatter = Scatter(settings)
+        self._standstill = Standstill(settings)
+        self._from = 0
+        self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill] = {
+            "recorded": self._recorded,
+            "waiting": self._waiting,
+            "learner": self._learner,
+            "scatter": self._scatter,
+            "standstill": self._standstill,
+        }
 
-    def _forget(self) -> None:
-        self._pending: list[Responses] = []
-        self._parts: list[Block] = []
-        self._from = -1
+    @property
+    def model(self) -> MovingModel | None:
+        """The fit of the newest chunk that travelled; None before the first."""
+        return self._learner.model
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """As of a Tracker: samples that came, were missing, and were left out for each reason."""
+        return self._tracker.counts
+
+    def found(self) -> dict[str, Any]:
+        """As `Tracker.found`, and the model of the newest chunk: its masses, and its belt at eleven positions."""
+        driven_by = "torque" if self._drive is None else "excitation"
+        model = None if self.model is None else self.model.plain()
+        return self._tracker.found() | {
+            "motion": {"driven_by": driven_by, "chunks": self._learner.chunks, "model": model}
+        }
+
+    def excitation_power(self) -> Floats:
+        """As `Tracker.excitation_power`."""
+        return self._tracker.excitation_power()
+
+    def repeatability(self) -> Floats:
+        """As `Tracker.repeatability`."""
+        return self._tracker.repeatability()
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call, those of the Tracker and of chunks that were completed."""
+        return sorted(self._tracker.drain_events() + self._standstill.drain(), key=lambda event: event.sample)
 
     def process(self, block: Block) -> Responses:
         """Responses of the chunks that this Block completes; often none, once a chunk many.
@@ -135,125 +173,121 @@ class MotionCorrection:
         """
         for name in self._names:
             block.index(name)
-        done: list[Responses] = []
-        if self._parts and (block.gap or block.start != self._parts[-1].stop):
-            done.append(self.finish())
         tracked = self._tracker.process(block)
-        if self._from < 0:
+        done: list[Responses] = []
+        if self._recorded and (block.gap or block.start != self._recorded.stop):
+            done.append(self.finish())
+        if not self._recorded:
             self._from = block.start
-        self._pending.append(tracked)
-        self._parts.append(block)
-        while self._parts[-1].stop >= self._from + self._chunk + self.settings.lines.window:
-            done.append(self._corrected(self._from + self._chunk))
+        self._waiting.append(tracked)
+        at = 0
+        while at < len(block):
+            wanted = self._from + self._chunk + self.settings.lines.window
+            piece = block.cut(at, wanted - block.start)
+            self._recorded.append(piece)
+            at += len(piece)
+            if self._recorded.stop == wanted:
+                done.append(self._corrected(self._from + self._chunk))
         return Responses.join(done) if done else tracked[0:0]
 
     def finish(self) -> Responses:
         """Responses of what is left, fitted as a short chunk; the next Block starts anew."""
-        if not self._parts:
+        if not self._recorded:
             raise InputError("there are no samples to finish; process a block first")
-        last = self._corrected(self._parts[-1].stop)
-        self._forget()
+        last = self._corrected(self._recorded.stop)
+        self._recorded.forget()
         return last
+
+    def snapshot(self) -> bytes:
+        """Everything that the next sample's result depends on, exact; see `restore`. Drain events before."""
+        own: dict[str, NDArray[np.generic]] = {
+            "tracker": np.frombuffer(self._tracker.snapshot(), dtype=np.uint8),
+            "from": np.array([self._from]),
+        }
+        return snapshots.pack({name: part.state() for name, part in self._parts.items()} | {"own": own}, self._identity)
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot of a MotionCorrection with the same settings.
+
+        Raises
+        ------
+        InputError
+            If the snapshot is damaged or belongs to other settings; the correction is then as it was.
+        """
+        parts = snapshots.unpack(snapshot, self._identity)
+        self._tracker.restore(parts["own"]["tracker"].tobytes())
+        self._from = int(parts["own"]["from"][0])
+        for name, part in self._parts.items():
+            part.load(parts.get(name, {}))
 
     def _corrected(self, stop: int) -> Responses:
         """Responses up to the sample before `stop`, and their fit; forgets what no later chunk needs."""
-        pending = Responses.join(self._pending)
-        count = int(np.searchsorted(pending.sample, stop))
-        tracked, self._pending = pending[:count], [pending[count:]]
-        end = min(stop + self.settings.lines.window, self._parts[-1].stop)
-        signals = self._signals(end)
-        corrected = self._correct(tracked, signals) if count else tracked
+        tracked = self._waiting.take(stop)
+        end = min(stop + self.settings.lines.window, self._recorded.stop)
+        chunk = self._recorded.chunk(self._from, stop, end)
         self._from = stop
-        self._parts = [part for part in self._parts if part.stop > stop - self._lead]
-        return corrected
+        self._recorded.drop(stop - self._lead)
+        return self._correct(tracked, chunk) if len(tracked) else tracked
 
-    def _signals(self, end: int) -> Block:
-        """w, u, y, x from the lead on; a sample that is not finite is as the last one before it."""
-        begin = max(self._from - self._lead, self._parts[0].start)
-        data = np.concatenate([[p.data[p.index(n)] for n in self._names] for p in self._parts], axis=1)
-        data = data[:, begin - self._parts[0].start : end - self._parts[0].start]
-        if not np.isfinite(data).all():
-            known = np.where(np.isfinite(data), np.arange(data.shape[1]), -1)
-            last = np.maximum.accumulate(known, axis=1)
-            data = np.where(last >= 0, np.take_along_axis(data, last.clip(0), axis=1), 0.0)
-        return Block(data, _channels("w", "u", "y", "x"), self.settings.lines.rate_hz, start=begin)
+    def _correct(self, tracked: Responses, chunk: Chunk) -> Responses:
+        def replay(model: MovingModel) -> Replayed:
+            return self._replayed(model, tracked, chunk)
 
-    def _correct(self, tracked: Responses, signals: Block) -> Responses:
-        usable = tracked.valid.all(axis=1) & np.isfinite(tracked.schedule)
-        steady = usable & steady_rows(tracked.sample, signals, self.settings.lines.window)
-        fitted = steady if np.count_nonzero(steady) >= _ROWS_MIN else usable
-        if np.count_nonzero(fitted) >= _ROWS_MIN:
-            self.model, value = self._fitted(tracked, fitted, signals)
-        elif self.model is not None:
-            value = self._moved(self.model, tracked, signals)
-        else:
-            value = np.full_like(tracked.value, np.nan)
-        valid = tracked.valid & np.isfinite(value)
+        now = self._learner.learn(tracked, chunk, replay)
+        if now is None:
+            nothing = np.full_like(tracked.value, complex(np.nan, np.nan))
+            return replace(tracked, value=nothing, sigma=np.full(nothing.shape, np.nan), valid=tracked.valid & False)
+        held = self._standstill.tail(chunk)
+        if self._learner.has_travelled and (found := self._standstill.stretches(now.left, chunk)):
+            wide = replay(self._learner.widened(tracked, chunk, now))
+            held += self._standstill.held(found, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
+            if not held and self._learner.travels:
+                now = self._learner.completed(tracked, chunk, replay, now)
+        left = without(now.left.velocity, held, chunk, self.settings.lines.window)
+        seen, memory = self._scatter.then(left, chunk)
+        self._scatter.keep(memory)
+        seen = _rows_of(seen, tracked)
+        value = self._value(now, tracked, chunk)
+        valid = tracked.valid & seen.valid & np.isfinite(value)
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, tracked.sigma * scale, np.nan),
+            sigma=np.where(valid, seen.sigma * scale, np.nan),
+            dof=seen.dof,
             valid=valid,
         )
 
-    def _fitted(
-        self, tracked: Responses, used: NDArray[np.bool_], signals: Block
-    ) -> tuple[MovingModel, NDArray[np.complex128]]:
-        lines, at = self.settings.lines, tracked.schedule[used]
-        splines = self._splines if np.ptp(at) > _FLAT_M else (1, 1)
-        fit = Fit(lines.z, lines.rate_hz, self._radius_m, *splines)
-        # The error of a response is n/|U|: white noise on y over the torque at the line.
-        weight = self._torque(signals, tracked.sample[used])
-        value = tracked.value
-        model = fit.start(Rows(value[used], weight, at))
-        for _ in range(self._passes):
-            model = fit.refine(Rows(value[used], weight, at), model)
-            value = self._moved(model, tracked, signals)
-            value[used] = np.where(np.isfinite(value[used]), value[used], tracked.value[used])
-        return model, value
+    def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Replayed:
+        left = residual(model, chunk, self.settings)
+        seen = _rows_of(self._scatter.once(left.velocity, chunk), tracked)
+        return Replayed(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
 
-    def _torque(self, signals: Block, sample: NDArray[np.int64]) -> Floats:
-        """|U| at the lines over the windows that end at these samples, (rows, lines)."""
-        window, lines = self.settings.lines.window, self.settings.lines
-        first = sample - signals.start - window + 1
-        wave = np.exp(-2j * np.pi * np.outer(np.arange(window), lines.bins) / window)
-        return np.asarray(np.abs(np.lib.stride_tricks.sliding_window_view(signals["u"], window)[first] @ wave))
-
-    def _moved(self, model: MovingModel, tracked: Responses, signals: Block) -> NDArray[np.complex128]:
+    def _value(self, now: Replayed, tracked: Responses, chunk: Chunk) -> Complex:
         """The tracked responses, moved as the model's had to be to its frozen one; NaN where it has no whole window."""
-        lines, s = self.settings.lines, self.settings
-        if self._drive is None:
-            u, y = signals["u"], by_torque(model, lines.rate_hz, signals["u"], signals["x"])
-            y = without_drift(y, signals["y"], lines.window)
-        else:
-            u, y = by_excitation(model, self._drive, signals["w"], signals["x"])
-        names = list(dict.fromkeys(n for n in (s.excitation, s.input, s.output) if n))
-        rows = {s.input: u, s.output: y} | ({s.excitation: signals["w"]} if s.excitation else {})
-        block = Block(np.array([rows[n] for n in names]), _channels(*names), lines.rate_hz, start=signals.start)
-        seen = Tracker(replace(s, schedule=None, spikes=())).process(block)
-        place = np.searchsorted(seen.sample, tracked.sample)
-        at = np.where(np.isfinite(tracked.schedule), tracked.schedule, model.low_m)
-        frozen = two_masses.sampled(model.parameters(at), lines.z, lines.rate_hz)
+        if self._drive is None and not self._quotient:
+            return now.value
+        held = frozen(now.model, tracked.schedule, self.settings)
         with np.errstate(invalid="ignore"):  # NaN where a window is not whole
-            if self._quotient:
-                return np.asarray(tracked.value * (frozen / seen.value[place]))
-            return np.asarray(tracked.value + (frozen - seen.value[place]))
+            if self._drive is None:
+                moving = tracked.value - now.seen.value
+            else:
+                moving = self._under_excitation(now.model, tracked, chunk)
+            return np.asarray(tracked.value * (held / moving) if self._quotient else tracked.value + (held - moving))
+
+    def _under_excitation(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> Complex:
+        s = self.settings
+        assert self._drive is not None
+        u, y = by_excitation(model, self._drive, chunk.w, chunk.x)
+        rows = {s.input: u, s.output: y} | ({s.excitation: chunk.w} if s.excitation else {})
+        names = [name for name in rows if name]
+        channels = tuple(map(Channel, names))
+        block = Block(np.array([rows[n] for n in names]), channels, s.lines.rate_hz, start=chunk.start)
+        seen = Tracker(replace(s, schedule=None, spikes=())).process(block)
+        return _rows_of(seen, tracked).value
 
 
-def _channels(*names: str) -> tuple[Channel, ...]:
-    return tuple(Channel(name) for name in names)
-
-
-def _check(settings: Settings, radius_m: float, passes: int, stiffness_splines: int, damping_splines: int) -> None:
-    if settings.input is None or settings.schedule is None:
-        raise InputError("the correction needs the input (torque) and the schedule (position); name their channels")
-    if settings.quantity != "plant" or settings.average or settings.estimator == "indirect":
-        raise InputError("the correction is of single windows of the plant by the joint or the direct estimator")
-    if not (np.isfinite(radius_m) and radius_m > 0):
-        raise InputError(f"{radius_m=} is not a positive number of metres per radian")
-    if passes < 1:
-        raise InputError(f"{passes=} is not at least 1; 3 is usual")
-    for name, splines in (("stiffness_splines", stiffness_splines), ("damping_splines", damping_splines)):
-        if splines != 1 and splines < 4:
-            raise InputError(f"{name}={splines} is neither 1 nor at least 4")
+def _rows_of(seen: Responses, tracked: Responses) -> Responses:
+    """The rows at the samples of the others."""
+    first = int(np.searchsorted(seen.sample, tracked.sample[0]))
+    return seen[first : first + len(tracked)]

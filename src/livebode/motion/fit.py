@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.motion import two_masses
-from livebode.motion.least_squares import minimise
+from livebode.fitting import two_masses
+from livebode.fitting.least_squares import minimise
+from livebode.fitting.windows import scan
 from livebode.motion.model import Curve, MovingModel, basis
-from livebode.motion.windows import scan
 from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
@@ -68,24 +68,48 @@ class Fit:
             weights.append(np.linalg.solve(matrix, shape.T @ found[:, which]))
         return self._model(np.concatenate([found[0, :2], *weights]), low, high)
 
-    def refine(self, rows: Rows, model: MovingModel) -> MovingModel:
-        """Weighted least squares over all rows, from a model on."""
+    def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
+        """A model from before, over another range of positions."""
+        at, arm = (
+            np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)),
+            2 * np.log(self.radius_m),
+        )
+        weights = [
+            np.linalg.lstsq(basis(at, low, high, splines), curve(at) + arm)[0]
+            for curve, splines in (
+                (model.log_stiffness, self.stiffness_splines),
+                (model.log_damping, self.damping_splines),
+            )
+        ]
+        masses = self._unknowns(model)[:2]
+        return self._model(np.concatenate([masses, *weights]), low, high)
+
+    def misfit(self, rows: Rows, model: MovingModel) -> float:
+        """Share of the weighted responses that the model leaves, rms."""
+        rest = two_masses.sampled(model.parameters(rows.position_m), self.z, self.rate_hz) - rows.value
+        return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
+
+    def refine(self, rows: Rows, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
+        """Weighted least squares over all rows, from a model on; `masses_known` holds Js and mL."""
         low, high = model.low_m, model.high_m
+        known = self._unknowns(model)
+        free = np.s_[2:] if masses_known else np.s_[:]
         design = self._design(rows.position_m, low, high)
         pull = _SMOOTH * self._smoothness(rows)
 
         def normal(unknowns: Floats) -> tuple[Floats, Floats, Floats]:
-            parameters = np.einsum("rpu,u->rp", design, unknowns[0])
+            known[free] = unknowns[0]
+            parameters = design @ known
             residual = (rows.weight * (two_masses.sampled(parameters, self.z, self.rate_hz) - rows.value)).ravel()
             slope = rows.weight[..., np.newaxis] * two_masses.slopes(parameters, self.z, self.rate_hz)
-            left = np.einsum("rlp,rpu->rlu", slope, design).reshape(residual.size, -1)
-            matrix = (left.conj().T @ left).real + pull
-            gradient = (left.conj().T @ residual).real + pull @ unknowns[0]
-            cost = np.sum(np.abs(residual) ** 2) + unknowns[0] @ pull @ unknowns[0]
+            left = (slope @ design[..., free]).reshape(residual.size, -1)
+            matrix = (left.conj().T @ left).real + pull[free, free]
+            gradient = (left.conj().T @ residual).real + (pull @ known)[free]
+            cost = np.sum(np.abs(residual) ** 2) + known @ pull @ known
             return np.atleast_1d(cost), gradient[np.newaxis], matrix[np.newaxis]
 
-        unknowns, _ = minimise(normal, self._unknowns(model)[np.newaxis])
-        return self._model(unknowns[0], low, high)
+        known[free] = minimise(normal, known[free][np.newaxis].copy())[0][0]
+        return self._model(known, low, high)
 
     def _design(self, position_m: Floats, low: float, high: float) -> Floats:
         """From the unknowns to the four logarithms of each row, shape (rows, 4, unknowns)."""

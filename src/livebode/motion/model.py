@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +12,15 @@ from scipy.interpolate import BSpline
 Floats = NDArray[np.float64]
 
 _DEGREE = 3
+_SHOWN = 11
+_BEYOND = 0.1  # of the range, on either side, where a curve goes on straight
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A smooth function of the position: a cubic spline with evenly spaced knots, constant outside of its range.
+    """A smooth function of the position: a cubic spline with evenly spaced knots.
+
+    Outside of its range it goes on straight for a tenth of it, and is constant from there.
 
     Parameters
     ----------
@@ -31,16 +36,32 @@ class Curve:
 
     def __call__(self, position_m: ArrayLike) -> Floats:
         at = np.asarray(position_m, dtype=np.float64)
-        return np.asarray((basis(at.ravel(), self.low, self.high, len(self.weights)) @ self.weights).reshape(at.shape))
+        if len(self.weights) == 1:
+            return np.full(at.shape, self.weights[0])
+        knots, slope, reach = _knots(self.low, self.high, len(self.weights))
+        value = BSpline(knots, self.weights, _DEGREE)(at.clip(self.low, self.high))
+        before, beyond = (at - self.low).clip(-reach, 0.0), (at - self.high).clip(0.0, reach)
+        rise, fall = slope * (self.weights[1] - self.weights[0]), slope * (self.weights[-1] - self.weights[-2])
+        return np.asarray(value + before * rise + beyond * fall)
+
+
+def _knots(low: float, high: float, splines: int) -> tuple[Floats, float, float]:
+    """Knots; what the slope at an end is per difference of its two weights; how far a curve goes on straight."""
+    inner = np.linspace(low, high, splines - _DEGREE + 1)
+    knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
+    return knots, _DEGREE / float(inner[1] - inner[0]), _BEYOND * (high - low)
 
 
 def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
     """Value of every B-spline at these positions, shape (positions, splines); one of them alone is 1."""
     if splines == 1:
         return np.ones((position_m.size, 1))
-    inner = np.linspace(low, high, splines - _DEGREE + 1)
-    knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
-    return np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+    knots, rise, reach = _knots(low, high, splines)
+    value = np.asarray(BSpline.design_matrix(position_m.clip(low, high), knots, _DEGREE).toarray())
+    slope = rise * np.array([-1.0, 1.0])
+    value[:, :2] += np.outer((position_m - low).clip(-reach, 0.0), slope)
+    value[:, -2:] += np.outer((position_m - high).clip(0.0, reach), slope)
+    return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +83,11 @@ class MovingModel:
     log_damping: Curve
 
     @property
+    def rigid_kg_m2(self) -> float:
+        """Js + mL·r²."""
+        return self.inertia_kg_m2 + self.load_kg * self.radius_m**2
+
+    @property
     def low_m(self) -> float:
         return self.log_stiffness.low
 
@@ -70,12 +96,24 @@ class MovingModel:
         return self.log_stiffness.high
 
     def stiffness_at(self, position_m: ArrayLike) -> Floats:
-        """Keff, N/m; outside of the range that the fit has seen as at its end."""
+        """Keff, N/m; beyond the range that the fit has seen it goes on for a tenth of it."""
         return np.asarray(np.exp(self.log_stiffness(position_m)))
 
     def damping_at(self, position_m: ArrayLike) -> Floats:
         """bs, N s/m; likewise."""
         return np.asarray(np.exp(self.log_damping(position_m)))
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data: masses and radius, and the belt at eleven positions of the range."""
+        at = np.linspace(self.low_m, self.high_m, _SHOWN)
+        return {
+            "inertia_kg_m2": self.inertia_kg_m2,
+            "load_kg": self.load_kg,
+            "radius_m": self.radius_m,
+            "position_m": at.tolist(),
+            "stiffness_n_per_m": self.stiffness_at(at).tolist(),
+            "damping_n_s_per_m": self.damping_at(at).tolist(),
+        }
 
     def parameters(self, position_m: ArrayLike) -> Floats:
         """Logarithms in the order of `two_masses`, shape (..., 4)."""

@@ -20,15 +20,16 @@ _PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by
 _ANYWHERE_M = 1e12
 
 
-def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats) -> Floats:
-    """Velocity of the model under the measured torque u, N m, from rest: rad/s, shape (samples,).
+def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats) -> tuple[Floats, Floats]:
+    """Velocities of motor (rad/s) and cart (m/s) under the measured torque u, N m, from rest, shape (samples,) each.
 
     Whatever made the torque (excitation, motion, the controllers' answer to noise) moves the model as it moved the
     machine. What is not in u or not in the model, such as friction, makes it drift away slowly; see `without_drift`.
     """
     drive = Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
                   position_gain_per_s=0.0)  # fmt: skip
-    return _run(model, drive, u, position_m)[1]
+    _, motor, cart = _run(model, drive, u, position_m)
+    return motor, cart
 
 
 def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
@@ -37,7 +38,8 @@ def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Float
     The motion itself is left out: what remains is linear and varies in time. A transient that the reference's
     acceleration leaves behind is not in it.
     """
-    return _run(model, drive, w, position_m)
+    u, motor, _ = _run(model, drive, w, position_m)
+    return u, motor
 
 
 def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
@@ -54,7 +56,8 @@ def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
     return np.asarray(model + slow)
 
 
-def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
+def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats, Floats]:
+    """u, velocity of the motor, velocity of the cart."""
     stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
     most = float(stiffness.max()), float(damping.max())
     mechanics = Mechanics(
@@ -76,4 +79,4 @@ def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tup
     output = np.empty((3 + _STATES, w.size))
     if engine.advance(inputs, output) < w.size:
         raise InputError("the fitted model does not stay in its loop; check the loop's description and the radius")
-    return output[0], output[1]
+    return output[0], output[1], output[6]

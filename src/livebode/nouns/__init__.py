@@ -7,6 +7,7 @@ from livebode.nouns.event import Event
 from livebode.nouns.lines import Lines
 from livebode.nouns.loop import Loop
 from livebode.nouns.model import Gain, Model, as_model
+from livebode.nouns.parameters import Parameters
 from livebode.nouns.response import Quantity, Response, Responses, widened
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Lines",
     "Loop",
     "Model",
+    "Parameters",
     "PositionPD",
     "Quantity",
     "Response",

@@ -10,9 +10,9 @@ from typing import Any
 class Event:
     """Something that a person should know, at one moment of the recording.
 
-    `kind` is a stable word that programs may rely on (``gap``, ``non-finite``, ``spike``), `sample` the number of
-    the first sample that it concerns, `time_s` its time in the source's clock, `message` one sentence for people,
-    and `details` plain data.
+    `kind` is a stable word that programs may rely on (``gap``, ``non-finite``, ``spike``, ``held``), `sample` the
+    number of the first sample that it concerns, `time_s` its time in the source's clock, `message` one sentence for
+    people, and `details` plain data.
     """
 
     kind: str

@@ -12,7 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Event, InputError, Responses
+from livebode.nouns import Event, InputError, Parameters, Responses
+from livebode.records.parameter_table import ParameterTable
 from livebode.records.plain_json import to_json
 from livebode.records.response_table import ResponseTable
 
@@ -52,6 +53,7 @@ class RunDirectory:
                 self.partial.chmod(0o755)
                 self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
                 self._responses = ResponseTable(self.partial / "responses.parquet")
+                self._parameters: ParameterTable | None = None
             except BaseException:
                 shutil.rmtree(self.partial, ignore_errors=True)
                 raise
@@ -61,6 +63,8 @@ class RunDirectory:
         try:
             with _disk_errors(self.path):
                 self._responses.close()
+                if self._parameters is not None:
+                    self._parameters.close()
                 self._events.close()
                 if kind is None:
                     self._check_free()
@@ -74,6 +78,13 @@ class RunDirectory:
         """Append responses."""
         with _disk_errors(self.path):
             self._responses.write(responses)
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        """Append what was fitted and what follows; the file ``parameters.parquet`` is there once anything was."""
+        with _disk_errors(self.path):
+            if self._parameters is None:
+                self._parameters = ParameterTable(self.partial / "parameters.parquet")
+            self._parameters.write(*parts)
 
     def write_event(self, event: Event) -> None:
         """Append an event."""

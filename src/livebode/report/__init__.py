@@ -4,8 +4,19 @@ Importing this costs nothing: Matplotlib and plotext are loaded when the first p
 """
 
 from livebode.report.bode import bode_figure
+from livebode.report.loop import loop_figure, save_loop_picture
 from livebode.report.pictures import save_pictures
 from livebode.report.terminal import terminal_bode
 from livebode.report.tracking import tracking_figure
+from livebode.report.validation import save_validation_picture, validation_figure
 
-__all__ = ["bode_figure", "save_pictures", "terminal_bode", "tracking_figure"]
+__all__ = [
+    "bode_figure",
+    "loop_figure",
+    "save_loop_picture",
+    "save_pictures",
+    "save_validation_picture",
+    "terminal_bode",
+    "tracking_figure",
+    "validation_figure",
+]

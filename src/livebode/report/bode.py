@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses
+from livebode.nouns import Model, Responses
 from livebode.report import ticks, words
 from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
 from livebode.report.summary import PROBABILITY, Summary, decibels, summarised
@@ -19,12 +19,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _LEFT = 0.085
+_FIT_POINTS = 600
 # A bound that reaches below this is drawn to the lower edge: the response cannot be told from zero.
 _FLOOR_DB = -1000.0
 
 
 def bode_figure(
-    responses: Responses, *, title: str = "", names: tuple[str, str] | None = None, dark: bool = False
+    responses: Responses,
+    *,
+    title: str = "",
+    names: tuple[str, str] | None = None,
+    fitted: Model | None = None,
+    dark: bool = False,
 ) -> Figure:
     """Magnitude (dB), unwrapped phase (degrees) and, where known, coherence over logarithmic frequency.
 
@@ -41,6 +47,8 @@ def bode_figure(
         Heading, from the recording; shortened where it does not fit.
     names
         Names of the input and the output channel.
+    fitted
+        The newest fit, drawn from the first to the last line.
     dark
         Light on dark.
     """
@@ -58,8 +66,25 @@ def bode_figure(
         if rest:
             _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary))
             rest[0].set_ylabel("coherence γ²")
-        _scales(figure, look, summary, magnitude, phase, *rest)
+        _scales(look, summary, magnitude, phase, *rest)
+        if summary.count:
+            if fitted is not None:
+                _draw_fit(magnitude, phase, look, summary, fitted)
+            _legend(figure, look, summary, fitted is not None)
     return figure
+
+
+def _draw_fit(magnitude: Axes, phase: Axes, look: Style, summary: Summary, fitted: Model) -> None:
+    """The model as a thin line, its phase on the turn that the newest response is drawn on."""
+    lines_hz = summary.responses.lines.frequency_hz
+    f = np.union1d(np.geomspace(lines_hz[0], lines_hz[-1], _FIT_POINTS), lines_hz)
+    value = fitted.response(f)
+    deg = np.degrees(np.unwrap(np.angle(value)))
+    away = (summary.newest_phase_deg - deg[np.searchsorted(f, lines_hz)]) / 360
+    turns = np.round(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
+    line: dict[str, Any] = {"color": look.ink, "linewidth": 1.0, "dashes": (4, 2), "zorder": 6, "gid": "fit"}
+    magnitude.plot(f, decibels(np.abs(value)), **line)
+    phase.plot(f, deg + 360 * turns, **line)
 
 
 def _panels(figure: Figure, coherent: bool) -> list[Axes]:
@@ -134,12 +159,12 @@ def _alone(values: Floats) -> NDArray[np.bool_]:
     return known & ~beside
 
 
-def _scales(figure: Figure, look: Style, summary: Summary, *panels: Axes) -> None:
+def _scales(look: Style, summary: Summary, *panels: Axes) -> None:
     magnitude, phase, *rest = panels
     for axes in panels:
         plain(axes)
         axes.yaxis.set_label_coords(-0.066, 0.5)
-        _frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
+        frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
     panels[-1].set_xlabel("frequency in Hz")
     _limits(magnitude, summary.magnitude_db, _newest_db(summary), room=3.0)
     low_deg, high_deg = _limits(phase, summary.phase_deg, _newest_deg(summary), room=10.0)
@@ -147,15 +172,13 @@ def _scales(figure: Figure, look: Style, summary: Summary, *panels: Axes) -> Non
     if rest:
         rest[0].set_ylim(-0.04, 1.06)
         rest[0].set_yticks([0.0, 0.5, 1.0])
-    if summary.count:
-        _legend(figure, look, summary)
-    else:
+    if not summary.count:
         empty_note(magnitude, look)
         for axes in (magnitude, phase):
             axes.set_yticks([])
 
 
-def _frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
+def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
     """Logarithmic frequency with plain numbers."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullFormatter
 
@@ -186,7 +209,7 @@ def _limits(axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], room
     return low - margin, high + margin
 
 
-def _legend(figure: Figure, look: Style, summary: Summary) -> None:
+def _legend(figure: Figure, look: Style, summary: Summary, fit: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -205,12 +228,16 @@ def _legend(figure: Figure, look: Style, summary: Summary) -> None:
     newest = f"newest, at {at_s:.1f} s" if abs(at_s) >= 1e5 else f"newest, at {at_s:.6g} s"
     if np.isfinite(summary.newest_bound).any():
         newest += f", bound: {100 * PROBABILITY:.1f} % (3σ)"
+    texts.append(newest)
+    if fit:
+        handles.append(Line2D([], [], color=look.ink, linewidth=1.0, dashes=(4, 2)))
+        texts.append("newest fit")
     figure.legend(
         handles,
-        [*texts, newest],
+        texts,
         loc="upper left",
         bbox_to_anchor=(_LEFT, 1 - 0.76 / figure.get_size_inches()[1]),
-        ncols=3,
+        ncols=len(texts),
         borderpad=0.0,
         borderaxespad=0.0,
         handlelength=1.6,

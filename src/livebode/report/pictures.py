@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from livebode.nouns import Responses
+from livebode.nouns import Model, Responses
 from livebode.report.style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ def save_pictures(
     title: str = "",
     schedule_name: str = "",
     names: tuple[str, str] | None = None,
+    fitted: Model | None = None,
     dark: bool = False,
 ) -> list[Path]:
     """Write bode.png and tracking.png into an existing directory and return their paths; see the two figures.
@@ -35,13 +36,14 @@ def save_pictures(
     from livebode.report.tracking import tracking_figure
 
     pictures = {
-        "bode.png": bode_figure(responses, title=title, names=names, dark=dark),
+        "bode.png": bode_figure(responses, title=title, names=names, fitted=fitted, dark=dark),
         "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
     }
-    return [_save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
+    return [save(figure, Path(directory) / name, style(dark)) for name, figure in pictures.items()]
 
 
-def _save(figure: Figure, path: Path, look: Style) -> Path:
+def save(figure: Figure, path: Path, look: Style) -> Path:
+    """Write a figure; the same figure gives the same bytes."""
     with drawing(look), quiet_about_letters():
         figure.savefig(path, format="png", metadata={"Software": None})
     return path

@@ -58,6 +58,15 @@ class TrackingSection(_Section):
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []
+    dtype: Literal["float64", "float32"] = "float64"
+
+
+class MotionSection(_Section):
+    """[motion]: responses freed from the axis's motion; see `livebode.motion.MotionCorrection`."""
+
+    radius_m: Positive
+    chunk_s: Positive = 4.0
+    driven_by: Literal["torque", "excitation"] = "torque"
 
 
 class _ControllerSection(_Section):
@@ -150,6 +159,20 @@ class RecordSection(_Section):
     segment_s: Annotated[float, Field(gt=0, le=86400)] = 300.0
 
 
+class FitSection(_Section):
+    """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
+
+    model: str = "auto"
+    output: Literal["auto", "velocity", "position"] = "auto"
+    side: Literal["motor", "load"] | None = None
+    radius_m: Positive | None = None
+    inertia_ratio: Positive | None = None
+    fixed: dict[str, float] = {}
+    free: list[str] = []
+    band_hz: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    hold: Literal["zero-order", "none"] = "zero-order"
+
+
 class Axis(_Section):
     """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
 
@@ -159,6 +182,8 @@ class Axis(_Section):
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
     record: RecordSection | None = None
+    motion: MotionSection | None = None
+    fit: FitSection | None = None
 
     @classmethod
     def read(cls, path: Path) -> Axis:

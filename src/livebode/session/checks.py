@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.estimation import Settings, Tracker
+from livebode.estimation import Settings
 from livebode.nouns import Block, InputError
+from livebode.session.follower import Follower
 
 # A DFT leaves 1e-30 of a signal's power at a line where there is none.
 _POWERLESS_SHARE = 1e-20
@@ -74,7 +75,7 @@ def check_length(samples: int | None, window: int) -> None:
         )
 
 
-def check_excitation(tracker: Tracker, variance: float) -> None:
+def check_excitation(tracker: Follower, variance: float) -> None:
     """InputError where a line has no excitation, or the excitation does not repeat from window to window.
 
     `variance` is that of the reference over the whole recording.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.estimation import Settings
+from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, Responses
 from livebode.session.tracking import Draw, Outcome, Progress, record
@@ -64,7 +64,7 @@ def demo(
 
     outcome = record(
         SimulatedAxis(axis),
-        demo_settings(),
+        Tracker(demo_settings()),
         directory,
         about={"configuration": {"demo": {"seconds": seconds, "seed": seed}}},
         block_samples=400,

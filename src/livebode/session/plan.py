@@ -4,13 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.estimation import Settings
+from livebode.estimation import Settings, Tracker
 from livebode.nouns import InputError, Lines
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
+from livebode.session.follower import Follower
 from livebode.sources import Log
 
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
+
+
+def make_follower(axis: Axis, log: Log) -> Follower:
+    """A Tracker for this recording, or with [motion] a MotionCorrection; InputError where they do not fit."""
+    settings = make_settings(axis, log)
+    if axis.motion is None:
+        return Tracker(settings)
+    # The simulation, which its model is driven by, takes a while to import.
+    from livebode.motion import MotionCorrection
+
+    chunk_samples = round(axis.motion.chunk_s * log.rate_hz)
+    if chunk_samples < 2 * settings.lines.window:
+        raise InputError(
+            f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
+            f"{settings.lines.window}; take the duration of a stroke"
+        )
+    return MotionCorrection(
+        settings, radius_m=axis.motion.radius_m, chunk_samples=chunk_samples, driven_by=axis.motion.driven_by
+    )
 
 
 def make_settings(axis: Axis, log: Log) -> Settings:
@@ -32,6 +52,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         differenced=tuple(tracking.differenced),
         hann=tracking.hann,
         spikes=tuple(tracking.spikes),
+        dtype=tracking.dtype,
     )
     if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
         check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)

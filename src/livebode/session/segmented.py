@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from livebode.nouns import Block, Channel, Event, InputError, Responses
-from livebode.records import RESPONSES, Run, as_batch, to_json
+from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
 from livebode.records.segments.limits import Limits
@@ -83,7 +83,9 @@ class SegmentedRun:
             interval_s=_INTERVAL_S,
             budget_bytes=kept.budget_bytes,
         )
-        tables = {"responses": RESPONSES} | ({"samples": self._samples} if self._samples else {})
+        tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
+            {"samples": self._samples} if self._samples else {}
+        )
         self._store = Store(path, tables, limits)
         self.partial = path / ".pictures.partial"
 
@@ -140,6 +142,12 @@ class SegmentedRun:
         if len(responses):
             self._store.write("responses", as_batch(responses))
 
+    def write_parameters(self, *parts: Parameters) -> None:
+        """Append what was fitted and what follows."""
+        for parameters in parts:
+            if len(parameters):
+                self._store.write("parameters", parameter_rows(parameters))
+
     def write_event(self, event: Event) -> None:
         """Append an event."""
         self._store.write_event(event)
@@ -156,6 +164,10 @@ class SegmentedRun:
             raise InputError(f"the pictures could not be written to {str(self.path)!r}: {why(error)}") from None
         finally:
             shutil.rmtree(self.partial, ignore_errors=True)
+        last = self._store.last
+        assert last is not None
+        # What was held back at the end was written since the last commit, and belongs to the states as they are now.
+        self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(summary, finished=self._ends)
 
     def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
@@ -194,7 +206,8 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
     # How the record is cut may change on the way; what is recorded may not.
     configuration = dict(summary["configuration"])
     kept = configuration.pop("record", None) or {}
-    return [configuration, summary["found"], kept.get("samples")]
+    found = {key: value for key, value in summary["found"].items() if key != "motion"}  # what the model has learnt
+    return [configuration, found, kept.get("samples")]
 
 
 def _make_way(path: Path) -> None:

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from livebode.nouns import Block, Responses
+from livebode.nouns import Responses
 from livebode.session.checks import ChannelCheck
 
 
@@ -20,11 +20,18 @@ class Tally:
         What looks at the signals.
     started
         `time.perf_counter()` at the beginning.
+
+    Attributes
+    ----------
+    stop
+        Number of the sample behind the last one that was followed.
+    handed_out
+        The `stop` at which what was held back had been handed out.
     """
 
     def __init__(self, check: ChannelCheck, started: float) -> None:
         self.check = check
-        self.responses = self.invalid = self.valid_lines = self.stop = 0
+        self.responses = self.invalid = self.valid_lines = self.stop = self.handed_out = 0
         self.tracked_s = 0.0
         self._started = started
 
@@ -32,15 +39,14 @@ class Tally:
     def run_s(self) -> float:
         return time.perf_counter() - self._started
 
-    def take(self, block: Block, responses: Responses, tracked_s: float) -> None:
-        """A block, what came of it, and the seconds that it took the tracker."""
-        self.stop = block.stop
+    def take(self, responses: Responses, tracked_s: float) -> None:
+        """What came of a step, and the seconds that it took the tracker."""
         self.responses += len(responses)
         self.invalid += int(np.count_nonzero(~responses.valid.all(axis=1)))
         self.valid_lines += int(np.count_nonzero(responses.valid))
         self.tracked_s += tracked_s
 
-    _STATE = ("responses", "invalid", "valid_lines", "stop", "tracked_s")
+    _STATE = ("responses", "invalid", "valid_lines", "stop", "handed_out", "tracked_s")
 
     def snapshot(self) -> bytes:
         """All of it as bytes; see `restore`."""

@@ -6,29 +6,34 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from livebode.estimation import Settings, Tracker, response_unit
+from livebode.estimation import response_unit
+from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.nouns import Block, Channel, Event, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Model, Responses
 from livebode.records import RunDirectory
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.fits import Fits
+from livebode.session.follower import Follower
+from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
-from livebode.session.plan import make_settings
+from livebode.session.plan import make_follower
 from livebode.session.tally import Tally
 from livebode.sources import open_log
 
 if TYPE_CHECKING:
-    from livebode.session.segmented import SegmentedRun
+    from livebode.session.segmented import SegmentedRun, Stateful
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
-Draw = Callable[[Responses, Path, str], None]
+Draw = Callable[[Responses, Path, str, Model | None], None]
 Tell = Callable[[Event], None]
 
 
@@ -47,11 +52,13 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: its directory, its summary as in run.json, and a thinned copy of its responses."""
+    """What a run came to: its directory, its summary as in run.json, a thinned copy of its responses, and the newest
+    fit that holds."""
 
     directory: Path
     summary: dict[str, Any]
     responses: Responses
+    fit: Fit | None = None
 
 
 def run(
@@ -77,8 +84,8 @@ def run(
     progress
         Called after each block with samples done and in all (None where not known).
     draw
-        Called with the thinned responses, the directory before it is put in place, and the scheduling signal's name
-        with its unit, to add pictures.
+        Called with the thinned responses, the directory before it is put in place, the scheduling signal's name
+        with its unit, and the newest fit, to add pictures.
     tell
         Called with what the record in segments itself has to say: that it goes on, pauses or removes what is oldest.
 
@@ -90,18 +97,21 @@ def run(
     """
     started = time.perf_counter()
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
-    settings = make_settings(axis, log)
+    tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
+    loop = tracker.settings.loop
+    fits = None if axis.fit is None else Fits(axis.fit, loop if loop.feedback else None)
     return record(
         log,
-        settings,
+        tracker,
         directory,
         about=about,
         force=force,
         progress=progress,
         draw=draw,
         started=started,
+        fits=fits,
         kept=axis.record,
         tell=tell,
     )
@@ -109,7 +119,7 @@ def run(
 
 def record(
     source: Source,
-    settings: Settings,
+    tracker: Follower,
     directory: Path,
     *,
     about: dict[str, Any],
@@ -118,6 +128,7 @@ def record(
     draw: Draw,
     watch: Watch | None = None,
     started: float | None = None,
+    fits: Fits | None = None,
     kept: RecordSection | None = None,
     again: bool = True,
     tell: Tell = lambda _: None,
@@ -125,94 +136,122 @@ def record(
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses; `started` (perf_counter) is when opening the source began, where
-    that is to count in the speed; `kept` asks for a record in segments, which goes on where it ended, and which `tell`
-    hears of; `again` says whether the source begins with the same samples each time; `delivery` goes to its `blocks`.
+    `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
+    opening the source began, where that is to count in the speed; `fits` are made of every response; `kept` asks for a
+    record in segments, which goes on where it ended, and which `tell` hears of; `again` says whether the source begins
+    with the same samples each time; `delivery` goes to its `blocks`.
     """
-    started = time.perf_counter() if started is None else started
     _keep_freed_memory()
-    tracker, overview = Tracker(settings), Overview()
+    settings, overview = tracker.settings, Overview()
     signals = [name for role in settings.roles if (name := settings.channel(role))]
     wanted = list(dict.fromkeys(signals + ([settings.schedule] if settings.schedule else [])))
     blocks = source.blocks(wanted, **delivery)
-    channels = {channel.name: channel for channel in source.channels}
-    tally = Tally(ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or ""), started)
-    about = _summary(about, settings, response_unit(source.channels, settings))
-
-    def publish(responses: Responses) -> None:
-        overview.add(responses)
-        out.write(responses)
-        if watch is not None:
-            watch(responses)
-
-    def drawn(into: Path) -> None:
-        draw(overview.responses(), into, _schedule_label(source, settings.schedule))
-
+    check = ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or "")
+    tally = Tally(check, time.perf_counter() if started is None else started)
+    parts: dict[str, Stateful] = {"tracker": tracker, "tally": tally}
+    if fits is not None:
+        parts["fits"] = fits
+    begun = _begun(about, tracker, response_unit(source.channels, settings))
     out: RunDirectory | SegmentedRun
     if kept is None:
         out = RunDirectory(directory, force=force)
     else:
         from livebode.session.segmented import SegmentedRun  # needs a POSIX system
 
+        channels = {channel.name: channel for channel in source.channels}
         out = SegmentedRun(
             directory,
             kept,
-            summary=about,
+            summary=begun,
             channels=[channels[name] for name in wanted],
             rate_hz=settings.lines.rate_hz,
-            parts={"tracker": tracker, "tally": tally},
+            parts=parts,
             force=force,
             again=again,
             ends=source.samples is not None,
             tell=tell,
         )
+
+    def publish(responses: Responses) -> None:
+        overview.add(responses)
+        out.write(responses)
+        if fits is not None:
+            fits.take(responses, out)
+        if watch is not None and len(responses):
+            watch(responses)
+
     with out:
         if not isinstance(out, RunDirectory):
             for responses in out.before():
                 overview.add(responses)
+                if fits is not None:
+                    fits.take(responses[0:0], out)  # which tells it the lines
             blocks = out.feed(blocks)
-        _track(source, blocks, tracker, tally, publish, out, progress)
-        _judge(tracker, tally, None if kept is None else out.write_event)
-        summary = about | _done(tracker, tally)
-        out.finish(summary, drawn)
-    return Outcome(directory, summary, overview.responses())
+        _track(source, blocks, tracker, tally, publish, out, progress, None if kept is None else out.write_event)
+        summary = _begun(about, tracker, begun["found"]["unit"]) | _done(tracker, tally)
+        newest = None if fits is None else fits.newest()
+        if fits is not None:
+            summary |= _fitted(fits, newest, overview.responses())
+        label = _schedule_label(source, settings.schedule)
+        out.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
+    return Outcome(directory, summary, overview.responses(), newest)
 
 
 def _track(
     source: Source,
     blocks: Iterator[Block],
-    tracker: Tracker,
+    tracker: Follower,
     tally: Tally,
     publish: Watch,
     out: RunDirectory | SegmentedRun,
     progress: Progress,
+    say: Tell | None,
 ) -> None:
-    """Every block through the tracker into the record."""
-    for block in blocks:
-        tally.check.take(block)
+    """Every block through the tracker into the record; where the signals mean nothing, `say` or InputError says so."""
+    settings, check = tracker.settings, tally.check
+
+    def follow(step: Callable[[], Responses | None]) -> None:
+        """Take one step and publish its responses and events."""
         before = time.perf_counter()
-        responses = tracker.process(block)
-        tally.take(block, responses, time.perf_counter() - before)
-        publish(responses)
+        responses = step()
+        if responses is not None:
+            tally.take(responses, time.perf_counter() - before)
+            publish(responses)
         for event in tracker.drain_events():
             out.write_event(event)
+
+    def rest() -> None:
+        check.finish()
+        check_length(tally.stop, settings.lines.window)
+        if tally.handed_out != tally.stop:
+            follow(tracker.finish)
+            tally.handed_out = tally.stop
+        check_excitation(tracker, check.variance)
+        check_some_valid(tally.responses, tally.valid_lines, tracker.counts, settings.lines.window)
+
+    for block in blocks:
+        check.take(block)
+        tally.stop = block.stop
+        follow(partial(tracker.process, block))
         progress(tracker.counts["samples"], source.samples)
     if not tally.stop:
         raise InputError("the recording holds no samples")
-
-
-def _judge(tracker: Tracker, tally: Tally, say: Tell | None) -> None:
-    """InputError where the responses mean nothing; with `say` an Event, since what was recorded stays."""
-    lines = tracker.settings.lines
     try:
-        tally.check.finish()
-        check_length(tally.stop, lines.window)
-        check_excitation(tracker, tally.check.variance)
-        check_some_valid(tally.responses, tally.valid_lines, tracker.counts, lines.window)
+        rest()
     except InputError as error:
         if say is None:
             raise
-        say(Event("check", tally.stop, tally.stop / lines.rate_hz, str(error)))
+        # What was recorded stays.
+        say(Event("check", tally.stop, tally.stop / settings.lines.rate_hz, str(error)))
+
+
+def _fitted(fits: Fits, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+    """What run.json says of the fits."""
+    summary = {"fit": fits.summary()}
+    if newest is not None and fits.loop is not None:
+        words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+        summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
+    return summary
 
 
 def _keep_freed_memory() -> None:
@@ -226,19 +265,9 @@ def _schedule_label(source: Source, name: str | None) -> str:
     return f"{name} in {unit}" if name and unit else name or ""
 
 
-def _summary(about: dict[str, Any], settings: Settings, unit: str) -> dict[str, Any]:
+def _begun(about: dict[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
     """What run.json says from the beginning."""
-    lines = settings.lines
-    found = {
-        "rate_hz": lines.rate_hz,
-        "window": lines.window,
-        "frequency_hz": lines.frequency_hz.tolist(),
-        "bins": list(lines.bins),
-        "quiet_bins": list(lines.quiet),
-        "hop": settings.step,
-        "quantity": settings.quantity,
-        "unit": unit,
-    }
+    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
     versions = {
         "livebode": version("livebode"),
         "numpy": np.__version__,
@@ -248,7 +277,7 @@ def _summary(about: dict[str, Any], settings: Settings, unit: str) -> dict[str, 
     return about | {"found": about.get("found", {}) | found, "versions": versions}
 
 
-def _done(tracker: Tracker, tally: Tally) -> dict[str, Any]:
+def _done(tracker: Follower, tally: Tally) -> dict[str, Any]:
     """What run.json says at the end."""
     samples, run_s = tracker.counts["samples"], tally.run_s
     recorded_s = samples / tracker.settings.lines.rate_hz

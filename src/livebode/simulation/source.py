@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class DivergenceError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedAxis:
-    """A machine on the bench. Every iteration starts it anew at rest at the motion's start; sample 0 is the first tick.
+    """A machine on the bench. Every iteration starts it anew at the motion's start, at rest or run in (`run_in_s`).
 
     Channels: w and u (N m, as applied), velocity and position of the motor as the drive reads them, the cart's
     position x, and the references of the motor. How the samples are cut into Blocks changes none of them.
@@ -96,6 +97,7 @@ class SimulatedAxis:
         position, speed = (row / axis.mechanics.radius_m for row in axis.motion.cycle(self.rate_hz))
         engine = Engine(engine_settings(axis), float(position[0]) * axis.mechanics.radius_m)
         noise = np.random.default_rng(axis.seed)
+        self._run_in(engine, float(position[0]))
         start = 0
         while self.samples is None or start < self.samples:
             ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
@@ -108,6 +110,19 @@ class SimulatedAxis:
             data = np.vstack([w, output[:3], output[-2], inputs[:2]])
             yield Block(data, CHANNELS, self.rate_hz, start=start), Truth(axis, start, output[3:], condition)
             start += ticks
+
+    def _run_in(self, engine: Engine, position_reference: float) -> None:
+        axis = self.axis
+        # Whole repetitions of the slowest controller, so that sample 0 is one of its ticks, as without.
+        every = axis.drive.position_ticks
+        ticks = every * ceil(axis.run_in_s * self.rate_hz / every)
+        if not ticks:
+            return
+        number = np.arange(-ticks, 0)
+        w = excitation_at(axis.excitation_n_m, number)
+        references = [np.full(ticks, position_reference), np.zeros(ticks)]
+        noise = self._noise(np.random.default_rng([axis.seed, 1]), ticks)
+        self._advanced(engine, np.array([*references, w, noise, *_rows(axis.condition(np.zeros(ticks)))]), -ticks)
 
     def _noise(self, generator: np.random.Generator, ticks: int) -> Floats:
         sigma = self.axis.sensor.noise_rad_per_s

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.motion import two_masses
-from livebode.motion.least_squares import minimise
+from livebode.fitting import two_masses
+from livebode.fitting.least_squares import minimise
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -29,7 +29,8 @@ def fit_windows(value: Complex, weight: Floats, z: Complex, rate_hz: float, star
         transposed = left.swapaxes(-1, -2)
         return np.sum(right**2, axis=-1), (transposed @ right[..., np.newaxis])[..., 0], transposed @ left
 
-    return minimise(normal, start)
+    found = minimise(normal, start)
+    return found.parameters, found.cost
 
 
 def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Floats, Floats]:

@@ -1,0 +1,91 @@
+"""Fits: the median time of one, beside scipy.optimize.least_squares from the same start, with the same model.
+
+python -m bench.fits
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from livebode.fitting import Fitter, Grid, TwoMass, two_masses
+from livebode.nouns import Lines, Responses
+
+TARGET_MS = 0.25
+LINES = Lines.parse("20:120:5", rate_hz=4000, window=800)
+MODEL = TwoMass(radius_m=0.019)
+TRUTH = np.array([0.0028, 6.7, 5.0e5, 130.0, 0.0, 0.0, 0.0])
+ROWS, REPEATS = 400, 15
+SIGMA = 0.005  # of |G|
+
+
+def responses(seed: int = 0) -> Responses:
+    """Two masses whose stiffness wanders by 20 %, with noise at 21 lines."""
+    rng = np.random.default_rng(seed)
+    values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
+    values[:, 2] *= 1 + 0.2 * np.sin(np.linspace(0, 2 * np.pi, ROWS))
+    truth = MODEL.at(values, Grid.of(LINES))
+    sigma = SIGMA * np.abs(truth)
+    value = truth + sigma * (rng.standard_normal(truth.shape) + 1j * rng.standard_normal(truth.shape)) / np.sqrt(2)
+    ones, rows = np.ones(truth.shape), np.arange(ROWS)
+    return Responses(
+        lines=LINES, value=value, sigma=sigma, dof=np.full(ROWS, np.inf), coherence=ones, valid=ones > 0,
+        first=20 * rows, sample=20 * rows + 799, time_s=0.005 * rows, schedule=np.full(ROWS, np.nan),
+    )  # fmt: skip
+
+
+def ours(batch: int) -> Callable[[], float]:
+    """Milliseconds a fit where responses come `batch` at a time: warm, after the first sixteen."""
+    every = responses()
+
+    def run() -> float:
+        fitter = Fitter(MODEL)
+        fitter.process(every[:16])
+        times = []
+        for first in range(16, ROWS, batch):
+            part = every[first : first + batch]
+            start = time.perf_counter()
+            found = fitter.process(part)
+            times.append((time.perf_counter() - start) / len(part))
+            assert found.ok.all()
+        return 1e3 * statistics.median(times)
+
+    return run
+
+
+def scipys() -> float:
+    """Milliseconds a fit of scipy's Levenberg–Marquardt, each from where the last one ended, with our closed form."""
+    every, arm = responses(), 2 * np.log(MODEL.radius_m or 1.0)
+    start = np.log(TRUTH[:4]) + np.array([0.0, arm, arm, arm])
+    weight = np.sqrt(2) / every.sigma
+    times = []
+    for i in range(16, 116):
+
+        def rest(x: np.ndarray, i: int = i) -> np.ndarray:
+            e = weight[i] * (two_masses.sampled(x, LINES.z, LINES.rate_hz) - every.value[i])
+            return np.concatenate([e.real, e.imag])
+
+        begun = time.perf_counter()
+        start = least_squares(rest, start, method="lm").x
+        times.append(time.perf_counter() - begun)
+    return 1e3 * statistics.median(times)
+
+
+def main() -> None:
+    print(
+        "two masses at 21 lines, warm, values with covariance and status; median of a fit, best of interleaved rounds"
+    )
+    ways = {f"livebode, {batch} at a time": ours(batch) for batch in (1, 16, 100)} | {"scipy least_squares": scipys}
+    found = {name: min(way() for _ in range(REPEATS if name[0] == "l" else 3)) for name, way in ways.items()}
+    theirs = found["scipy least_squares"]
+    for name, ms in found.items():
+        verdict = "" if name[0] == "s" else f"target ≤ {TARGET_MS:g} ms: {'reached' if ms <= TARGET_MS else 'SHORT'}"
+        print(f"{name:26}{ms:8.3f} ms{theirs / ms:8.1f} × scipy's speed   {verdict}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""`livebode export`: a run for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from livebode.nouns import InputError
+from livebode.records import Run
+
+_IN_PYTHON = {
+    "xarray": "to_xarray(Run.open(path).responses()); --to netcdf writes a file that xarray opens",
+    "control": "mean(Run.open(path).batches()).to_control()",
+}
+
+
+def export_command(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, netcdf or uff.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File to write; RUN with the format's ending unless said.")
+    ] = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Only the response nearest to this moment.")
+    ] = None,
+    mean: Annotated[bool, typer.Option("--mean", help="Only the mean of the valid responses.")] = False,
+    parameters: Annotated[
+        bool, typer.Option("--parameters", help="The fitted parameters instead of the responses; csv or mat.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write what a run measured in a format that other programs read."""
+    from livebode import export
+
+    _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
+    record = Run.open(run)
+    name = record.path.resolve()
+    path = out or name.with_name(name.name + "-parameters" * parameters + export.ENDINGS[to])
+    if parameters:
+        table = export.ParameterTable(record.path)
+        written = export.save(path, lambda partial: export.TABLES[to](partial, table), force=force)
+        print(f"{path}: {written.rows} parameter values")
+        return
+    if at is not None:
+        parts = iter([export.only(export.at(record.batches(), at))])
+    elif mean:
+        parts = iter([export.only(export.mean(record.batches()))])
+    else:
+        parts = record.batches()
+    written = export.save(path, lambda partial: export.FORMATS[to](partial, parts, record.summary), force=force)
+    left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
+    print(f"{path}: {written.rows} response{'s' * (written.rows != 1)} at {len(record.lines)} lines{left_out}")
+
+
+def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tuple[str, ...]) -> None:
+    if to in _IN_PYTHON:
+        raise InputError(f"{to} is no file; in Python it is {_IN_PYTHON[to]} (docs/export.md)")
+    if to not in formats:
+        what = "parameters" if parameters else "responses"
+        raise InputError(f"--to {to!r} is not a format for {what}; take {', '.join(formats[:-1])} or {formats[-1]}")
+    given = [name for name, said in (("--at", at is not None), ("--mean", mean), ("--parameters", parameters)) if said]
+    if len(given) > 1:
+        raise InputError(f"{given[0]} and {given[1]} do not go together; give one of them")

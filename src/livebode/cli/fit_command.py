@@ -1,0 +1,75 @@
+"""`livebode fit`: a model fitted to a run that was made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.cli.pictures import show_fit
+from livebode.nouns import InputError
+from livebode.records import to_json
+from livebode.session import Axis
+
+
+def fit_command(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
+    model: Annotated[
+        str, typer.Option(help="rigid, two-mass, three-mass, two-mass-gain; auto: two-mass for a torque in N m.")
+    ] = "auto",
+    output: Annotated[
+        str, typer.Option(help="What y is: velocity or position; auto: by its unit, else by trial.")
+    ] = "auto",
+    side: Annotated[str | None, typer.Option(help="motor or load, where y is measured; motor unless said.")] = None,
+    radius: Annotated[
+        float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves along.")
+    ] = None,
+    ratio: Annotated[float | None, typer.Option(help="Load's inertia over the motor's, where it is known.")] = None,
+    fix: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter.")] = None,
+    free: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Fit one that is held: delay, B, BL.")] = None,
+    band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Use lines from LOW to HIGH Hz.")] = None,
+    hold: Annotated[str, typer.Option(help="zero-order: the input stands between samples; or none.")] = "zero-order",
+    as_json: Json = False,
+) -> None:
+    """Fit a model to the response of a run, and print its parameters with bounds."""
+    from livebode.session.fits import fit_run, plain_fit
+
+    given: dict[str, Any] = {
+        "model": model,
+        "output": output,
+        "side": side,
+        "radius_m": radius,
+        "inertia_ratio": ratio,
+        "fixed": dict(_pair(text) for text in fix or []),
+        "free": free or [],
+        "band_hz": _band(band),
+        "hold": hold,
+    }
+    data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
+    section = Axis.of(data | {"fit": {k: v for k, v in given.items() if v is not None}}, "the options").fit
+    assert section is not None
+    found, words = fit_run(directory, section)
+    if as_json:
+        print(to_json({"fitted_to": words} | plain_fit(found)))
+    else:
+        show_fit(found, words)
+
+
+def _pair(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise InputError(f"--fix {text!r} is not NAME=VALUE with a number; write --fix Js=0.0028") from None
+
+
+def _band(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--band {text!r} is not LOW:HIGH in Hz; write --band 30:120") from None
+    return [low, high]

@@ -1,0 +1,113 @@
+"""`livebode margins`: the margins of the loop in a run that was made, and what would widen them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from livebode.cli.options import Json
+from livebode.records import to_json
+from livebode.session import Axis
+
+if TYPE_CHECKING:
+    from livebode.margins import Margins, Proposal, Tuning
+    from livebode.session.loop_report import LoopReport
+
+_WORDS = {
+    "gain_margin": "gain may rise by",
+    "gain_reduction": "gain may fall by",
+    "phase_margin": "phase margin",
+    "delay_margin": "delay margin",
+    "peak_sensitivity": "peak sensitivity Ms",
+    "bandwidth": "bandwidth",
+}
+
+
+def margins_command(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
+    axis: Annotated[
+        Path | None, typer.Option(metavar="AXIS.toml", help="Takes [loop] and [fit] from there instead of the run.")
+    ] = None,
+    model: Annotated[str | None, typer.Option(help="rigid, two-mass, …; that of the run's [fit] unless said.")] = None,
+    radius: Annotated[float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves.")] = None,
+    ms: Annotated[float, typer.Option(help="The largest peak sensitivity that is wished for.")] = 2.0,
+    as_json: Json = False,
+) -> None:
+    """Gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; a filter where they are too small.
+
+    Leaves margins.png in the run's directory.
+    """
+    from livebode.report import save_loop_picture
+    from livebode.session.axis import FitSection
+    from livebode.session.loop_report import loop_of_run
+
+    given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
+    section = FitSection.model_validate(given) if given else None
+    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), ms)
+    picture = save_loop_picture(found, directory, title=directory.name)
+    if as_json:
+        print(to_json(found.plain()))
+        return
+    show_loop(found)
+    print(f"\n{picture}")
+
+
+def show_loop(found: LoopReport) -> None:
+    """Margins with bounds and marks, and the proposal."""
+    low, high = found.fit.band_hz
+    print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
+    if not found.margins.ok[0]:
+        print(f"  no margins: {found.margins.status[0]}; check the loop's description and the fit")
+    else:
+        _show_margins(found.margins)
+    size, bound, at_hz = found.at_lines
+    print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
+    if len(found.places) > 1:
+        print(f"worst of {len(found.places)} places: {_in_short(found.tuning.before)}")
+    _show_tuning(found.tuning)
+
+
+def _show_margins(margins: Margins) -> None:
+    bound = margins.bound()[0]
+    for i, (name, unit) in enumerate(zip(margins.names, margins.units)):
+        value, f = margins.value[0, i], margins.frequency_hz[0, i]
+        if np.isnan(f):
+            print(f"  {_WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
+            continue
+        mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
+        print(f"  {_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}")
+    print("  ± holds 95 % of what noise does to the fit; where EXTRAPOLATED, no line checks the model")
+
+
+def _show_tuning(found: Tuning) -> None:
+    print(f"{found.verdict}: {found.sentence}")
+    for proposal in found.proposals:
+        _show_proposal(proposal)
+
+
+def _show_proposal(proposal: Proposal) -> None:
+    about = proposal.about
+    if proposal.kind == "notch":
+        words = f"notch at {about['frequency_hz']:.4g} Hz, {about['depth_db']:g} dB deep, "
+        words += f"half of that from {about['from_hz']:.4g} to {about['to_hz']:.4g} Hz"
+    else:
+        words = f"low-pass of second order at {about['frequency_hz']:.4g} Hz"
+    print(f"  {words}; behind the controller, {proposal.biquad.rate_hz:g} times a second:")
+    b, a = proposal.biquad.b, proposal.biquad.a
+    print("    b = " + ", ".join(f"{x:.12g}" for x in b) + "   a = 1, " + ", ".join(f"{x:.12g}" for x in a))
+    print(f"    would give: {_in_short(proposal.after)}")
+
+
+def _in_short(margins: Margins) -> str:
+    from livebode.margins import worst
+
+    least = worst(margins)
+    if not least:
+        return "no margins"
+    return (
+        f"gain {least['gain_margin']:.3g} dB, phase {least['phase_margin']:.3g}°, delay "
+        f"{least['delay_margin']:.3g} ms, Ms {least['peak_sensitivity']:.3g}, bandwidth {least['bandwidth']:.3g} Hz"
+    )

@@ -1,0 +1,30 @@
+"""A run for other programs: CSV, MATLAB, NetCDF, UFF 58, xarray and python-control."""
+
+from livebode.export.delimited import write_csv
+from livebode.export.formats import ENDINGS, FORMATS, TABLES, save
+from livebode.export.labelled import to_xarray, write_netcdf
+from livebode.export.matlab import write_mat
+from livebode.export.mean import mean
+from livebode.export.parameters import ParameterTable, write_parameters_csv, write_parameters_mat
+from livebode.export.selection import at, only
+from livebode.export.universal import write_uff
+from livebode.export.written import Written
+
+__all__ = [
+    "ENDINGS",
+    "FORMATS",
+    "TABLES",
+    "ParameterTable",
+    "Written",
+    "at",
+    "mean",
+    "only",
+    "save",
+    "to_xarray",
+    "write_csv",
+    "write_mat",
+    "write_netcdf",
+    "write_parameters_csv",
+    "write_parameters_mat",
+    "write_uff",
+]

@@ -1,0 +1,77 @@
+"""The formats by name, and a file that appears in its place when it is whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pyarrow as pa
+
+from livebode.export.delimited import write_csv
+from livebode.export.labelled import write_netcdf
+from livebode.export.matlab import write_mat
+from livebode.export.parameters import write_parameters_csv, write_parameters_mat
+from livebode.export.universal import write_uff
+from livebode.export.written import Written
+from livebode.nouns import InputError, Responses
+
+FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], Written]] = {
+    "csv": write_csv,
+    "mat": write_mat,
+    "netcdf": write_netcdf,
+    "uff": write_uff,
+}
+"""What writes responses, by the name of the format."""
+
+TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], Written]] = {
+    "csv": write_parameters_csv,
+    "mat": write_parameters_mat,
+}
+"""What writes parameters, by the name of the format."""
+
+ENDINGS: Mapping[str, str] = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}
+
+_DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
+
+
+def save(path: Path, write: Callable[[Path], Written], *, force: bool = False) -> Written:
+    """Let `write` make a file beside its place, and move it there when it is whole.
+
+    Parameters
+    ----------
+    path
+        Where the file is to stand; directories above it are made.
+    write
+        Is called with the path to write to, whose name is that of `path`.
+    force
+        Whether to replace a file that stands there.
+
+    Raises
+    ------
+    InputError
+        If something stands there that is not to be replaced or is no file, or the disk refuses. Nothing is left of
+        what was written then, and what stood there still stands.
+    """
+    _check_free(path, force)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{path.name[:100]}.partial-", dir=path.parent) as folder:
+            partial = Path(folder) / path.name
+            written = write(partial)
+            _check_free(path, force)
+            partial.replace(path)
+    except OSError as error:
+        why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
+        raise InputError(f"{str(path)!r} could not be written: {why}; nothing was left there") from None
+    return written
+
+
+def _check_free(path: Path, force: bool) -> None:
+    if path.is_dir():
+        raise InputError(f"{str(path)!r} is a directory; name a file with --out")
+    if not force and (path.exists() or path.is_symlink()):
+        raise InputError(f"{str(path)!r} exists already; take another --out, or --force to replace it")

@@ -1,0 +1,98 @@
+"""parameters.parquet: what models fitted to the responses say, one row for each moment and parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.export.delimited import begin
+from livebode.export.matlab import VARIABLE
+from livebode.export.written import VALUES_MAX, Written
+from livebode.nouns import InputError
+
+COLUMNS = ("time_s", "schedule", "name", "value", "sigma", "unit", "model", "status")
+_NUMBERS = ("time_s", "schedule", "value", "sigma")
+_ROWS = 1 << 16
+
+
+@dataclass(frozen=True)
+class ParameterTable:
+    """The table of parameters of a run's directory, in parts of bounded size. Iterate over it as often as needed.
+
+    Raises
+    ------
+    InputError
+        If the run has none, or the table cannot be read or lacks a column.
+    """
+
+    run: Path
+
+    def __iter__(self) -> Iterator[pa.RecordBatch]:
+        name = self.run / "parameters.parquet"
+        if not name.is_file():
+            raise InputError(
+                f"the run {str(self.run)!r} has no parameters.parquet: no model was fitted to its responses"
+            )
+        try:
+            with pq.ParquetFile(name) as file:
+                missing = [column for column in COLUMNS if column not in file.schema_arrow.names]
+                if missing:
+                    raise InputError(f"{str(name)!r} has no column {missing[0]!r}; it is not the file that a run wrote")
+                schema = pa.schema([(c, pa.float64() if c in _NUMBERS else pa.string()) for c in COLUMNS])
+                for batch in file.iter_batches(_ROWS, columns=list(COLUMNS)):
+                    yield batch.select(list(COLUMNS)).cast(schema)
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"{str(name)!r} cannot be read: {error}") from None
+
+
+def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
+    """Write parameters in long form, part by part, under the names of `COLUMNS`; units stand in their own column.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    rows, writer = 0, None
+    with path.open("wb") as file:
+        for part in parts:
+            writer = writer or begin(file, list(COLUMNS), part.schema)
+            writer.write_batch(part)
+            rows += part.num_rows
+        if writer is None:
+            raise InputError("the run has no parameters to export")
+        writer.close()
+    return Written(rows)
+
+
+def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
+    """Write parameters as a MATLAB struct `livebode` of columns, as `struct2table` takes it; text is in cells.
+
+    Raises
+    ------
+    InputError
+        If there are none or too many (`VALUES_MAX`).
+    """
+    from scipy.io import savemat
+
+    kept: list[pa.RecordBatch] = []
+    for part in parts:
+        kept.append(part)
+        if sum(p.num_rows for p in kept) > VALUES_MAX:
+            raise InputError(
+                f"the run has more than {VALUES_MAX} parameters, too many for mat; csv takes them in parts"
+            )
+    table = pa.Table.from_batches(kept) if kept else None
+    if table is None or not table.num_rows:
+        raise InputError("the run has no parameters to export")
+    numbers = {name: table[name].to_numpy()[:, np.newaxis] for name in _NUMBERS}
+    texts = {
+        name: np.array(table[name].to_pylist(), dtype=object)[:, np.newaxis] for name in set(COLUMNS) - set(_NUMBERS)
+    }
+    savemat(path, {VARIABLE: {name: (numbers | texts)[name] for name in COLUMNS}}, appendmat=False, do_compression=True)
+    return Written(table.num_rows)

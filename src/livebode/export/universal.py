@@ -1,0 +1,127 @@
+"""Universal File Format, dataset 58: one frequency response function for each response."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.export.written import Written
+from livebode.nouns import InputError, Response, Responses
+
+_LABEL, _ID = 20, 80  # letters that the format has for a unit and for a line of text
+_LINES_MIN = 2
+_UNKNOWN, _TIME, _FREQUENCY = 0, 17, 18  # specific data types
+_FRF, _SCALAR = 4, 0
+
+
+def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
+    """Write one ASCII dataset 58 for each response, in order (extra `uff`).
+
+    Function type 4 (frequency response function), complex in double precision (12 digits), abscissa in Hz, response
+    and reference node 1, scalar. The ordinate's unit is its label, cut at 20 letters; ID line 1 is the quantity
+    with its channels, ID line 2 the quantity's unit in full, ID line 4 the moment, schedule and extent; the moment
+    is the z-axis value as well.
+
+    Lines that are not valid are left out, since the format knows no NaN. The spacing is even where the valid lines
+    are evenly spaced and the format's six digits hold start and step exactly, else uneven, with each frequency to
+    six digits. Responses with fewer than two valid lines are left out. Sigma and coherence have no place in a
+    frequency response function.
+
+    Raises
+    ------
+    InputError
+        If pyuff is not installed, or no response has two valid lines.
+    """
+    try:
+        import pyuff
+    except ImportError:
+        raise InputError("pyuff is not installed; pip install 'livebode[uff]'") from None
+    functions = left_out = 0
+    with path.open("wb") as file, TemporaryDirectory(prefix=f"{path.name}-", dir=path.parent) as folder:
+        # pyuff reads a file anew after each set that it adds to it; sets may simply follow each other.
+        scratch = os.path.join(folder, "set")
+        for response in (response for part in parts for response in part):
+            if np.count_nonzero(response.valid) < _LINES_MIN:
+                left_out += 1
+                continue
+            functions += 1
+            try:
+                pyuff.UFF(scratch).write_sets(_dataset(response, functions, about or {}), mode="overwrite")
+            except Exception as error:
+                raise _cause(error) from None
+            file.write(Path(scratch).read_bytes())
+    if not functions:
+        raise InputError(
+            f"no response has {_LINES_MIN} valid lines, which UFF 58 needs; csv and mat take a response with fewer"
+        )
+    return Written(functions, left_out)
+
+
+def _cause(error: BaseException) -> BaseException:
+    """What went wrong first: pyuff turns a full disk and even the end of the program into an error of its own."""
+    while error.__context__ is not None:
+        error = error.__context__
+    return error
+
+
+def _dataset(response: Response, number: int, about: Mapping[str, Any]) -> dict[str, Any]:
+    valid = response.valid
+    frequency_hz = response.lines.frequency_hz[valid]
+    return {
+        "type": 58,
+        "binary": 0,
+        "id1": _text(f"{response.quantity} {_channels(about)}".strip(), _ID),
+        "id2": _text(response.unit, _ID),
+        "id4": _text(_moment(response), _ID),
+        "func_type": _FRF,
+        "func_id": number,
+        "rsp_node": 1,
+        "rsp_dir": _SCALAR,
+        "ref_node": 1,
+        "ref_dir": _SCALAR,
+        "abscissa_spacing": int(_even(frequency_hz)),
+        "abscissa_spec_data_type": _FREQUENCY,
+        "abscissa_axis_lab": "Frequency",
+        "abscissa_axis_units_lab": "Hz",
+        "ordinate_spec_data_type": _UNKNOWN,
+        "ordinate_axis_lab": _text(response.quantity, _LABEL),
+        "ordinate_axis_units_lab": _text(response.unit, _LABEL),
+        "orddenom_spec_data_type": _UNKNOWN,
+        "z_axis_spec_data_type": _TIME,
+        "z_axis_axis_lab": "Time",
+        "z_axis_axis_units_lab": "s",
+        "z_axis_value": response.time_s,
+        "x": frequency_hz,
+        "data": response.value[valid],
+    }
+
+
+def _even(frequency_hz: NDArray[np.float64]) -> bool:
+    start, step = (float(f"{x:.5e}") for x in (frequency_hz[0], frequency_hz[1] - frequency_hz[0]))
+    return np.allclose(start + step * np.arange(len(frequency_hz)), frequency_hz, rtol=1e-12, atol=0)
+
+
+def _channels(about: Mapping[str, Any]) -> str:
+    signals = about.get("configuration", {}).get("signals", {})
+    return (
+        f"from {signals.get('input') or signals.get('excitation')} to {signals['output']}"
+        if "output" in signals
+        else ""
+    )
+
+
+def _moment(response: Response) -> str:
+    schedule = f" schedule {response.schedule:.6g}" if np.isfinite(response.schedule) else ""
+    return f"{response.time_s:.9g} s{schedule} samples {response.first} to {response.sample}"
+
+
+def _text(text: str, length: int) -> str:
+    """What a line of the format can hold: ASCII, no line breaks, not blank."""
+    plain = text.replace("µ", "u").replace("μ", "u").replace("°", "deg").encode("ascii", "replace").decode()
+    return "".join(c if c.isprintable() else "?" for c in plain).strip()[:length] or "NONE"

@@ -1,0 +1,32 @@
+"""From responses to what the machine is: physical parameters and rational models, with covariance."""
+
+from livebode.fitting.chains import Rigid, TwoMass
+from livebode.fitting.fitter import Fitter
+from livebode.fitting.mean import mean_response
+from livebode.fitting.models import MODELS, model_named
+from livebode.fitting.once import Fit, fit, fit_of
+from livebode.fitting.physical import Grid, Parameter, PhysicalModel
+from livebode.fitting.rational import fit_rational
+from livebode.fitting.rational_model import Rational, rational_of
+from livebode.fitting.three_mass import ThreeMass
+from livebode.fitting.unknown_gain import TwoMassGain
+
+__all__ = [
+    "MODELS",
+    "Fit",
+    "Fitter",
+    "Grid",
+    "Parameter",
+    "PhysicalModel",
+    "Rational",
+    "Rigid",
+    "ThreeMass",
+    "TwoMass",
+    "TwoMassGain",
+    "fit",
+    "fit_of",
+    "fit_rational",
+    "mean_response",
+    "model_named",
+    "rational_of",
+]

@@ -1,0 +1,203 @@
+"""Masses in a row, the motor first: what they share, one, and two."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.modal import chain_of, scan
+from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay, free_friction
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_INERTIA = (1e-9, 1e7)
+_MASS = (1e-6, 1e9)
+_STIFFNESS = (1e-6, 1e15)
+_DAMPING = (1e-12, 1e12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain(PhysicalModel):
+    """What the models of masses in a row share.
+
+    Parameters
+    ----------
+    output
+        "velocity" or "position".
+    side
+        "motor" (where the torque acts) or "load" (the last mass).
+    radius_m
+        Of the pulley, for a load that moves along: it then is a mass in kg, stiffness in N/m, damping in N s/m, and the
+        load's output in m/s or m. None for one that turns: kg m², N m/rad, N m s/rad, rad/s or rad.
+    """
+
+    output: Literal["velocity", "position"] = "velocity"
+    side: Literal["motor", "load"] = "motor"
+    radius_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.output not in ("velocity", "position"):
+            raise InputError(f"output={self.output!r} is not known; choose 'velocity' or 'position'")
+        if self.side not in ("motor", "load"):
+            raise InputError(f"side={self.side!r} is not known; choose 'motor' or 'load'")
+        if self.radius_m is not None and not (np.isfinite(self.radius_m) and self.radius_m > 0):
+            raise InputError(f"radius_m={self.radius_m} is not a positive number of metres per radian")
+
+    @property
+    def arm(self) -> float:
+        """r², from belt to shaft; 1 for a load that turns."""
+        return 1.0 if self.radius_m is None else self.radius_m**2
+
+    @property
+    def integrators(self) -> int:
+        return 1 if self.output == "velocity" else 2
+
+    @property
+    def lever(self) -> float:
+        """Of the output: metres per radian for a load that moves along."""
+        return self.radius_m if self.radius_m is not None and self.side == "load" else 1.0
+
+    def _load(self, name: str) -> Parameter:
+        if self.radius_m is None:
+            return Parameter(f"J{name}", "kg m²", 1e-2, *_INERTIA)
+        return Parameter(f"m{name}", "kg", 10.0, *_MASS)
+
+    def _spring(self, name: str) -> Parameter:
+        unit = "N m/rad" if self.radius_m is None else "N/m"
+        return Parameter(name, unit, 1e4, *_STIFFNESS)
+
+    def _damper(self, name: str) -> Parameter:
+        unit = "N m s/rad" if self.radius_m is None else "N s/m"
+        return Parameter(name, unit, 10.0, *_DAMPING)
+
+    def _motor(self) -> Parameter:
+        return Parameter("Js", "kg m²", 1e-2, *_INERTIA)
+
+    def drag(self, values: Floats, grid: Grid) -> Floats:
+        """Frictions that stop the motor's inertia in as long as ten of the lowest line's radians take."""
+        dragged = np.array(values)
+        for name in self.frictions:
+            arm = self.arm if name == "BL" else 1.0
+            dragged[..., self.names.index(name)] = values[..., 0] * (2 * np.pi * grid.frequency_hz.min() / 10) / arm
+        return dragged
+
+    def _whole(self, found: Floats, grid: Grid) -> Floats:
+        """Found values (..., some) with frictions and no delay behind them."""
+        rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
+        return self.drag(np.concatenate([found, rest], axis=-1), grid)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rigid(Chain):
+    """One inertia, J, with viscous friction B (held at zero unless freed) and a delay.
+
+    >>> Rigid().names
+    ('J', 'B', 'delay')
+    """
+
+    name = "rigid"
+    frictions = ("B",)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        inertia = Parameter("J", "kg m²", 1e-2, *_INERTIA)
+        return (inertia, free_friction("B", "N m s/rad"), delay())
+
+    def transfer(self, inertia: Any, friction: Any) -> tuple[list[Any], list[Any]]:
+        return [self.lever], [inertia, friction] + [0.0] * (self.integrators - 1)
+
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+        weights = scan(value, weight, grid, modes=0, integrators=self.integrators)[0]
+        return self._whole(self.lever / weights[..., :1], grid)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoMass(Chain):
+    """Motor, spring and load: Nevaranta 2016, (11), (12), whose motor side is (14).
+
+    Js, load (mL or JL), Keff and bs are fitted; B (viscous friction at the motor), BL (at the load) and delay are held
+    at zero unless freed. With a known ratio of the load's inertia to the motor's, the load is not fitted.
+
+    Parameters
+    ----------
+    inertia_ratio
+        Load's inertia at the shaft over Js, where it is known.
+
+    >>> TwoMass(radius_m=0.019).names
+    ('Js', 'mL', 'Keff', 'bs', 'B', 'BL', 'delay')
+    >>> TwoMass(inertia_ratio=2.0).derived_names[-1]
+    'inertia_ratio'
+    """
+
+    inertia_ratio: float | None = None
+    name = "two-mass"
+    frictions = ("B", "BL")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.inertia_ratio is not None and not (np.isfinite(self.inertia_ratio) and self.inertia_ratio > 0):
+            raise InputError(f"inertia_ratio={self.inertia_ratio} is not a positive number")
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        load = () if self.inertia_ratio is not None else (self._load("L"),)
+        frictions = free_friction("B", "N m s/rad"), free_friction("BL", self._damper("bs").unit)
+        return (self._motor(), *load, self._spring("Keff"), self._damper("bs"), *frictions, delay())
+
+    def transfer(self, *parameters: Any) -> tuple[list[Any], list[Any]]:
+        js, load, k, d, b, bl = self._at_the_shaft(*parameters)
+        rest = [0.0] * (self.integrators - 1)
+        if not (np.any(b) or np.any(bl)):
+            denominator = [js * load, (js + load) * d, (js + load) * k, 0.0, *rest]
+        else:
+            denominator = [
+                js * load,
+                js * (d + bl) + load * (d + b),
+                (js + load) * k + b * bl + d * (b + bl),
+                k * (b + bl),
+                *rest,
+            ]
+        if self.side == "load":
+            return [self.lever * d, self.lever * k], denominator
+        return [load, d + bl, k], denominator
+
+    @property
+    def derived_names(self) -> tuple[str, ...]:
+        return (*super().derived_names, "inertia_ratio")
+
+    @property
+    def derived_units(self) -> tuple[str, ...]:
+        return (*super().derived_units, "")
+
+    def derived(self, values: Floats) -> Floats:
+        js, load, *_ = self._at_the_shaft(*np.moveaxis(values[..., :-1], -1, 0))
+        return np.concatenate([super().derived(values), (load / js)[..., np.newaxis]], axis=-1)
+
+    def _pairs(self) -> list[str]:
+        return ["resonance", "antiresonance"] if self.side == "motor" else ["resonance"]
+
+    def _at_the_shaft(self, *p: Any) -> list[Any]:
+        js, *others, friction, load_friction = p
+        if self.inertia_ratio is not None:
+            others = [js * self.inertia_ratio / self.arm, *others]
+        return [js, *(x * self.arm for x in others), friction, load_friction * self.arm]
+
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+        ratio = self.inertia_ratio
+        load_side = self.side == "load"
+        weights, omega = scan(
+            value / self.lever, weight * self.lever, grid, modes=1, integrators=self.integrators,
+            ratio=-1.0 if load_side else ratio,
+        )  # fmt: skip
+        if load_side:
+            weights = weights[..., :1] * np.array([1.0, 1.0 if ratio is None else ratio])
+        inertia, spring, damper = chain_of(weights, omega)
+        found = [inertia[..., 0], inertia[..., 1] / self.arm, spring[..., 0] / self.arm, damper[..., 0] / self.arm]
+        if ratio is not None:
+            del found[1]
+        return self._whole(np.stack(found, axis=-1), grid)

@@ -1,0 +1,240 @@
+"""Fitter: responses in, parameters with bounds out, at the pace of the responses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.models import model_named
+from livebode.fitting.physical import Grid, Hold, PhysicalModel
+from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, Fitted, fit_rows
+from livebode.fitting.weighing import epsilon_for, squares
+from livebode.nouns import Event, InputError, Lines, Parameters, Responses
+from livebode.nouns.parameters import OK
+
+Floats = NDArray[np.float64]
+
+_GROUP = 16  # rows that share a start and an ε, however they arrive
+_MEMORY = 64  # rows that ε is taken from
+_KNOWN = 4  # rows that ε is taken from at least
+
+
+class Fitter:
+    """Fits a model to every Response as it comes, from where the last fits ended.
+
+    Rows count in groups of sixteen: a row starts from the last good fit of the groups before its own, and takes ε from
+    their newest 64 good rows, so that it stands still from row to row; only the rows of the first group find their own.
+    However the same responses are cut into batches, the results are the same (to rounding). A row whose fit fails from
+    there is scanned anew (docs/fits.md).
+
+    Delay: none beyond that of the Responses.
+
+    Bias: a model that is not the machine's is wrong by more than noise, in the same way in neighbouring rows; ε covers
+    its size, but no averaging takes it away. Responses of a moving axis carry the motion (see `MotionCorrection`).
+
+    Parameters
+    ----------
+    model
+        A PhysicalModel, or the name of one ("two-mass") with `options`.
+    fixed, free
+        Parameters held at a value; names of those that the model holds at first (delay, friction) and that are to be
+        fitted.
+    band_hz
+        Lowest and highest frequency of the lines that are used; all by default.
+    hold
+        "zero-order": the input stands between samples, as a drive's does; "none": the continuous response.
+
+    Raises
+    ------
+    InputError
+        If model, parameter names or bounds cannot be, or the band has too few lines.
+
+    Examples
+    --------
+    >>> from livebode.fitting import TwoMass
+    >>> fitter = Fitter(TwoMass(radius_m=0.019))
+    >>> fitter.names[:4]
+    ('Js', 'mL', 'Keff', 'bs')
+    """
+
+    def __init__(
+        self,
+        model: PhysicalModel | str,
+        *,
+        fixed: Mapping[str, float] | None = None,
+        free: Sequence[str] = (),
+        band_hz: tuple[float, float] | None = None,
+        hold: Hold = "zero-order",
+        **options: object,
+    ) -> None:
+        self.model = model_named(model, **options) if isinstance(model, str) else model
+        self._fixed, self._free = dict(fixed or {}), tuple(free)
+        self._band, self._hold = band_hz, hold
+        Problem(self.model, Grid(np.ones(1), 1.0, hold), self._fixed, self._free)  # refused before anything starts
+        self._lines: Lines | None = None
+        self._events: list[Event] = []
+        self._word = NO_RESPONSE
+        self._seen = 0
+        self._start: Floats | None = None
+        self._next: Floats | None = None
+        self._epsilon: float | None = None
+        self._rows: list[tuple[Floats, Floats, Floats]] = []
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the fitted parameters, those that are held included."""
+        return self.model.names
+
+    @property
+    def derived_names(self) -> tuple[str, ...]:
+        """Of `derived`."""
+        return self.model.derived_names
+
+    def process(self, responses: Responses) -> Parameters:
+        """Parameters of each Response, in order.
+
+        Raises
+        ------
+        InputError
+            If the Responses are not of a plant, or on other lines than those before.
+        """
+        if responses.quantity != "plant":
+            raise InputError(f"a model is fitted to the plant, and these responses are of {responses.quantity!r}")
+        problem, use = self._prepare(responses.lines)
+        parts = []
+        first = 0
+        while first < len(responses):
+            last = min(len(responses), first + _GROUP - self._seen % _GROUP)
+            parts.append(self._group(problem, responses[first:last], use))
+            first = last
+        if not parts:
+            parts = [self._parameters(responses, fit_rows(problem, *measured_of(responses, use)))]
+        return Parameters.join(parts)
+
+    def derived(self, parameters: Parameters) -> Parameters:
+        """What follows from fitted parameters: resonances, damping ratios, quality factors, ratios; with bounds."""
+        return parameters.derived(self.model.derived_names, self.model.derived_units, self.model.derived)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Parameters that are not fitted, and their values."""
+        return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
+
+    @property
+    def grid(self) -> Grid:
+        """The lines of the band; InputError before the first responses, which bring them."""
+        if self._lines is None:
+            raise InputError("the fitter has seen no responses, so that its lines are not known; process some first")
+        return self._prepared[0].grid
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call: where fits begin to fail ("fit-failed") and hold again ("fit-resumed")."""
+        events, self._events = self._events, []
+        return events
+
+    def snapshot(self) -> bytes:
+        """Everything that the next row's result depends on; see `restore`."""
+        state = {
+            "owner": self._identity(), "seen": self._seen, "word": self._word, "epsilon": self._epsilon,
+            "start": None if self._start is None else self._start.tolist(),
+            "next": None if self._next is None else self._next.tolist(),
+            "rows": [[part.tolist() for part in row] for row in self._rows],
+        }  # fmt: skip
+        return json.dumps(state).encode()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot of a Fitter with the same settings.
+
+        Raises
+        ------
+        InputError
+            If the snapshot is damaged or belongs to other settings; the Fitter is then as it was.
+        """
+        try:
+            state = json.loads(snapshot)
+            owner, seen = state["owner"], int(state["seen"])
+            rows = [(np.array(a), np.array(b), np.array(c)) for a, b, c in state["rows"]]
+            start, after = (None if state[k] is None else np.array(state[k], dtype=float) for k in ("start", "next"))
+            word, epsilon = str(state["word"]), state["epsilon"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"the snapshot of {len(snapshot)} bytes is damaged ({error}); start afresh") from None
+        if owner != self._identity():
+            raise InputError("the snapshot belongs to a fitter with other settings; restore it into one with the same")
+        self._seen, self._rows, self._start, self._next = seen, rows, start, after
+        self._word, self._epsilon = word, epsilon
+
+    def _identity(self) -> str:
+        parts = (self.model, sorted(self._fixed.items()), self._free, self._band, self._hold)
+        return f"{type(self.model).__qualname__} {parts!r}"
+
+    def _prepare(self, lines: Lines) -> tuple[Problem, NDArray[np.bool_]]:
+        if self._lines is None:
+            grid = Grid.of(lines, self._hold)
+            low, high = self._band or (0.0, np.inf)
+            use = (grid.frequency_hz >= low) & (grid.frequency_hz <= high)
+            problem = Problem(self.model, grid._replace(frequency_hz=grid.frequency_hz[use]), self._fixed, self._free)
+            if 2 * np.count_nonzero(use) <= problem.size:
+                band = f"the band {low:g} … {high:g} Hz has" if self._band else "there are"
+                raise InputError(
+                    f"{band} {np.count_nonzero(use)} lines, too few for {problem.size} free parameters of "
+                    f"{self.model.name!r}; take more lines, or hold parameters"
+                )
+            self._lines, self._prepared = lines, (problem, use)
+        elif lines != self._lines:
+            raise InputError("these responses are on other lines than those before; take a new Fitter")
+        return self._prepared
+
+    def _group(self, problem: Problem, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
+        """Rows of one group, or a part of it."""
+        measured, noise_dof = measured_of(responses, use)
+        epsilon = None if self._epsilon is None else np.full(len(responses), self._epsilon)
+        found = fit_rows(problem, measured, noise_dof, self._start, epsilon)
+        good = np.flatnonzero(found.status == OK)
+        near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
+        parts = squares(measured, found.response)
+        self._rows += [(parts[0][i], parts[1][i], parts[2][i]) for i in good]
+        if near.size:
+            self._next = found.ended[near[-1]]
+        self._seen += len(responses)
+        if self._seen % _GROUP == 0:
+            self._finish_group(problem)
+        parameters = self._parameters(responses, found)
+        self._notice(parameters)
+        return parameters
+
+    def _finish_group(self, problem: Problem) -> None:
+        self._rows = self._rows[-_MEMORY:]
+        self._start = self._next
+        if len(self._rows) >= _KNOWN:
+            rest, noise, size = (np.concatenate(part)[np.newaxis] for part in zip(*self._rows))
+            dof = 2.0 * np.count_nonzero(size) - problem.size * len(self._rows)
+            self._epsilon = float(epsilon_for(rest, noise, size, np.array([dof]))[0])
+
+    def _parameters(self, responses: Responses, found: Fitted) -> Parameters:
+        return Parameters(
+            model=self.model.name, names=self.model.names, units=self.model.units, value=found.values,
+            covariance=found.covariance, status=found.status, epsilon=found.epsilon, chi2=found.chi2, dof=found.dof,
+            sample=responses.sample, time_s=responses.time_s, schedule=responses.schedule,
+        )  # fmt: skip
+
+    def _notice(self, parameters: Parameters) -> None:
+        for i, word in enumerate(parameters.status):
+            if word == self._word:
+                continue
+            self._word, sample, time_s = str(word), int(parameters.sample[i]), float(parameters.time_s[i])
+            kind = "fit-resumed" if word == OK else "fit-failed"
+            self._events.append(Event(kind, sample, time_s, SENTENCES[self._word], {"status": self._word}))
+
+
+def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:
+    """The lines in use as rows to fit, and the degrees of freedom of their sigmas."""
+    value, sigma = responses.value[:, use], responses.sigma[:, use]
+    usable = responses.valid[:, use] & np.isfinite(value)
+    # A sigma that is known at some lines and not at others would weigh those as if they had no noise.
+    known = np.isfinite(sigma) | ~usable
+    sigma = np.where(known.all(axis=1, keepdims=True), sigma, np.nan)
+    return Measured(value, sigma, usable), responses.dof

@@ -1,0 +1,186 @@
+"""fit: one model to one response, with everything that a person wants to see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.fitting.fitter import Fitter
+from livebode.fitting.hold import to_discrete
+from livebode.fitting.mean import mean_response
+from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
+from livebode.fitting.rows import SENTENCES
+from livebode.nouns import InputError, Parameters, Response, Responses
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to one response; a Model by its `response`.
+
+    Attributes
+    ----------
+    model
+        What was fitted.
+    parameters, derived
+        One row each: the parameters, and the resonances, damping ratios and ratios that follow.
+    held
+        Parameters that were not fitted, and their values.
+    band_hz, lines
+        Lowest and highest line that was used, and how many.
+    rate_hz, hold
+        How the input was held.
+    """
+
+    model: PhysicalModel
+    parameters: Parameters
+    derived: Parameters
+    held: dict[str, float]
+    band_hz: tuple[float, float]
+    lines: int
+    rate_hz: float
+    hold: Hold = field(default="zero-order")
+
+    @property
+    def status(self) -> str:
+        """ "ok", or why there are no numbers."""
+        return str(self.parameters.status[0])
+
+    @property
+    def sentence(self) -> str:
+        """The status for people."""
+        return SENTENCES[self.status]
+
+    @property
+    def epsilon(self) -> float:
+        """What the model lacks, as a share of |G|; 0 where noise alone explains the residuals."""
+        return float(self.parameters.epsilon[0])
+
+    @property
+    def chi2(self) -> float:
+        """Reduced: residuals against sigma alone, 1 for a true model; NaN where no sigma is known."""
+        return float(self.parameters.chi2[0] / self.parameters.dof[0])
+
+    def __getitem__(self, name: str) -> float:
+        """Value of a parameter or derived quantity."""
+        part = self.parameters if name in self.parameters.names else self.derived
+        return float(part[name][0])
+
+    def bound(self, name: str, probability: float = 0.95) -> float:
+        """Half-width of its interval; see `Parameters.bound`."""
+        part = self.parameters if name in self.parameters.names else self.derived
+        return float(part.bound(probability)[0, part.index(name)])
+
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        """The fitted model's response, behind hold and delay.
+
+        Raises
+        ------
+        InputError
+            If the fit failed.
+        """
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        found = self.model.at(self._values(), Grid(f.ravel(), self.rate_hz, self.hold))
+        return np.asarray(found.reshape(f.shape))
+
+    def to_control(self, discrete: bool = False) -> Any:
+        """python-control TransferFunction (extra `control`): in s, without the delay; or in z, behind hold and delay.
+
+        Raises
+        ------
+        InputError
+            If the fit failed, python-control is missing, or a negative delay is to become discrete.
+        """
+        values = self._values()
+        try:
+            import control
+        except ImportError:
+            raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
+        transfer = self.model.continuous(values)
+        if discrete:
+            late = float(values[self.model.names.index(DELAY)]) if DELAY in self.model.names else 0.0
+            return control.tf(*to_discrete(transfer, self.rate_hz, late), 1 / self.rate_hz)
+        below = np.concatenate([transfer.denominator, np.zeros(transfer.integrators)])
+        return control.tf(transfer.numerator, below)
+
+    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+        """Name, value, half-width and unit of everything that was fitted or follows."""
+        found = []
+        for part in (self.parameters, self.derived):
+            bound = part.bound(probability)[0]
+            for i, name in enumerate(part.names):
+                if name not in self.held:
+                    found.append((name, float(part.value[0, i]), float(bound[i]), part.units[i]))
+        return found
+
+    def _values(self) -> NDArray[np.float64]:
+        if self.status != "ok":
+            raise InputError(f"there is no fit to evaluate: {self.sentence}")
+        return np.asarray(self.parameters.value[0])
+
+
+def fit(
+    measured: Response | Responses,
+    model: PhysicalModel | str,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    free: Sequence[str] = (),
+    band_hz: tuple[float, float] | None = None,
+    hold: Hold = "zero-order",
+    **options: Any,
+) -> Fit:
+    """Fit a model to a Response, or to the mean of Responses (`mean_response`).
+
+    Lines weigh by sigma² + (ε|G|)², with ε ≥ 0 such that the reduced chi² is 1; see docs/fits.md for what the bounds
+    then hold. The other arguments are those of `Fitter`.
+
+    Bias: as `Fitter`.
+
+    Raises
+    ------
+    InputError
+        If model, names, bounds or band cannot be, or the responses are not of a plant. A fit that fails is no error:
+        its status says why, and its values are NaN.
+
+    Examples
+    --------
+    >>> from livebode import Lines, Response
+    >>> from livebode.simulation import BeltAxis
+    >>> lines = Lines.parse("20:140:5", rate_hz=4000, window=800)
+    >>> truth = BeltAxis().linear(0.8).sampled(4000.0).response(lines.frequency_hz)
+    >>> ones = np.ones(len(lines))
+    >>> exact = Response(lines, truth, 1e-3 * ones, np.inf, ones, ones > 0, 0, 799, 0.1)
+    >>> found = fit(exact, "two-mass", radius_m=0.019)
+    >>> round(found["Keff"]), round(found["mL"], 4), round(found["resonance"], 3)
+    (500000, 6.7, 59.357)
+    """
+    one = mean_response(measured) if isinstance(measured, Responses) else as_row(measured)
+    fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
+    return fit_of(fitter, fitter.process(one))
+
+
+def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
+    """One row that a Fitter gave, with what it was fitted to."""
+    grid = fitter.grid
+    return Fit(
+        model=fitter.model,
+        parameters=parameters,
+        derived=fitter.derived(parameters),
+        held=fitter.held,
+        band_hz=(float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])),
+        lines=grid.frequency_hz.size,
+        rate_hz=grid.rate_hz,
+        hold=grid.hold,
+    )
+
+
+def as_row(response: Response) -> Responses:
+    """One Response as a batch of one."""
+    rows = {name: np.array([getattr(response, name)]) for name in _ROWS}
+    return Responses(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
+
+
+_ROWS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")

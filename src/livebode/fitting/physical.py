@@ -1,0 +1,217 @@
+"""PhysicalModel: a machine as a transfer function of parameters with units and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.fitting.transfer import Transfer
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Hold = Literal["zero-order", "none"]
+
+DELAY = "delay"
+
+
+class Grid(NamedTuple):
+    """Where a model is compared: lines, the loop's rate, and what holds the input between its ticks."""
+
+    frequency_hz: Floats
+    rate_hz: float
+    hold: Hold = "zero-order"
+
+    @classmethod
+    def of(cls, lines: Lines, hold: Hold = "zero-order") -> Grid:
+        return cls(lines.frequency_hz, lines.rate_hz, hold)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a model.
+
+    Parameters
+    ----------
+    name, unit
+        As in tables and files.
+    start
+        Where a search begins, if the model knows no better.
+    low, high
+        Bounds. A positive `low` makes the fit move the logarithm. A fit that ends at a bound has failed.
+    held
+        The value at which it is held unless it is freed; None for one that is fitted.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    held: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.low <= self.start <= self.high and self.low < self.high and isfinite(self.start)):
+            raise InputError(f"parameter {self.name!r}: {self.start=:g} is not between {self.low:g} and {self.high:g}")
+
+    @property
+    def logarithmic(self) -> bool:
+        return self.low > 0
+
+    @property
+    def scale(self) -> float:
+        """Of one that is not logarithmic: what counts as a step."""
+        finite = [abs(x) for x in (self.low, self.high) if isfinite(x) and x]
+        return abs(self.start) or min(finite, default=1.0)
+
+
+class PhysicalModel:
+    """Base of all models: name a class, its parameters and its transfer function, and it can be fitted.
+
+    The transfer function is written with NumPy arithmetic on its arguments, one for each parameter in order, which may
+    be numbers or arrays: fits evaluate it for many values at once. It gives the coefficients of numerator and
+    denominator from the highest power of s on. A parameter named "delay" (s) is a delay behind it, and not an argument.
+
+    A model in state space gives `from_state_space(a, b, c)`, one by its poles and zeros `from_zeros_poles(...)`.
+
+    Attributes
+    ----------
+    name
+        In tables, files and `livebode fit --model`.
+    parameters
+        What can be fitted.
+
+    Examples
+    --------
+    >>> class Oscillator(PhysicalModel):
+    ...     name = "oscillator"
+    ...     parameters = (
+    ...         Parameter("m", "kg", start=1.0, low=1e-3, high=1e3),
+    ...         Parameter("c", "N s/m", start=10.0, low=1e-3, high=1e4),
+    ...         Parameter("k", "N/m", start=1e4, low=1.0, high=1e8),
+    ...     )
+    ...
+    ...     def transfer(self, m, c, k):
+    ...         return [1.0], [m, c, k]
+    >>> grid = Grid(np.array([1.0, 16.0]), rate_hz=1000.0)
+    >>> abs(Oscillator().at([1.0, 10.0, 1e4], grid)).round(6)
+    array([0.0001  , 0.000989])
+    >>> Oscillator().derived_names
+    ('resonance', 'resonance_damping', 'resonance_q')
+    """
+
+    name: ClassVar[str]
+    parameters: tuple[Parameter, ...]
+
+    frictions: ClassVar[tuple[str, ...]] = ()
+    """Parameters that are viscous frictions, which a fit tries where the model lacks something."""
+
+    def transfer(self, *parameters: Any) -> tuple[Sequence[ArrayLike], Sequence[ArrayLike]]:
+        """Coefficients of numerator and denominator, each a number or an array like the arguments."""
+        raise NotImplementedError(f"{type(self).__name__} has no transfer function; define transfer()")
+
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+        """First values to try for responses (rows, lines), shape (starts, rows, parameters).
+
+        Unless a model knows better: the declared ones, and each of them a third and three times as large.
+        """
+        middle = np.array([p.start for p in self.parameters])
+        tried = [middle]
+        for i, parameter in enumerate(self.parameters):
+            if parameter.logarithmic and parameter.held is None:
+                for factor in (1 / 3, 3.0):
+                    other = middle.copy()
+                    other[i] = np.clip(other[i] * factor, parameter.low, parameter.high)
+                    tried.append(other)
+        return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
+
+    def drag(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+        """The same values (..., parameters) with frictions that the lines would just show."""
+        return values
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return tuple(p.unit for p in self.parameters)
+
+    def at(self, values: ArrayLike, grid: Grid) -> Complex:
+        """Response at the lines, behind the hold and the delay, for values (..., parameters): shape (..., lines)."""
+        p = np.asarray(values, dtype=np.float64)
+        transfer, delay_s = self._transfer(p), self._delay_s(p)
+        s = np.asarray(2j * np.pi * grid.frequency_hz, dtype=np.complex128)
+        if grid.hold == "zero-order":
+            return transfer.sampled(np.exp(s / grid.rate_hz), grid.rate_hz, delay_s)
+        late = np.exp(-s * np.asarray(delay_s)[..., np.newaxis])
+        return np.asarray(transfer.response(s) * late)
+
+    def continuous(self, values: ArrayLike) -> Transfer:
+        """The transfer function in s, without the delay."""
+        return self._transfer(np.asarray(values, dtype=np.float64))
+
+    @property
+    def derived_names(self) -> tuple[str, ...]:
+        """Of `derived`: frequency, damping ratio and quality factor of each mode, and of each pair of zeros."""
+        return tuple(n + end for n in self._pairs() for end in ("", "_damping", "_q"))
+
+    @property
+    def derived_units(self) -> tuple[str, ...]:
+        return ("Hz", "", "") * len(self._pairs())
+
+    def derived(self, values: Floats) -> Floats:
+        """From values (..., parameters): |p|/2π, −Re p/|p| and its half inverse for each pair, (..., derived_names)."""
+        transfer = self._transfer(values)
+        found = [_paired(roots) for roots in (transfer.poles(), transfer.zeros())]
+        # A polynomial without parameters in it has roots for one set of values only.
+        pairs = np.concatenate([np.broadcast_to(x, (*values.shape[:-1], *x.shape[-2:])) for x in found], axis=-2)
+        size = np.sqrt(np.abs(pairs[..., 0] * pairs[..., 1]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            damping = -(pairs[..., 0] + pairs[..., 1]).real / (2 * size)
+            quantities = np.stack([size / (2 * np.pi), damping, 1 / (2 * damping)], axis=-1)
+        return np.asarray(quantities.reshape(*values.shape[:-1], -1))
+
+    def _pairs(self) -> list[str]:
+        transfer = self._transfer(np.array([p.start for p in self.parameters]))
+        counts = (transfer.denominator.shape[-1] - 1) // 2, (transfer.numerator.shape[-1] - 1) // 2
+        return [
+            name if count == 1 else f"{name}_{i + 1}"
+            for name, count in zip(("resonance", "antiresonance"), counts)
+            for i in range(count)
+        ]
+
+    def _transfer(self, p: Floats) -> Transfer:
+        late = self._late
+        arguments = [p[..., i] for i in range(len(self.names)) if i != late]
+        return Transfer.of(*self.transfer(*arguments))
+
+    def _delay_s(self, p: Floats) -> Floats | float:
+        return 0.0 if self._late is None else np.asarray(p[..., self._late])
+
+    @cached_property
+    def _late(self) -> int | None:
+        """Where the delay stands."""
+        return self.names.index(DELAY) if DELAY in self.names else None
+
+
+def delay(held: float | None = 0.0) -> Parameter:
+    """A delay, held at zero unless freed; negative where the input was logged later than it acted."""
+    return Parameter(DELAY, "s", start=0.0, low=-0.02, high=0.02, held=held)
+
+
+def free_friction(name: str, unit: str) -> Parameter:
+    """A viscous friction, held at zero unless freed."""
+    return Parameter(name, unit, start=1e-3, low=1e-15, high=1e12, held=0.0)
+
+
+def _paired(roots: Complex) -> Complex:
+    """Neighbours by size two by two, shape (..., pairs, 2); a real root that is left over, the smallest, is no mode."""
+    left = roots.shape[-1] % 2
+    return roots[..., left:].reshape(*roots.shape[:-1], -1, 2)

@@ -1,0 +1,161 @@
+"""One model fitted to rows of measured values: weighted least squares in the parameters' own coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.least_squares import Minimum, minimise
+from livebode.fitting.physical import Grid, PhysicalModel
+from livebode.nouns import InputError, missing_channel
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_STEP = 1e-7
+_ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, and what is left after it far less
+_AT_BOUND = 1e-6
+
+
+class Measured(NamedTuple):
+    """Values (rows, lines), their standard deviations E|e|² = sigma² (NaN: not known), and which count."""
+
+    value: Complex
+    sigma: Floats
+    use: NDArray[np.bool_]
+
+    def rows(self, which: NDArray[Any]) -> Measured:
+        return Measured(self.value[which], self.sigma[which], self.use[which])
+
+    def repeated(self, times: int) -> Measured:
+        return Measured(*(np.tile(x, (times, 1)) for x in (self.value, self.sigma, self.use)))  # type: ignore[arg-type]
+
+
+class Solution(NamedTuple):
+    """Values (rows, parameters), the model's response (rows, lines) and slopes (rows, lines, free) there or a hundredth
+    of sigma beside, and whether each row settled."""
+
+    values: Floats
+    response: Complex
+    slope: Complex
+    settled: NDArray[np.bool_]
+
+
+class Problem:
+    """A model at some lines with some of its parameters free.
+
+    Parameters
+    ----------
+    model, grid
+        What is fitted, where.
+    fixed
+        Values at which parameters are held.
+    free
+        Names of parameters that are fitted although the model holds them at first.
+    """
+
+    def __init__(
+        self, model: PhysicalModel, grid: Grid, fixed: Mapping[str, float] | None = None, free: Sequence[str] = ()
+    ) -> None:
+        fixed = dict(fixed or {})
+        for name in (*fixed, *free):
+            if name not in model.names:
+                raise InputError(_no_parameter(name, model))
+        self.model, self.grid = model, grid
+        self.held = {p.name: p.held for p in model.parameters if p.held is not None and p.name not in free} | fixed
+        self.free = np.array([name not in self.held for name in model.names])
+        if not self.free.any():
+            raise InputError(f"every parameter of {model.name!r} is held; free at least one")
+        chosen = [p for p, free_ in zip(model.parameters, self.free) if free_]
+        for p in model.parameters:
+            if (value := fixed.get(p.name)) not in (None, p.held) and not p.low <= value <= p.high:
+                raise InputError(f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}")
+        self._log = np.array([p.logarithmic for p in chosen])
+        self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            low, high = (np.array([getattr(p, end) for p in chosen]) for end in ("low", "high"))
+            self._low, self._high = (np.where(self._log, np.log(x), x / self._scale) for x in (low, high))
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return int(np.count_nonzero(self.free))
+
+    def with_held(self, values: Floats) -> Floats:
+        """Values (..., parameters) with those that are held at what they are held."""
+        values = np.array(values, dtype=np.float64)
+        for name, value in self.held.items():
+            values[..., self.model.names.index(name)] = value
+        return values
+
+    def starts(self, measured: Measured, weight: Floats) -> Floats:
+        """The model's first values, (starts, rows, parameters), within the bounds."""
+        value = np.where(measured.use, measured.value, 0.0)
+        found = self.model.starts(value, weight, self.grid)
+        low, high = (np.array([getattr(p, end) for p in self.model.parameters]) for end in ("low", "high"))
+        middle = np.array([p.start for p in self.model.parameters])
+        return self.with_held(np.where(np.isfinite(found), found, middle).clip(low, high))
+
+    def solve(self, measured: Measured, weight: Floats, start: Floats, rounds: int = 30) -> tuple[Solution, Floats]:
+        """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,)."""
+        value = np.where(measured.use, measured.value, 0.0)
+        weight = np.where(measured.use, weight, 0.0)
+
+        def normal(x: Floats) -> tuple[Floats, Floats, Floats, Complex, Complex]:
+            response, slope = self._slopes(x, start)
+            # One matrix of slopes and, behind them, the residual: its square holds all that is needed.
+            both = np.concatenate([slope, (response - value)[..., np.newaxis]], axis=-1) * weight[..., np.newaxis]
+            square = (both.conj().swapaxes(1, 2) @ both).real
+            if not np.isfinite(square).all():
+                bad = ~np.isfinite(square).all(axis=(1, 2))
+                square[bad] = np.eye(square.shape[-1])
+                square[bad, -1, -1] = np.inf
+            return square[:, -1, -1], square[:, :-1, -1], square[:, :-1, :-1], response, slope
+
+        with np.errstate(all="ignore"):
+            found: Minimum = minimise(
+                normal, self._inward(start), rounds, 1e-10, enough=_ENOUGH, low=self._low, high=self._high
+            )
+        values = self._outward(found.parameters, start)
+        response, slope = found.known
+        return Solution(values, response, slope, found.settled), found.cost
+
+    def at_bound(self, values: Floats) -> NDArray[np.bool_]:
+        """Rows of which a free parameter lies at one of its bounds."""
+        x = self._inward(values)
+        return np.asarray(((x - self._low < _AT_BOUND) | (self._high - x < _AT_BOUND)).any(axis=1))
+
+    def outward_slopes(self, values: Floats) -> Floats:
+        """Derivatives of the free parameters by their coordinates, (rows, free)."""
+        return np.where(self._log, values[:, self.free], self._scale)
+
+    def relative(self) -> NDArray[np.bool_]:
+        """Which free parameters move as logarithms."""
+        return self._log
+
+    def _inward(self, values: Floats) -> Floats:
+        free = values[..., self.free]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(self._log, np.log(np.abs(free)), free / self._scale)
+
+    def _outward(self, x: Floats, start: Floats) -> Floats:
+        values = np.array(start)
+        with np.errstate(over="ignore"):
+            values[..., self.free] = np.where(self._log, np.exp(x), x * self._scale)
+        return values
+
+    def _slopes(self, x: Floats, start: Floats) -> tuple[Complex, Complex]:
+        """Response (rows, lines) and its derivatives by the coordinates (rows, lines, free), by forward differences."""
+        n = x.shape[-1]
+        moved = np.empty((n + 1, *x.shape))
+        moved[:] = x
+        moved[np.arange(1, n + 1), :, np.arange(n)] += _STEP
+        every = self.model.at(self._outward(moved, np.broadcast_to(start, (n + 1, *start.shape))), self.grid)
+        return every[0], np.moveaxis((every[1:] - every[0]) / _STEP, 0, -1)
+
+
+def _no_parameter(name: str, model: PhysicalModel) -> str:
+    return missing_channel(name, model.names).replace("channel", "parameter", 1).replace("Channels", model.name)

@@ -1,0 +1,222 @@
+"""Fits of rows of responses: from measured values to values, covariance and the reason where there are none."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.friction import held_by_friction
+from livebode.fitting.problem import Measured, Problem, Solution
+from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
+from livebode.nouns.parameters import OK
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+NO_RESPONSE = "no response"
+NOT_CONVERGED = "not converged"
+BOUND = "bound hit"
+NOT_SEEN = "not seen"
+NO_FIT = "model does not fit"
+FRICTION = "friction"
+
+SENTENCES = {
+    OK: "the fit holds",
+    NO_RESPONSE: "too few lines are valid for the model's free parameters",
+    NOT_CONVERGED: "the fit did not converge; the lines may not show what the model says",
+    BOUND: "a parameter ended at its bound; the lines do not hold it",
+    NOT_SEEN: "the lines do not show what the model says: a parameter is uncertain by more than half; take lines "
+    "around the resonance and the antiresonance, or hold parameters that are known",
+    NO_FIT: "the model misses the response by more than half of it: another machine than the model's, or no response",
+    FRICTION: "friction holds the machine and explains most of what the model lacks; move, excite more, or free the "
+    "model's viscous friction",
+}
+"""What each status means, for people."""
+
+EPSILON_MAX = 0.5
+_UNCERTAIN = 0.5  # of a logarithm
+_WORD = "<U20"
+_FIRST_EPSILON = 0.1  # so that no line that is measured far better than the model holds decides a first fit
+_REWEIGHTED, _SAME = 8, 0.01
+_SUSPICIOUS = 4.0  # of a reduced chi², ε and all
+_WARM_ROUNDS = 12
+_DOF_LEAST = 3.0
+_CONDITION_MAX = 1e11
+_ROUNDING = 1e-14
+
+
+class Fitted(NamedTuple):
+    """What a batch of rows came to: the arrays of `Parameters`, and, failed or not, the model's response (rows, lines)
+    and the values where the search ended."""
+
+    values: Floats
+    covariance: Floats
+    status: NDArray[np.str_]
+    epsilon: Floats
+    chi2: Floats
+    dof: Floats
+    response: Complex
+    ended: Floats
+
+
+def fit_rows(
+    problem: Problem,
+    measured: Measured,
+    noise_dof: Floats,
+    start: Floats | None = None,
+    epsilon: Floats | None = None,
+) -> Fitted:
+    """Fit each row, from `start` (parameters,) where there is one; where there is none or it fails, from a scan.
+
+    `epsilon` (rows,) is held where it is given; else each row's own is found, such that its reduced chi² is 1.
+    `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
+    """
+    dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
+    if dof.size and (dof > 0).all():
+        return _fitted(problem, measured, noise_dof, start, epsilon, dof)
+    some = np.flatnonzero(dof > 0)
+    whole = _none(problem, measured, dof)
+    if some.size:
+        eps = None if epsilon is None else epsilon[some]
+        found = _fitted(problem, measured.rows(some), noise_dof[some], start, eps, dof[some])
+        for kept, other in zip(whole, found):
+            kept[some] = other
+    return whole
+
+
+def _none(problem: Problem, measured: Measured, dof: Floats) -> Fitted:
+    """Rows without a fit."""
+    rows, n = len(dof), len(problem.model.names)
+    nan = np.full(rows, np.nan)
+    return Fitted(
+        np.full((rows, n), np.nan), np.full((rows, n, n), np.nan), np.full(rows, NO_RESPONSE, dtype=_WORD), nan,
+        nan.copy(), dof, np.full(measured.value.shape, np.nan, dtype=np.complex128), np.full((rows, n), np.nan),
+    )  # fmt: skip
+
+
+def _fitted(
+    problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
+) -> Fitted:
+    eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
+    # Before a model is known the measured size stands for the model's.
+    size = np.where(measured.use, np.abs(measured.value), 0.0)
+    weight = _weights(measured, size, eps)
+    found = _begun(problem, measured, weight, start, dof)
+    if epsilon is None:
+        found, eps = _reweighted(problem, measured, found, dof)
+    else:
+        # A row that lacks much more than those before it is not known as well as they were.
+        more = own_epsilon(measured, found.response, _SUSPICIOUS * dof) > eps
+        if more.any():
+            eps = np.where(more, own_epsilon(measured, found.response, dof), eps)
+    return _judged(problem, measured, noise_dof, found, eps, dof)
+
+
+def _weights(measured: Measured, size: Floats, epsilon: Floats) -> Floats:
+    """Where neither noise nor ε is known, lines weigh by their size."""
+    found = weights(measured.sigma, size, epsilon)
+    unknown = ~(np.where(measured.use, found, 0.0) > 0).any(axis=1)
+    if unknown.any():
+        found[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
+    return found
+
+
+def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats | None, dof: Floats) -> Solution:
+    """From the start, and for rows that it does not suit the best fit of a scan."""
+    if start is None:
+        return _scanned(problem, measured, weight)
+    found, cost = problem.solve(measured, weight, np.repeat(start[np.newaxis], len(dof), axis=0), _WARM_ROUNDS)
+    lost = ~found.settled | (cost > _SUSPICIOUS * dof)
+    if lost.any():
+        again = _scanned(problem, measured.rows(lost), weight[lost])
+        rest = np.abs(weight[lost] * np.where(measured.use[lost], again.response - measured.value[lost], 0.0)) ** 2
+        better = (rest.sum(axis=1) < cost[lost]) | ~found.settled[lost]
+        rows = np.flatnonzero(lost)[better]
+        for kept, other in zip(found, again):
+            kept[rows] = other[better]
+    return found
+
+
+def _scanned(problem: Problem, measured: Measured, weight: Floats) -> Solution:
+    """The best of the fits from the model's first values."""
+    starts = problem.starts(measured, np.where(measured.use, weight, 0.0))
+    count, rows, _ = starts.shape
+    every, cost = problem.solve(measured.repeated(count), np.tile(weight, (count, 1)), starts.reshape(count * rows, -1))
+    best = np.argmin(np.where(every.settled, cost, cost + 1e300).reshape(count, rows), axis=0)
+    return Solution(*(x.reshape(count, rows, *x.shape[1:])[best, np.arange(rows)] for x in every))
+
+
+def _reweighted(problem: Problem, measured: Measured, found: Solution, dof: Floats) -> tuple[Solution, Floats]:
+    """Fits repeated with the ε of their residuals until it stays; each row by itself."""
+    eps = np.full(len(dof), _FIRST_EPSILON)
+    for _ in range(_REWEIGHTED):
+        new = own_epsilon(measured, found.response, dof)
+        same = np.abs(new - eps) <= _SAME * new
+        if same.all():
+            break
+        eps = np.where(same, eps, new)
+        weight = _weights(measured, np.abs(found.response), eps)
+        again, _ = problem.solve(measured, weight, found.values)
+        for kept, other in zip(found, again):
+            kept[~same] = other[~same]
+    return found, eps
+
+
+def _judged(
+    problem: Problem, measured: Measured, noise_dof: Floats, found: Solution, eps: Floats, dof: Floats
+) -> Fitted:
+    rest, noise, _ = squares(measured, found.response)
+    small = covariance(measured, found, eps, noise_dof)
+    with np.errstate(invalid="ignore"):
+        uncertain = np.sqrt(np.einsum("rii->ri", small))[:, problem.relative()]
+        unseen = ~np.isfinite(small).all(axis=(1, 2)) | ~(uncertain <= _UNCERTAIN).all(axis=1)
+    status = np.full(len(dof), OK, dtype=_WORD)
+    for word, failed in (
+        (FRICTION, held_by_friction(problem, measured, found, dof)),
+        (NO_FIT, lacks_more_than(EPSILON_MAX, measured, found.response, dof)),
+        (NOT_SEEN, unseen),
+        (BOUND, problem.at_bound(found.values)),
+        (NOT_CONVERGED, ~found.settled),
+    ):
+        status[failed] = word
+    failed = status != OK
+    outward = problem.outward_slopes(found.values)
+    whole = np.zeros((len(dof), found.values.shape[1], found.values.shape[1]))
+    free = np.flatnonzero(problem.free)
+    whole[:, free[:, np.newaxis], free] = outward[:, :, np.newaxis] * small * outward[:, np.newaxis]
+    whole[failed] = np.nan
+    return Fitted(
+        np.where(failed[:, np.newaxis], np.nan, found.values),
+        whole, status, np.where(failed, np.nan, eps), chi_squared(rest, noise), dof,
+        found.response, found.values,
+    )  # fmt: skip
+
+
+def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floats) -> Floats:
+    """Of the free parameters in their coordinates, (rows, free, free); not finite where the lines do not hold them.
+
+    A sigma that was estimated with d degrees of freedom makes a weight that scatters; weighted least squares then
+    scatter more than the weights say, by d/(d − 2) where noise alone is in the weight and parameters are few; with as
+    many as there are data the weights have no say.
+    """
+    size = np.abs(found.response)
+    weight = np.where(measured.use, _weights(measured, size, eps), 0.0)
+    left = weight[..., np.newaxis] * found.slope
+    matrix = (left.conj().swapaxes(1, 2) @ left).real
+    share = np.where(measured.sigma > 0, measured.sigma * weight, 0.0) ** 2 / 2
+    d = np.where(np.isnan(noise_dof), np.inf, np.maximum(noise_dof, _DOF_LEAST))[:, np.newaxis]
+    data = 2 * np.count_nonzero(measured.use, axis=1)[:, np.newaxis]
+    middle = np.sqrt(1 + share**2 * 2 / (d - 2) * (1 - left.shape[-1] / data))[..., np.newaxis] * left
+    scattered = (middle.conj().swapaxes(1, 2) @ middle).real
+    with np.errstate(all="ignore"):
+        scale = np.sqrt(np.einsum("rii->ri", matrix))
+        scaled = matrix / (scale[:, :, np.newaxis] * scale[:, np.newaxis])
+        unit = np.eye(matrix.shape[-1])
+        finite = np.isfinite(scaled).all(axis=(1, 2))
+        inverse = np.linalg.inv(np.where(finite[:, np.newaxis, np.newaxis], scaled, unit) + _ROUNDING * unit)
+        held = finite & (np.abs(inverse).max(axis=(1, 2)) < _CONDITION_MAX)
+        inverse[~held] = np.nan
+        inverse /= scale[:, :, np.newaxis] * scale[:, np.newaxis]
+    return np.asarray(inverse @ scattered @ inverse)

@@ -1,0 +1,69 @@
+"""Three masses in a row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.chains import Chain
+from livebode.fitting.modal import chain_of, scan
+from livebode.fitting.physical import Grid, Parameter, delay
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreeMass(Chain):
+    """Motor, middle and load, joined by two springs: torque on the first.
+
+    At the motor any machine of one rigid and two lightly damped modes looks like such a chain, also one whose springs
+    form a ring, as (8) … (10); its middle mass then need not be a part that one could touch.
+
+    >>> ThreeMass().names
+    ('Js', 'J2', 'J3', 'K1', 'K2', 'b1', 'b2', 'delay')
+    """
+
+    name = "three-mass"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        springs = (self._spring("K1"), self._spring("K2"), self._damper("b1"), self._damper("b2"))
+        return (self._motor(), self._load("2"), self._load("3"), *springs, delay())
+
+    def transfer(self, *parameters: Any) -> tuple[list[Any], list[Any]]:
+        js = parameters[0]
+        j2, j3, k1, k2, b1, b2 = (x * self.arm for x in parameters[1:])
+        # The load's side of the first spring, over s²: N/D of what it takes to move it.
+        below = [j3, b2, k2]
+        above = [j2 * j3, (j2 + j3) * b2, (j2 + j3) * k2]
+        joined = _sum(_times(above, [1.0, 0.0, 0.0]), _times([b1, k1], below))
+        denominator = _sum(_times([js], joined), _times([b1, k1], above))
+        numerator = joined
+        if self.side == "load":
+            numerator = [self.lever * x for x in _times([b1, k1], [b2, k2])]
+        return numerator, denominator + [0.0] * self.integrators
+
+    def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
+        weights, omega = scan(value, weight, grid, modes=2, integrators=self.integrators)
+        inertia, spring, damper = chain_of(weights, omega)
+        found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
+        return self._whole(np.concatenate(found, axis=-1), grid)
+
+
+def _times(first: list[Any], second: list[Any]) -> list[Any]:
+    """Product of two polynomials by their coefficients."""
+    product: list[Any] = [0.0] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            product[i + j] = product[i + j] + a * b
+    return product
+
+
+def _sum(first: list[Any], second: list[Any]) -> list[Any]:
+    short, long = sorted((first, second), key=len)
+    offset = len(long) - len(short)
+    return [x + (short[i - offset] if i >= offset else 0.0) for i, x in enumerate(long)]

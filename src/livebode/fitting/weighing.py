@@ -1,0 +1,78 @@
+"""Weights of lines: their noise, and what the model lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.problem import Measured
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_STEPS, _CLOSE = 30, 1e-6
+
+
+def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
+    """√2/√(sigma² + (ε|G|)²): residuals so weighted have a sum of squares of one each, real and imaginary apart.
+
+    sigma (rows, lines), NaN or zero where it is not known; size |G|, (rows, lines); epsilon (rows,).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):  # a fit that ran away has no size
+        variance = np.where(sigma > 0, sigma, 0.0) ** 2 + (epsilon[:, np.newaxis] * size) ** 2
+        return np.where(variance > 0, np.sqrt(2 / variance), 0.0)
+
+
+def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Floats:
+    """ε ≥ 0 with Σ 2·rest/(noise + ε²·size) = dof, (rows,); all are squares, (rows, lines), zero where not used.
+
+    Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        used = rest > 0
+        # No line has more than all together, which bounds ε² from below; from there the left side is convex and falls,
+        # so that Newton's steps climb to the root and never pass it.
+        least = (2 * rest / dof[:, np.newaxis] - noise) / size
+        square = np.max(np.where(used & np.isfinite(least), least, 0.0), axis=-1, initial=0.0)
+        noisy = _reduced(rest, noise, size, np.zeros(len(rest))) <= dof
+        for _ in range(_STEPS):
+            share = np.where(used, 1 / (noise + square[:, np.newaxis] * size), 0.0)
+            total = 2 * np.einsum("rl,rl->r", rest, share)
+            slope = 2 * np.einsum("rl,rl,rl,rl->r", rest, size, share, share)
+            step = np.where(noisy | ~(slope > 0), 0.0, (total - dof) / slope)
+            square = square + np.maximum(step, 0.0)
+            if not np.any(step > _CLOSE * square):
+                break
+    return np.where(noisy | ~(dof > 0) | ~np.isfinite(square), 0.0, np.sqrt(square))
+
+
+def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floats]:
+    """|residual|², sigma² and |G|² of the model, (rows, lines), zero where a line is not used."""
+    rest = np.abs(np.where(measured.use, measured.value - response, 0.0)) ** 2
+    noise = np.where(measured.use & (measured.sigma > 0), measured.sigma, 0.0) ** 2
+    return rest, noise, np.where(measured.use, np.abs(response), 0.0) ** 2
+
+
+def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
+    """Each row's ε by its own residuals, (rows,)."""
+    return epsilon_for(*squares(measured, response), dof)
+
+
+def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:
+    """Rows whose own ε is larger than this one."""
+    rest, noise, size = squares(measured, response)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _reduced(rest, noise, size, np.full(len(dof), epsilon**2)) > dof
+
+
+def chi_squared(rest: Floats, noise: Floats) -> Floats:
+    """Σ 2·rest/noise over the lines whose noise is known, (rows,); NaN where none is."""
+    known = noise > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = np.sum(np.where(known, 2 * rest / noise, 0.0), axis=-1)
+    return np.where(known.any(axis=-1), total, np.nan)
+
+
+def _reduced(rest: Floats, noise: Floats, size: Floats, square: Floats) -> Floats:
+    below = noise + square[:, np.newaxis] * size
+    return np.asarray(np.sum(np.where(rest > 0, 2 * rest / below, 0.0), axis=-1))

@@ -1,0 +1,127 @@
+"""Where an open loop crosses what a margin is read from, for many rows at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.margins.open_loop import OpenLoop
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+BANDWIDTH = 10 ** (-3 / 20)
+"""|T| at the bandwidth: 3 dB down."""
+
+_TOLERANCE = 1e-10  # of a frequency
+
+
+class Crossings(NamedTuple):
+    """Places on the curves of some rows, all shape (places,)."""
+
+    row: NDArray[np.int64]
+    frequency_hz: Floats
+    open_loop: Complex
+
+
+class Kind(NamedTuple):
+    """What changes its sign at a crossing, and which changes count."""
+
+    side: Callable[[Complex], Floats]
+    counts: Callable[[Complex], NDArray[np.bool_]]
+
+
+def _everywhere(value: Complex) -> NDArray[np.bool_]:
+    return np.ones(value.shape, dtype=np.bool_)
+
+
+GAIN = Kind(lambda x: np.log(np.abs(x)), _everywhere)
+PHASE = Kind(lambda x: np.asarray(x.imag), lambda x: x.real < 0)
+CLOSED = Kind(lambda x: np.log(np.abs(x / (1 + x)) / BANDWIDTH), _everywhere)
+_KINDS = (GAIN, PHASE, CLOSED)
+
+
+def crossings(
+    loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex
+) -> tuple[Crossings, Crossings, Crossings]:
+    """Where |L| = 1, where L is a negative number, and where |T| = |L/(1 + L)| first falls 3 dB below one.
+
+    Half the rate, where a sampled loop is real, is a crossing of the second kind if L is negative there. A row whose
+    |T| begins below has no bandwidth.
+    """
+    with np.errstate(divide="ignore"):  # a sampled loop may be nought at half the rate
+        at_gain, at_phase = (_changes(grid, kind) for kind in (GAIN, PHASE))
+    below = np.abs(grid / (1 + grid)) < BANDWIDTH
+    first = np.argmax(below, axis=1)
+    row = np.flatnonzero((first > 0) & below[np.arange(len(grid)), first])
+    starts = [at_gain, at_phase, (row, first[row] - 1)]
+    found = _roots(loop, values, frequency_hz, starts)
+    last = np.flatnonzero(grid[:, -1].real < 0)
+    ends = Crossings(last, np.full(last.size, frequency_hz[-1]), grid[last, -1])
+    phase = Crossings(*(np.concatenate(parts) for parts in zip(found[1], ends)))
+    return found[0], phase, found[2]
+
+
+def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
+    """Where |1 + L| is least in each row."""
+    from scipy.optimize import elementwise
+
+    row = np.arange(len(grid))
+    at = np.argmin(np.abs(1 + grid), axis=1)
+    found = Crossings(row, frequency_hz[at], grid[row, at])
+    inside = np.flatnonzero((at > 0) & (at < len(frequency_hz) - 1))
+    if not inside.size:
+        return found
+    log = np.log(frequency_hz)
+    bracket = tuple(log[at[inside] + step] for step in (-1, 0, 1))
+
+    def distance(x: Floats, i: Any) -> Floats:
+        return np.log(np.abs(1 + _one(loop, values, np.exp(x), i.astype(np.int64))))
+
+    better = elementwise.find_minimum(distance, bracket, args=(inside.astype(float),), tolerances={"xatol": 1e-7})
+    frequency = found.frequency_hz.copy()
+    frequency[inside] = np.exp(better.x)
+    return Crossings(row, frequency, _one(loop, values, frequency, row))
+
+
+Starts = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+def _changes(grid: Complex, kind: Kind) -> Starts:
+    """Row and grid point before every change of sign that counts.
+
+    At half the rate L is real but for rounding, and its sign there says nothing.
+    """
+    sign = kind.side(grid) > 0
+    row, at = np.nonzero(sign[:, 1:] != sign[:, :-1])
+    kept = kind.counts(grid[row, at])
+    if kind is PHASE:
+        kept &= at < grid.shape[1] - 2
+    return row[kept], at[kept]
+
+
+def _roots(loop: OpenLoop, values: Floats, frequency_hz: Floats, starts: list[Starts]) -> list[Crossings]:
+    """The roots between neighbours of the grid; all kinds at once, for it is the number of calls that costs."""
+    from scipy.optimize import elementwise
+
+    row, at = (np.concatenate(part) for part in zip(*starts))
+    kind = np.repeat(np.arange(len(starts)), [len(r) for r, _ in starts])
+    if not row.size:
+        return [Crossings(row, np.zeros(0), np.zeros(0, dtype=np.complex128))] * len(starts)
+
+    def value(x: Floats, row: Any, kind: Any) -> Floats:
+        found = _one(loop, values, x, row.astype(np.int64))
+        return np.asarray(np.choose(kind.astype(np.int64), [k.side(found) for k in _KINDS]))
+
+    ends, about = (frequency_hz[at], frequency_hz[at + 1]), (row.astype(float), kind.astype(float))
+    root = elementwise.find_root(value, ends, args=about, tolerances={"xrtol": _TOLERANCE})
+    level = _one(loop, values, root.x, row)
+    return [Crossings(row[of], root.x[of], level[of]) for of in (kind == i for i in range(len(starts)))]
+
+
+def _one(loop: OpenLoop, values: Floats, frequency_hz: Floats, row: NDArray[np.int64]) -> Complex:
+    """L of one row at one frequency each."""
+    return loop.at(values[row], frequency_hz[:, np.newaxis])[:, 0]

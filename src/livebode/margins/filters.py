@@ -1,0 +1,108 @@
+"""Notch and low-pass as one biquad each, at a controller's rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, pi, sqrt, tan
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError
+from livebode.nouns.model import Algebra
+
+
+@dataclass(frozen=True)
+class Biquad(Algebra):
+    """y(n) = b0·x(n) + b1·x(n−1) + b2·x(n−2) − a1·y(n−1) − a2·y(n−2), computed `rate_hz` times a second.
+
+    In series with a controller of the same rate, so that the hold behind both is counted with the controller.
+
+    Parameters
+    ----------
+    b
+        b0, b1, b2.
+    a
+        a1, a2; a0 is 1.
+    rate_hz
+        How often it is computed.
+    """
+
+    b: tuple[float, float, float]
+    a: tuple[float, float]
+    rate_hz: float
+
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        before = np.exp(-2j * np.pi * np.asarray(frequency_hz, dtype=np.float64) / self.rate_hz)
+        below = 1 + before * (self.a[0] + before * self.a[1])
+        return np.asarray((self.b[0] + before * (self.b[1] + before * self.b[2])) / below)
+
+    @classmethod
+    def of(cls, numerator: list[float], denominator: list[float], frequency_hz: float, rate_hz: float) -> Biquad:
+        """By the bilinear transformation that is exact at `frequency_hz` (prewarped)."""
+        from scipy.signal import bilinear
+
+        if not 0 < frequency_hz < rate_hz / 2:
+            raise InputError(
+                f"a filter at {frequency_hz:g} Hz cannot run at {rate_hz:g} Hz; it must lie below half the rate"
+            )
+        b, a = bilinear(numerator, denominator, fs=pi * frequency_hz / tan(pi * frequency_hz / rate_hz))
+        return cls((float(b[0]), float(b[1]), float(b[2])), (float(a[1]), float(a[2])), rate_hz)
+
+
+def notch(frequency_hz: float, depth_db: float, damping: float, rate_hz: float) -> Biquad:
+    """(s² + 2·g·ζ·ω·s + ω²)/(s² + 2·ζ·ω·s + ω²) with g = 10^(−depth/20): `depth_db` down at its centre, 0 dB far away.
+
+    Raises
+    ------
+    InputError
+        If the centre is not below half the rate.
+
+    Examples
+    --------
+    >>> at = notch(60.0, depth_db=20.0, damping=0.5, rate_hz=4000.0)
+    >>> abs(at.response([0.0, 60.0, 2000.0])).round(6)
+    array([1. , 0.1, 1. ])
+    """
+    omega, share = 2 * pi * frequency_hz, 10 ** (-depth_db / 20)
+    above, below = ([1.0, 2 * d * omega, omega**2] for d in (share * damping, damping))
+    return Biquad.of(above, below, frequency_hz, rate_hz)
+
+
+def low_pass(frequency_hz: float, rate_hz: float, damping: float = 1 / sqrt(2)) -> Biquad:
+    """ω²/(s² + 2·ζ·ω·s + ω²); with the usual damping (Butterworth) 3 dB down at `frequency_hz`.
+
+    Raises
+    ------
+    InputError
+        If the frequency is not below half the rate.
+
+    Examples
+    --------
+    >>> abs(low_pass(60.0, 4000.0).response([0.0, 60.0])).round(4)
+    array([1.    , 0.7071])
+    """
+    omega = 2 * pi * frequency_hz
+    return Biquad.of([omega**2], [1.0, 2 * damping * omega, omega**2], frequency_hz, rate_hz)
+
+
+def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: float, rate_hz: float) -> Biquad:
+    """A notch that is at least half its depth (in dB) down everywhere from `low_hz` to `high_hz`.
+
+    With v = (f/f0 − f0/f)/2 its size squared is (v² + g²ζ²)/(v² + ζ²), which is g at v = √g·ζ. Its zeros are damped by
+    `least_damping` at least: by as much as the resonance, so that it takes the peak away and leaves no dip beside it.
+
+    Raises
+    ------
+    InputError
+        If the range does not lie below half the rate.
+    """
+    if not 0 < low_hz <= high_hz < rate_hz / 2:
+        raise InputError(
+            f"a notch over {low_hz:g} … {high_hz:g} Hz cannot run at {rate_hz:g} Hz; it must lie below half"
+        )
+    share = 10 ** (-depth_db / 20)
+    low, high = tan(pi * low_hz / rate_hz), tan(pi * high_hz / rate_hz)  # as the bilinear transformation bends them
+    centre_hz = atan(sqrt(low * high)) * rate_hz / pi
+    edge = (sqrt(high / low) - sqrt(low / high)) / 2
+    return notch(centre_hz, depth_db, max(edge / sqrt(share), least_damping / share), rate_hz)

@@ -1,0 +1,132 @@
+"""Margins of the loop at each fit, with bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError, Parameters
+from livebode.nouns.parameters import OK
+
+Floats = NDArray[np.float64]
+
+NAMES = (
+    "gain_margin",
+    "gain_reduction",
+    "phase_margin",
+    "delay_margin",
+    "peak_sensitivity",
+    "bandwidth",
+)
+UNITS = ("dB", "dB", "deg", "ms", "", "Hz")
+UNSTABLE = "unstable by the fit"
+NONE, INTERPOLATED, EXTRAPOLATED = "none", "interpolated", "extrapolated"
+
+PER_ROW = ("value", "sigma", "frequency_hz", "frequency_sigma_hz", "place", "status", "sample", "time_s", "schedule")
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Margins of the closed loop, a row for each fit. Immutable.
+
+    Attributes
+    ----------
+    names, units
+        Of the columns. ``gain_margin``: dB by which the loop's gain may rise; ``gain_reduction``: dB by which it may
+        fall; ``phase_margin``: the smallest turn of L, deg, that makes it unstable, at any |L| = 1 (negative
+        for a turn ahead); ``delay_margin``: ms; ``peak_sensitivity``: Ms, largest |S|; ``bandwidth``: where |T| first
+        falls 3 dB below one, Hz.
+    value, sigma
+        Shape (rows, margins); sigma by linear propagation of the fit's covariance. Infinite (0 for sigma) where there
+        is no crossing, so that nothing of the kind can make the loop unstable; NaN where `status` is not "ok".
+    frequency_hz, frequency_sigma_hz
+        Where each was read, and how sure that place is; NaN where there is none.
+    place
+        ``interpolated`` by the fitted model within the band of the lines, ``extrapolated`` by it beyond, or ``none``.
+    status
+        Shape (rows,): "ok", the fit's reason, or that the fitted plant would make the loop unstable.
+    sample, time_s, schedule
+        Those of the fit.
+    """
+
+    value: Floats
+    sigma: Floats
+    frequency_hz: Floats
+    frequency_sigma_hz: Floats
+    place: NDArray[np.str_]
+    status: NDArray[np.str_]
+    sample: NDArray[np.int64]
+    time_s: Floats
+    schedule: Floats
+
+    names = NAMES
+    units = UNITS
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    def __getitem__(self, at: slice | NDArray[Any]) -> Margins:
+        return replace(self, **{name: getattr(self, name)[at] for name in PER_ROW})
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Rows that hold numbers, shape (rows,)."""
+        return np.asarray(self.status == OK)
+
+    def of(self, name: str) -> Floats:
+        """The values of one margin, shape (rows,)."""
+        return np.asarray(self.value[:, self.index(name)])
+
+    def index(self, name: str) -> int:
+        """Column of a margin; InputError with the known names where it is not one."""
+        if name not in NAMES:
+            raise InputError(f"there is no margin {name!r}; choose from {', '.join(NAMES)}")
+        return NAMES.index(name)
+
+    def bound(self, probability: float = 0.95) -> Floats:
+        """Half-width of the interval that holds the truth with this probability, shape (rows, margins).
+
+        Raises
+        ------
+        InputError
+            If the probability is not between 0 and 1.
+        """
+        if not 0 < probability < 1:
+            raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
+        from scipy.special import ndtri
+
+        return np.asarray(self.sigma * float(ndtri(0.5 + probability / 2)))
+
+    def parameters(self) -> tuple[Parameters, ...]:
+        """For a table in long form: each margin and where it was read, with its place as status."""
+        empty = np.full(len(self), np.nan)
+        found = []
+        for i, (name, unit) in enumerate(zip(NAMES, UNITS)):
+            spread = np.stack([self.sigma[:, i], self.frequency_sigma_hz[:, i]], axis=1)
+            found.append(
+                Parameters(
+                    model="margins",
+                    names=(name, f"{name}_frequency"),
+                    units=(unit, "Hz"),
+                    value=np.stack([self.value[:, i], self.frequency_hz[:, i]], axis=1),
+                    covariance=np.einsum("rn,nm->rnm", spread**2, np.eye(2)),
+                    status=np.where(self.ok, self.place[:, i], self.status),
+                    epsilon=empty,
+                    chi2=empty,
+                    dof=empty,
+                    sample=self.sample,
+                    time_s=self.time_s,
+                    schedule=self.schedule,
+                )
+            )
+        return tuple(found)
+
+    @classmethod
+    def join(cls, parts: list[Margins]) -> Margins:
+        """Parts of one run, in order, as one."""
+        if not parts:
+            raise InputError("there are no margins to join; give at least one part")
+        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in PER_ROW})

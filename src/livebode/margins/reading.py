@@ -1,0 +1,207 @@
+"""Margins read from open loops: crossings, slopes, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
+from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
+from livebode.margins.open_loop import OpenLoop
+from livebode.margins.slopes import Fits, Slopes, moved, peak_moved, slopes
+from livebode.margins.stability import stable
+from livebode.nouns import InputError, Parameters
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_DB = 20 / np.log(10)
+_ROWS = 64  # evaluated at once: some 2 MB a grid
+
+
+def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> Margins:
+    """Margins of the loop at each row of `fits`.
+
+    Read from L = F·G(fit) where it crosses, exact to 1e-10 of a frequency, on the model and never between lines without
+    one. Linear propagation of the fit's covariance: right where the covariance is (docs/margins.md), and where the
+    crossing that is nearest to harm stays the nearest.
+
+    Parameters
+    ----------
+    fits
+        Parameters of `loop.plant`.
+    loop
+        The controllers around it.
+    band_hz
+        Lowest and highest line that the fits are of.
+
+    Raises
+    ------
+    InputError
+        If the band is not two ascending positive frequencies below half the rate.
+
+    Examples
+    --------
+    >>> from livebode import PID, Lines, Loop, Response
+    >>> from livebode.fitting import fit
+    >>> from livebode.simulation import BeltAxis
+    >>> lines = Lines.parse("20:140:5", rate_hz=4000, window=800)
+    >>> ones, truth = np.ones(len(lines)), BeltAxis().linear(0.8).sampled(4000.0).response(lines.frequency_hz)
+    >>> measured = Response(lines, truth, 1e-3 * ones, np.inf, ones, ones > 0, 0, 799, 0.1)
+    >>> found = fit(measured, "two-mass", radius_m=0.019)
+    >>> loop = OpenLoop(found.model, Loop(feedback=PID(gain=1.0, rate_hz=4000, delay_ticks=4)), found.rate_hz)
+    >>> of_it = margins(found.parameters, loop, found.band_hz)
+    >>> of_it.of("phase_margin").round(2), of_it.of("gain_margin").round(2), of_it.place[0, 2].item()
+    (array([61.32]), array([11.58]), 'interpolated')
+    """
+    low, high = band_hz
+    if not 0 < low <= high <= loop.rate_hz / 2:
+        raise InputError(f"{band_hz=} is not two ascending frequencies up to half the rate of {loop.rate_hz:g} Hz")
+    found = _nothing(fits)
+    rows = np.flatnonzero(fits.ok)
+    for part in _parts(rows):
+        _read(found, part, fits.value[part], fits.covariance[part], loop, band_hz)
+    return found
+
+
+def _parts(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    return (rows[i : i + _ROWS] for i in range(0, len(rows), _ROWS))
+
+
+def _nothing(fits: Parameters) -> Margins:
+    shape = len(fits), len(NAMES)
+    status = fits.status.astype(f"<U{max(len(UNSTABLE), fits.status.dtype.itemsize // 4)}")
+    return Margins(
+        value=np.full(shape, np.nan),
+        sigma=np.full(shape, np.nan),
+        frequency_hz=np.full(shape, np.nan),
+        frequency_sigma_hz=np.full(shape, np.nan),
+        place=np.full(shape, NONE, dtype="<U12"),
+        status=status,
+        sample=fits.sample,
+        time_s=fits.time_s,
+        schedule=fits.schedule,
+    )
+
+
+def _read(
+    found: Margins,
+    rows: NDArray[np.int64],
+    values: Floats,
+    covariance: Floats,
+    loop: OpenLoop,
+    band: tuple[float, float],
+) -> None:
+    """Write the margins of `rows` into `found`."""
+    f = loop.frequencies(values, band)
+    grid = loop.at(values, f)
+    steady = stable(grid, f, loop.unstable_poles(values))
+    found.status[rows[~steady]] = UNSTABLE
+    if not steady.any():
+        return
+    rows, values, covariance, grid = rows[steady], values[steady], covariance[steady], grid[steady]
+    at_gain, at_phase, at_bandwidth = crossings(loop, values, f, grid)
+    at_peak = nearest_to_minus_one(loop, values, f, grid)
+    size = np.log(np.abs(at_phase.open_loop))
+    turn_deg = np.degrees(np.angle(-at_gain.open_loop))
+    late_ms = np.degrees(np.angle(-at_gain.open_loop) % (2 * np.pi)) / 360e-3 / at_gain.frequency_hz
+    chosen = (
+        _nearest(at_phase, -size, size < 0),
+        _nearest(at_phase, size, size >= 0),
+        _nearest(at_gain, np.abs(turn_deg)),
+        _nearest(at_gain, late_ms),
+        at_peak,
+        at_bandwidth,
+    )
+    sigma = np.sqrt(np.einsum("rii->ri", covariance))
+    unit = np.where(sigma > 0, sigma, 1.0)
+    correlation = covariance / unit[:, :, np.newaxis] / unit[:, np.newaxis]
+    fits = Fits(values, sigma)
+    everywhere = slopes(loop, fits, Crossings(*(np.concatenate(parts) for parts in zip(*chosen))))
+    ends = np.cumsum([0, *(len(at.row) for at in chosen)])
+    for column, at in enumerate(chosen):
+        reading = _READING[column](loop, fits, at, everywhere.part(slice(ends[column], ends[column + 1])))
+        _write(found, rows, column, at, reading, correlation)
+    place = np.where((found.frequency_hz >= band[0]) & (found.frequency_hz <= band[1]), INTERPOLATED, EXTRAPOLATED)
+    found.place[rows] = np.where(np.isnan(found.frequency_hz[rows]), NONE, place[rows])
+
+
+def _write(
+    found: Margins, rows: NDArray[np.int64], column: int, at: Crossings, reading: Reading, correlation: Floats
+) -> None:
+    value, by, by_log_f = reading
+    found.value[rows, column], found.sigma[rows, column] = np.inf, 0.0
+    if column == NAMES.index("bandwidth"):
+        found.value[rows, column], found.sigma[rows, column] = np.nan, np.nan
+    to = rows[at.row]
+    found.value[to, column] = value
+    found.frequency_hz[to, column] = at.frequency_hz
+    found.sigma[to, column] = _spread(by, correlation[at.row])
+    found.frequency_sigma_hz[to, column] = at.frequency_hz * _spread(by_log_f, correlation[at.row])
+
+
+def _spread(by: Floats, correlation: Floats) -> Floats:
+    """Sigma of what moves by so much for a sigma of each parameter."""
+    return np.asarray(np.sqrt(np.einsum("ri,rij,rj->r", by, correlation, by).clip(0)))
+
+
+def _nearest(places: Crossings, cost: Floats, counts: NDArray[np.bool_] | None = None) -> Crossings:
+    """Of each row the place of least cost."""
+    kept = np.arange(len(cost)) if counts is None else np.flatnonzero(counts)
+    order = kept[np.lexsort((cost[kept], places.row[kept]))]
+    _, first = np.unique(places.row[order], return_index=True)
+    chosen = order[first]
+    return Crossings(places.row[chosen], places.frequency_hz[chosen], places.open_loop[chosen])
+
+
+Reading = tuple[Floats, Floats, Floats]
+
+
+def _gain(loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    """−|L| in dB where L is negative. At half the rate, the place itself stays."""
+    by_f, by = along
+    by_log_f = moved(by_f.imag, by.imag)
+    by_log_f[at.frequency_hz >= loop.rate_hz / 2] = 0.0
+    moving = by.real + by_f.real[:, np.newaxis] * by_log_f
+    return -_DB * np.log(np.abs(at.open_loop)), -_DB * moving, by_log_f
+
+
+def _reduction(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    value, by, by_log_f = _gain(loop, fits, at, along)
+    return -value, -by, by_log_f
+
+
+def _phase(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    """Angle of −L where |L| = 1, deg."""
+    by_f, by = along
+    by_log_f = moved(by_f.real, by.real)
+    turn = np.degrees(np.angle(-at.open_loop))
+    return turn, np.degrees(by.imag + by_f.imag[:, np.newaxis] * by_log_f), by_log_f
+
+
+def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    """The delay that turns L to −1 where |L| = 1, ms."""
+    turn, by_turn, by_log_f = _phase(loop, fits, at, along)
+    late = (turn % 360) / 360e-3 / at.frequency_hz
+    by = by_turn / 360e-3 / at.frequency_hz[:, np.newaxis] - late[:, np.newaxis] * by_log_f
+    return late, by, by_log_f
+
+
+def _peak(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    """1/|1 + L| where it is largest; to first order the place does not matter."""
+    largest = 1 / np.abs(1 + at.open_loop)
+    closed = at.open_loop / (1 + at.open_loop)
+    by = -largest[:, np.newaxis] * (closed[:, np.newaxis] * along.by_parameter).real
+    return largest, by, peak_moved(loop, fits, at)
+
+
+def _bandwidth(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
+    by_f, by = along
+    sensitivity = 1 / (1 + at.open_loop)
+    by_log_f = moved((sensitivity * by_f).real, (sensitivity[:, np.newaxis] * by).real)
+    return at.frequency_hz, at.frequency_hz[:, np.newaxis] * by_log_f, by_log_f
+
+
+_READING = (_gain, _reduction, _phase, _delay, _peak, _bandwidth)

@@ -1,0 +1,31 @@
+"""What a MotionCorrection cannot be made of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.estimation import Settings
+from livebode.nouns import InputError
+
+
+def check(
+    settings: Settings, radius_m: float, chunk_samples: int, driven_by: str, passes: int, splines: tuple[int, int]
+) -> None:
+    """InputError where a correction cannot be made of these, with the value and the remedy."""
+    if settings.input is None or settings.schedule is None:
+        raise InputError("the correction needs the input (torque) and the schedule (position); name their channels")
+    if settings.quantity != "plant" or settings.average or settings.estimator == "indirect":
+        raise InputError("the correction is of single windows of the plant by the joint or the direct estimator")
+    if not (np.isfinite(radius_m) and radius_m > 0):
+        raise InputError(f"{radius_m=} is not a positive number of metres per radian")
+    if chunk_samples < 2 * settings.lines.window:
+        raise InputError(
+            f"chunk_samples={chunk_samples} is less than two windows of {settings.lines.window}; take a stroke"
+        )
+    if driven_by not in ("torque", "excitation"):
+        raise InputError(f"{driven_by=} is not known; choose 'torque' or 'excitation'")
+    if passes < 1:
+        raise InputError(f"{passes=} is not at least 1; 3 is usual")
+    for name, many in zip(("stiffness_splines", "damping_splines"), splines):
+        if many != 1 and many < 4:
+            raise InputError(f"{name}={many} is neither 1 nor at least 4")

@@ -1,0 +1,112 @@
+"""The samples that one fit sees, and the buffer that they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.implausible import PlausibleRange
+from livebode.nouns import Block, Lines
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Consecutive samples of w, u, y, x, shape (samples,) each.
+
+    `start` is the number of the first one, `first` that of the first one that is new; what is before it is the lead, in
+    which the model comes to the machine's state. `stop` is the number behind the last one that is new; a window more
+    may follow. `missing` (samples,) is True where a sample was not finite or implausibly large, and is the one before.
+    """
+
+    start: int
+    first: int
+    stop: int
+    w: Floats
+    u: Floats
+    y: Floats
+    x: Floats
+    missing: NDArray[np.bool_]
+    rate_hz: float
+
+    def torque(self, lines: Lines, sample: NDArray[np.int64]) -> Floats:
+        """|U| at the lines over the windows that end at these samples, (rows, lines)."""
+        wave = np.exp(-2j * np.pi * np.outer(np.arange(lines.window), lines.bins) / lines.window)
+        return np.asarray(np.abs(self._windows(self.u, lines.window, sample) @ wave))
+
+    def drag(self, window: int, sample: NDArray[np.int64], inertia_kg_m2: float) -> Floats:
+        """Torque along the motion that accelerates nothing, over two windows up to these samples, (rows,)."""
+        u = self._windows(self.u, 2 * window, sample).mean(axis=1)
+        before, after = (self._windows(self.y, window, at).mean(axis=1) for at in (sample - window, sample))
+        return np.asarray((u - inertia_kg_m2 * (after - before) * self.rate_hz / window) * np.sign(after))
+
+    def _windows(self, signal: Floats, window: int, sample: NDArray[np.int64]) -> Floats:
+        return np.lib.stride_tricks.sliding_window_view(signal, window)[sample - self.start - window + 1]
+
+
+class Recorded:
+    """The newest samples of w, u, y, x, as many as the next chunk needs."""
+
+    def __init__(self, names: list[str], lines: Lines) -> None:
+        self._names, self._rate_hz = names, lines.rate_hz
+        self._range = PlausibleRange(3, lines.window)
+        self.forget()
+
+    def forget(self) -> None:
+        """No samples are left; the size of those before still says what is implausible."""
+        self._parts: list[Floats] = []
+        self.start = self.stop = 0
+
+    def __bool__(self) -> bool:
+        return self.stop > self.start
+
+    def append(self, block: Block) -> None:
+        if not self:
+            self.start = block.start
+        data = block.data[[block.index(name) for name in self._names]]
+        signals: NDArray[np.bool_] = np.asarray(np.isfinite(data[:3]).all(axis=0))
+        implausible = self._range.process(np.where(signals, data[:3], 0.0))
+        signals[implausible] = False
+        data[:3, ~signals] = np.nan
+        self._parts.append(data)
+        self.stop = block.stop
+
+    def drop(self, before: int) -> None:
+        """Forget the samples before this number."""
+        if before > self.start:
+            self._parts = [self._whole()[:, before - self.start :].copy()]
+            self.start = before
+
+    def chunk(self, first: int, stop: int, end: int) -> Chunk:
+        """All up to the one before `end`."""
+        data = self._whole()[:, : end - self.start]
+        missing = np.isnan(data[0])
+        if not np.isfinite(data).all():
+            known = np.where(np.isfinite(data), np.arange(data.shape[1]), -1)
+            last = np.maximum.accumulate(known, axis=1)
+            data = np.where(last >= 0, np.take_along_axis(data, last.clip(0), axis=1), 0.0)
+        return Chunk(self.start, first, stop, data[0], data[1], data[2], data[3], missing, self._rate_hz)
+
+    def _whole(self) -> Floats:
+        if len(self._parts) > 1:
+            self._parts = [np.concatenate(self._parts, axis=1)]
+        return self._parts[0]
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        data = self._whole() if self else np.zeros((4, 0))
+        return {f"range.{name}": array for name, array in self._range.state().items()} | {
+            "data": data,
+            "start": np.array([self.start]),
+        }
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self.forget()
+        self._range.load({k.removeprefix("range."): v for k, v in state.items() if k.startswith("range.")})
+        data = np.array(state["data"], dtype=np.float64)
+        if data.size:
+            self._parts = [data]
+        self.start = int(state["start"][0])
+        self.stop = self.start + data.shape[1]

@@ -1,0 +1,201 @@
+"""From chunk to chunk: the model that the machine's responses show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import Settings
+from livebode.fitting import two_masses
+from livebode.motion.chunk import Chunk
+from livebode.motion.fit import Fit, Rows
+from livebode.motion.model import Curve, MovingModel
+from livebode.motion.residual import Residual
+from livebode.motion.standstill import turns
+from livebode.motion.steady import FLAT_M, steady_rows
+from livebode.nouns import Responses
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A model driven through a chunk: what it leaves, R/U of that, and the corrected responses (rows, lines)."""
+
+    model: MovingModel
+    left: Residual
+    seen: Responses
+    value: Complex
+
+
+Replay = Callable[[MovingModel], Replayed]
+
+_ROWS_MIN = 12
+_OVERLAP = 4  # windows of a period that go into the fit: more share their samples, and say nothing new
+_REACH = 0.25  # of the new range that may lie outside of the model's, for a start from it
+_CHECKED = 50  # positions
+_WORSE = 1.5  # misfit against the one before from which a start from the model before is doubted
+
+
+class Learner:
+    """Fits a MovingModel to each chunk, the first from a scan, the next ones from the model before.
+
+    A chunk that does not travel says nothing of the curves: after one that did, the model stays.
+    """
+
+    def __init__(self, settings: Settings, radius_m: float, splines: tuple[int, int], passes: int) -> None:
+        self._settings, self._radius_m, self._splines, self._passes = settings, radius_m, splines, passes
+        self.model: MovingModel | None = None
+        self.chunks = 0
+        self.travels = False
+        self._misfit = np.inf
+
+    @property
+    def has_travelled(self) -> bool:
+        """Whether the model knows the machine in motion."""
+        return self.model is not None and len(self.model.log_stiffness.weights) > 1
+
+    def learn(self, tracked: Responses, chunk: Chunk, replay: Replay) -> Replayed | None:
+        """The model after this chunk's steady motion; None as long as there is too little to fit."""
+        usable = self._usable(tracked)
+        steady = usable[steady_rows(tracked.sample[usable], chunk, self._settings.lines.window)]
+        if steady.size >= _ROWS_MIN:
+            self.travels = True
+            return self._learn(tracked, steady, chunk, replay)
+        self.travels = False
+        if self.model is None and usable.size >= _ROWS_MIN:
+            return self._learn(tracked, usable, chunk, replay)
+        return None if self.model is None else replay(self.model)
+
+    def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
+        """The model over all positions of the chunk, with the stiffness and damping that all responses show."""
+        rows, fit, model = self._over_all(tracked, now)
+        wide = fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
+        return wide if self._sound(wide) else now.model
+
+    def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
+        """The model fitted to all responses, for a chunk in which friction holds nowhere."""
+        rows, fit, model = self._over_all(tracked, now)
+        model = fit.refine(self._rows(tracked, rows, chunk, now), model)
+        if not self._sound(model):
+            return now
+        self.model = model
+        return replay(model)
+
+    def _over_all(self, tracked: Responses, now: Replayed) -> tuple[NDArray[np.intp], Fit, MovingModel]:
+        rows = self._thinned(tracked, self._usable(tracked))
+        at = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
+        fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
+        return rows, fit, fit.follow(now.model, float(at.min()), float(at.max()))
+
+    def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> Replayed | None:
+        rows = self._thinned(tracked, rows)
+        at = tracked.schedule[rows]
+        splines = self._splines if self.travels else (1, 1)
+        fit = self._fit(*splines)
+        best = None
+        if self.model is not None and _reaches(self.model, at, splines):
+            model = fit.follow(self.model, float(at.min()), float(at.max()))
+            best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
+        if best is None or best[1] > _WORSE * self._misfit:
+            raw = Rows(tracked.value[rows], chunk.torque(self._settings.lines, tracked.sample[rows]), at)
+            first = fit.refine(raw, fit.start(raw))
+            if self._sound(first):
+                anew = self._refined(fit, replay(first), tracked, rows, chunk, replay, self._passes - 1)
+                best = anew if best is None or anew[1] < best[1] else best
+        if best is None:
+            return None if self.model is None else replay(self.model)
+        found, self._misfit = best
+        self.model = found.model
+        self.chunks += 1
+        return found
+
+    def _refined(
+        self,
+        fit: Fit,
+        now: Replayed,
+        tracked: Responses,
+        used: NDArray[np.intp],
+        chunk: Chunk,
+        replay: Replay,
+        passes: int,
+    ) -> tuple[Replayed, float]:
+        rows = self._rows(tracked, used := self._onward(tracked, used, chunk, now), chunk, now)
+        for _ in range(passes):
+            model = fit.refine(rows, now.model)
+            if not self._sound(model):
+                break
+            now = replay(model)
+            rows = self._rows(tracked, used, chunk, now)
+        return now, fit.misfit(rows, now.model)
+
+    def _onward(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> NDArray[np.intp]:
+        """Those in whose window neither motor nor cart turns, which friction would bias; all, if few are left."""
+        where, newest = turns(now.left, chunk, chunk.start), tracked.sample[used]
+        inside = np.searchsorted(where, newest, "right") - np.searchsorted(
+            where, newest - self._settings.lines.window, "right"
+        )
+        onward = used[inside == 0]
+        return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
+
+    def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> Rows:
+        # The error of a response is n/|U|: white noise on y over the torque at the line.
+        weight = chunk.torque(self._settings.lines, tracked.sample[used])
+        value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])
+        return Rows(value, weight, tracked.schedule[used])
+
+    def _usable(self, tracked: Responses) -> NDArray[np.intp]:
+        return np.flatnonzero(tracked.valid.all(axis=1) & np.isfinite(tracked.schedule))
+
+    def _thinned(self, tracked: Responses, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The first of these rows in each quarter of a window."""
+        apart = max(self._settings.lines.window // _OVERLAP, 1)
+        return rows[np.unique(tracked.sample[rows] // apart, return_index=True)[1]]
+
+    def _sound(self, model: MovingModel) -> bool:
+        """Whether all poles are slower than the rate; else too little was in the responses to fit it."""
+        js, load, stiffness, damping = np.exp(model.parameters(np.linspace(model.low_m, model.high_m, _CHECKED))).T
+        reduced = js * load / (js + load)
+        fastest = np.maximum(np.sqrt(stiffness / reduced), damping / reduced)
+        return bool(np.all(fastest < np.pi * self._settings.lines.rate_hz))
+
+    def _fit(self, stiffness_splines: int, damping_splines: int) -> Fit:
+        lines = self._settings.lines
+        return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines)
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        head = {"count": np.array([self.chunks]), "misfit": np.array([self._misfit])}
+        if self.model is None:
+            return head
+        m = self.model
+        return head | {
+            "constants": np.array([m.inertia_kg_m2, m.load_kg, m.low_m, m.high_m]),
+            "stiffness": m.log_stiffness.weights,
+            "damping": m.log_damping.weights,
+        }
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self.chunks, self._misfit = int(state["count"][0]), float(state["misfit"][0])
+        self.model = None
+        if "constants" in state:
+            inertia, load, low, high = (float(n) for n in state["constants"])
+            curves = (Curve(low, high, np.array(state[name], dtype=np.float64)) for name in ("stiffness", "damping"))
+            self.model = MovingModel(inertia, load, self._radius_m, *curves)
+
+
+def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
+    """Whether a model has seen enough of these positions to start from."""
+    if splines != (len(model.log_stiffness.weights), len(model.log_damping.weights)):
+        return False
+    outside = max(model.low_m - at.min(), at.max() - model.high_m, 0.0)
+    return bool(outside <= max(_REACH * np.ptp(at), FLAT_M))
+
+
+def frozen(model: MovingModel, position_m: Floats, settings: Settings) -> Complex:
+    """The model's response held at these positions (the lowest it knows, where NaN), (rows, lines)."""
+    at = np.where(np.isfinite(position_m), position_m, model.low_m)
+    return two_masses.sampled(model.parameters(at), settings.lines.z, settings.lines.rate_hz)

@@ -1,0 +1,141 @@
+"""Where dry friction holds an axis that stands or reverses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import Settings
+from livebode.motion.chunk import Chunk
+from livebode.motion.residual import Residual
+from livebode.motion.steady import steady_rows
+from livebode.nouns import Event, Responses
+
+Floats = NDArray[np.float64]
+
+_UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
+_DRAG = 0.01  # of the torque's amplitude at the lines, rms; friction that small cannot leave the share above
+_SLOW = 0.05  # of the largest speed: friction at its bend
+_LONGEST = 4  # windows that are judged together
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples `first` to `last` in which motor or cart stand or reverse; `unexplained`: share of the output, rms."""
+
+    first: int
+    last: int
+    unexplained: float
+
+
+class Standstill:
+    """Finds the stretches in which the axis does not answer as the model that was fitted to its motion.
+
+    Coulomb friction is a constant torque while motor and cart keep their direction, and no line sees it. Where one of
+    them stands or reverses, it is not. Such stretches are judged by how much of the output's power at the lines
+    a belt on the masses known from the motion leaves, beyond what is left elsewhere (the noise): more than 3 % in
+    amplitude is friction, where steady motion has shown that there is a drag. Masses that really changed while an axis
+    with drag stood would look the same.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._window = settings.lines.window
+        self._noise = 0.0  # Σ|R|² over the lines where the axis moves
+        self._drag = np.inf  # mean torque along a steady motion; unknown, it may be any
+        self._until = -1  # end of the last stretch in which it was held
+        self._events: list[Event] = []
+
+    def stretches(self, left: Residual, chunk: Chunk) -> list[tuple[int, int]]:
+        """Numbers of the first and last sample of stretches with changes of sign less than a window apart.
+
+        None is longer than four windows, so that each speaks for one place.
+        """
+        where = turns(left, chunk, max(chunk.first - self._window + 1, chunk.start))
+        apart = (np.diff(where) >= self._window) | (np.diff(where // (_LONGEST * self._window)) > 0)
+        groups = np.split(where, 1 + np.flatnonzero(apart))
+        return [(int(group[0]), int(group[-1])) for group in groups if group.size]
+
+    def tail(self, chunk: Chunk) -> list[Stretch]:
+        """The end of a stretch that the chunk before found held, if it reaches into this one."""
+        reaches = self._until >= 0 and self._until + 2 * self._window > chunk.first
+        return [Stretch(self._until, self._until, 0.0)] if reaches else []
+
+    def held(
+        self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
+    ) -> list[Stretch]:
+        """Those of the stretches in which friction holds.
+
+        `seen` is R/U with a model whose belt fits here too, `inertia_kg_m2` what the motor moves in all.
+        """
+        rows = np.flatnonzero(tracked.valid.all(axis=1))
+        rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
+        torque = chunk.torque(self._settings.lines, tracked.sample[rows])
+        rest = np.sum(np.abs(seen.value[rows] * torque) ** 2, axis=1)
+        output = np.sum(np.abs(tracked.value[rows] * torque) ** 2, axis=1)
+        newest = tracked.sample[rows]
+        touches = [(newest >= first) & (newest - self._window < last) for first, last in found]
+        moving = ~np.any(touches, axis=0) & np.isfinite(rest)
+        if moving.any():
+            self._noise = float(np.median(rest[moving]))
+        steady = steady_rows(newest, chunk, self._window)
+        if steady.any():
+            self._drag = float(np.abs(np.mean(chunk.drag(self._window, newest[steady], inertia_kg_m2))))
+        # |U| of a sine of amplitude a over N samples is N·a/2.
+        amplitude = np.sqrt(2 * np.mean(np.sum(torque**2, axis=1))) / self._window
+        dragged = self._drag > _DRAG * amplitude
+        done = []
+        for (first, last), touch in zip(found, touches):
+            goes_on = self._until >= 0 and first - self._until < self._window
+            rest_of_one = goes_on and last - first < self._window
+            at = touch & np.isfinite(rest)
+            excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
+            stretch = Stretch(first, last, float(np.sqrt(excess)))
+            if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
+                if not goes_on:
+                    self._say(stretch, tracked)
+                self._until = last
+                done.append(stretch)
+        return done
+
+    def drain(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def _say(self, stretch: Stretch, tracked: Responses) -> None:
+        lines = self._settings.lines
+        newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
+        time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
+        message = (
+            f"dry friction holds the axis, which stands or reverses: {100 * stretch.unexplained:.0f} % of its output "
+            "is not as in motion; responses are invalid until it has moved for two windows"
+        )
+        self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"noise": np.array([self._noise, self._drag]), "until": np.array([self._until])}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._noise, self._drag = (float(n) for n in state["noise"])
+        self._until = int(state["until"][0])
+        self._events = []
+
+
+def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
+    """Numbers of the samples, from `first` on, at which motor or cart changes its direction, or all but stands."""
+    at, end = first - chunk.start, chunk.stop - chunk.start
+    changes = np.zeros(max(end - at - 1, 0), dtype=np.bool_)
+    for velocity in (chunk.y[at:end], left.cart[at:end]):
+        forward, speed = velocity > 0, np.abs(velocity)
+        changes |= (forward[1:] != forward[:-1]) | (speed[1:] < _SLOW * np.max(speed, initial=0.0))
+    return np.asarray(first + 1 + np.flatnonzero(changes), dtype=np.int64)
+
+
+def without(velocity: Floats, held: list[Stretch], chunk: Chunk, window: int) -> Floats:
+    """The residual with NaN where friction holds and a window to either side: its drift has a kink there."""
+    left = velocity.copy()
+    for stretch in held:
+        left[max(stretch.first - window - chunk.start, 0) : max(stretch.last + window + 1 - chunk.start, 0)] = np.nan
+    return left

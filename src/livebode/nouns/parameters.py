@@ -1,0 +1,137 @@
+"""Parameters: what a model fitted to Responses says of the machine, with its covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns.errors import InputError
+
+Floats = NDArray[np.float64]
+
+OK = "ok"
+"""The status of a row that holds numbers; any other is the reason why it holds NaN."""
+
+_PER_ROW = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
+_STEP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Parameters of one model in a row, one for each Response that it was fitted to. Immutable.
+
+    Attributes
+    ----------
+    model
+        Name of the model.
+    names, units
+        Of the parameters, in the order of the columns.
+    value
+        Shape (rows, parameters); NaN where `status` is not "ok".
+    covariance
+        Shape (rows, parameters, parameters), of noise and, by `epsilon`, of what the model lacks; a parameter that was
+        held fixed has zeros.
+    status
+        Shape (rows,): "ok", or in a few stable words why there are no numbers.
+    epsilon
+        Shape (rows,): the model's share of the error that was taken in, |error of the model| = ε·|G| at a line.
+    chi2, dof
+        Shape (rows,): weighted sum of squared residuals by sigma alone, and what it would be for a true model.
+    sample, time_s, schedule
+        Those of the Response: its newest sample, the moment it speaks for, the scheduling signal there.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    value: Floats
+    covariance: Floats
+    status: NDArray[np.str_]
+    epsilon: Floats
+    chi2: Floats
+    dof: Floats
+    sample: NDArray[np.int64]
+    time_s: Floats
+    schedule: Floats
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    @overload
+    def __getitem__(self, at: str) -> Floats: ...
+    @overload
+    def __getitem__(self, at: slice | NDArray[Any]) -> Parameters: ...
+    def __getitem__(self, at: str | slice | NDArray[Any]) -> Floats | Parameters:
+        """The values of one parameter by its name, shape (rows,); or some of the rows."""
+        if isinstance(at, str):
+            return np.asarray(self.value[:, self.index(at)])
+        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
+        return replace(self, **rows)
+
+    def index(self, name: str) -> int:
+        """Column of a parameter; InputError with the known names where it is not there."""
+        if name not in self.names:
+            raise InputError(f"the model {self.model!r} has no parameter {name!r}; it has {', '.join(self.names)}")
+        return self.names.index(name)
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Rows that hold numbers, shape (rows,)."""
+        return np.asarray(self.status == OK)
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviation of each parameter, shape (rows, parameters)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(np.einsum("rii->ri", self.covariance)))
+
+    def bound(self, probability: float = 0.95) -> Floats:
+        """Half-width of the interval that holds the truth with this probability, shape (rows, parameters).
+
+        Of a normal error: 1.96 sigma for 95 %. It holds for noise and for what `epsilon` allows; a model that is
+        wrong in the same way in every response stays wrong by the same amount (docs/fits.md).
+
+        Raises
+        ------
+        InputError
+            If the probability is not between 0 and 1.
+        """
+        if not 0 < probability < 1:
+            raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
+        from scipy.special import ndtri
+
+        return np.asarray(self.sigma * float(ndtri(0.5 + probability / 2)))
+
+    def derived(self, names: Sequence[str], units: Sequence[str], of: Callable[[Floats], Floats]) -> Parameters:
+        """Quantities that follow from these, with their covariance by linear propagation.
+
+        `of` takes values (…, parameters) to derived ones (…, names). Slopes are central differences.
+        """
+        n, shape = self.value.shape[1], (len(self), len(names))
+        value, covariance = np.full(shape, np.nan), np.full((*shape, len(names)), np.nan)
+        if (ok := self.ok).any():
+            at, sigma = self.value[ok], self.sigma[ok]
+            moving = np.flatnonzero((sigma > 0).any(axis=0))  # those that are held move nothing
+            # Of a parameter near zero, sigma says what a small step is.
+            size = _STEP * np.maximum(np.abs(at), sigma)[:, moving]
+            steps = size[..., np.newaxis] * np.eye(n)[moving]
+            both = of(at[:, np.newaxis] + steps), of(at[:, np.newaxis] - steps)
+            slope = (both[0] - both[1]) / (2 * size[..., np.newaxis])
+            value[ok] = of(at)
+            covariance[ok] = slope.swapaxes(1, 2) @ self.covariance[ok][:, moving[:, np.newaxis], moving] @ slope
+        return replace(self, names=tuple(names), units=tuple(units), value=value, covariance=covariance)
+
+    @classmethod
+    def join(cls, parts: Sequence[Parameters]) -> Parameters:
+        """Parts of one run, in order, as one; InputError where they are of different models."""
+        if not parts:
+            raise InputError("there are no parameters to join; give at least one part")
+        head = parts[0]
+        if any((p.model, p.names, p.units) != (head.model, head.names, head.units) for p in parts):
+            raise InputError("parameters of different models cannot be joined; fit one model")
+        rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _PER_ROW}
+        return replace(head, **rows)

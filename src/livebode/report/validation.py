@@ -1,0 +1,90 @@
+"""The picture of a validation: measured and simulated output, and the residual's correlations with their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from livebode.report.pictures import save
+from livebode.report.style import Style, drawing, heading, new_figure, plain, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from livebode.validation import Correlation, Validation
+
+_SHOWN = 600  # samples of the output
+_SMALL = 0.15  # livebode.validation.SMALL, which takes SciPy's statistics to import
+
+
+def save_validation_picture(
+    found: Sequence[Validation], directory: str | PathLike[str], *, title: str = "", dark: bool = False
+) -> Path:
+    """Write validation.png into an existing directory."""
+    return save(validation_figure(found, title=title, dark=dark), Path(directory) / "validation.png", style(dark))
+
+
+def validation_figure(found: Sequence[Validation], *, title: str = "", dark: bool = False) -> Figure:
+    """A row for each model: the last samples of the output, and the correlations over the lags.
+
+    The band holds 97 % of what chance makes at a lag, the thin lines are 2.17/√L and 0.15. Lags that cannot tell a
+    wrong model are thin.
+    """
+    look = style(dark)
+    columns = 1 + max(len(v.correlations) for v in found)
+    with drawing(look):
+        figure = new_figure(3.4 * columns + 1.2, 1.3 + 2.5 * len(found))
+        height = figure.get_size_inches()[1]
+        grid = figure.add_gridspec(
+            len(found), columns, width_ratios=[1.5, *[1.0] * (columns - 1)], left=0.7 / figure.get_size_inches()[0],
+            right=0.985, top=1 - 1.2 / height, bottom=0.55 / height, hspace=0.45, wspace=0.28,
+        )  # fmt: skip
+        facts = f"{found[0].samples} samples · band: 97 % of chance at each lag · dashed: 2.17/√L · dotted: {_SMALL}"
+        heading(figure, look, title or "Validation", facts, 0.7 / figure.get_size_inches()[0])
+        for row, one in enumerate(found):
+            last = row == len(found) - 1
+            _output(figure.add_subplot(grid[row, 0]), look, one, last)
+            for column, c in enumerate(one.correlations, 1):
+                _correlation(figure.add_subplot(grid[row, column]), look, c, c.name in one.judged_by, last)
+    return figure
+
+
+def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
+    shown = slice(max(0, found.samples - _SHOWN), found.samples)
+    at = np.arange(found.samples)[shown]
+    axes.plot(at, found.measured[shown], color=look.newest, linewidth=0.9, label="measured")
+    axes.plot(at, found.simulated.output[shown], color=look.run, linewidth=1.3, label="ŷ, simulated")
+    axes.set_title(
+        f"{found.model}: {found.verdict}, fit {found.fit_percent:.1f} %", loc="left", size=10, color=look.ink
+    )
+    axes.set_ylabel("output")
+    if last:
+        axes.set_xlabel("sample")
+    axes.legend(loc="upper right", ncols=2, borderpad=0.2)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.22 * (high - low))
+    plain(axes)
+
+
+def _correlation(axes: Axes, look: Style, c: Correlation, counts: bool, last: bool) -> None:
+    axes.fill_between(c.lags, -c.limit, c.limit, color=look.run, alpha=0.2, linewidth=0)
+    for level, dashes in ((c.white_limit, (4, 2)), (_SMALL, (1, 2))):
+        for sign in (-1, 1):
+            axes.axhline(sign * level, color=look.muted, linewidth=0.9, dashes=dashes)
+    axes.vlines(
+        c.lags, 0, c.value, color=np.where(c.judged, look.run, look.muted), linewidth=np.where(c.judged, 1.6, 0.6)
+    )
+    outside = c.judged & (np.abs(c.value) > c.limit)
+    axes.plot(c.lags[outside], c.value[outside], "o", markersize=3, color=look.newest)
+    reach = 1.15 * max(_SMALL, float(np.max(np.abs(c.value))), float(np.max(c.limit)))
+    axes.set_ylim(-reach, reach)
+    share = f"{100 * c.share:.0f} % inside" if counts else "does not count"
+    axes.set_title(f"ε with {c.name}: {share}", loc="left", size=10, color=look.ink)
+    if last:
+        axes.set_xlabel("lag in samples")
+    plain(axes)

@@ -1,0 +1,150 @@
+"""A model fitted to every response of a run, or to a run that was made."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
+from livebode.nouns import Event, Loop, Parameters, Response, Responses
+from livebode.records import Run
+from livebode.session.axis import FitSection
+from livebode.session.live_margins import live_margins
+
+_ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
+_POSITIONS = ("rad", "m", "deg", "mm")
+
+
+class Out(Protocol):
+    """Where parameters and events go: a RunDirectory, or a SegmentedRun."""
+
+    def write_parameters(self, *parts: Parameters) -> None: ...
+
+    def write_event(self, event: Event) -> None: ...
+
+
+class Fits:
+    """The fits of one run, and the margins of a known loop around them: into its directory, and what they came to.
+
+    The model is chosen at the first responses, whose unit tells it where the configuration does not.
+    """
+
+    def __init__(self, section: FitSection, loop: Loop | None = None) -> None:
+        self.section, self.loop = section, loop
+        self._fitter: Fitter | None = None
+        self._counts: dict[str, int] = {}
+        self._newest: Parameters | None = None
+
+    def take(self, responses: Responses, out: Out) -> None:
+        """Fit a batch, and write its parameters and events."""
+        fitter = self._fitter or self._begin(responses.unit)
+        found = fitter.process(responses)
+        around = () if self.loop is None else live_margins(found, fitter, self.loop)
+        out.write_parameters(found, fitter.derived(found), *around)
+        for event in fitter.drain_events():
+            out.write_event(event)
+        for word, count in zip(*np.unique(found.status, return_counts=True)):
+            self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
+        good = np.flatnonzero(found.ok)
+        if good.size:
+            self._newest = found[good[-1:]]
+
+    def snapshot(self) -> bytes:
+        """All that the next fit depends on as bytes; see `restore`."""
+        if self._fitter is None:
+            return b""
+        newest = None if self._newest is None else {name: getattr(self._newest, name).tolist() for name in _ROWS}
+        state = {"unit": self._unit, "counts": self._counts, "newest": newest}
+        return json.dumps(state).encode() + b"\n" + self._fitter.snapshot()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot."""
+        if not snapshot:
+            return
+        head, _, own = snapshot.partition(b"\n")
+        state = json.loads(head)
+        fitter = self._begin(state["unit"])
+        fitter.restore(own)
+        self._counts = state["counts"]
+        if state["newest"] is not None:
+            rows = {name: np.array(values) for name, values in state["newest"].items()}
+            self._newest = Parameters(fitter.model.name, fitter.names, fitter.model.units, **rows)
+
+    def _begin(self, unit: str) -> Fitter:
+        self._unit = unit
+        self._fitter = Fitter(chosen_model(self.section, unit), **_settings(self.section))
+        return self._fitter
+
+    def newest(self) -> Fit | None:
+        """The newest fit that holds."""
+        if self._fitter is None or self._newest is None:
+            return None
+        return fit_of(self._fitter, self._newest)
+
+    def summary(self) -> dict[str, Any]:
+        """For run.json: the model, how often each status was, and the newest fit that holds."""
+        newest = self.newest()
+        return {
+            "model": self._fitter.model.name if self._fitter else None,
+            "statuses": self._counts,
+            "newest": None if newest is None else plain_fit(newest),
+        }
+
+
+def chosen_model(section: FitSection, unit: str) -> PhysicalModel:
+    """The section's model; "auto" is two masses where the input is a torque, else two masses behind an unknown gain."""
+    name = section.model
+    if name == "auto":
+        name = "two-mass" if unit.endswith("/(N m)") or section.radius_m else "two-mass-gain"
+    output = section.output
+    if output == "auto":
+        output = "position" if unit.split("/(")[0] in _POSITIONS else "velocity"
+    options = {"side": section.side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    return model_named(name, output=output, **options)
+
+
+def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
+    """A model fitted to a run that was made, and in words to what of it.
+
+    Of a run that averages, the newest valid response; of another the mean of all. Where neither configuration nor unit
+    say whether the output is a velocity or a position, the one that lacks less of the response is taken.
+    """
+    run = Run.open(directory)
+    responses = run.responses()
+    valid = np.flatnonzero(responses.valid.any(axis=1))
+    chosen: Response | Responses = responses
+    words = f"the mean of {valid.size} responses"
+    if valid.size and run.summary.get("configuration", {}).get("tracking", {}).get("average"):
+        chosen = responses[int(valid[-1])]
+        words = f"the average up to {chosen.time_s:.6g} s"
+    sections = [section]
+    if section.output == "auto" and not responses.unit:
+        sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
+    found = [fit(chosen, chosen_model(s, responses.unit), **_settings(s)) for s in sections]
+    return min(found, key=lambda f: f.epsilon if f.status == "ok" else np.inf), words
+
+
+def plain_fit(found: Fit) -> dict[str, Any]:
+    """One fit as plain data."""
+    quantities = {name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()}
+    return {
+        "model": found.model.name,
+        "status": found.status,
+        "message": found.sentence,
+        "time_s": float(found.parameters.time_s[0]),
+        "schedule": float(found.parameters.schedule[0]),
+        "band_hz": list(found.band_hz),
+        "lines": found.lines,
+        "epsilon": found.epsilon,
+        "reduced_chi2": found.chi2,
+        "held": found.held,
+        "quantities": quantities,
+    }
+
+
+def _settings(section: FitSection) -> dict[str, Any]:
+    band = None if section.band_hz is None else (section.band_hz[0], section.band_hz[1])
+    return {"fixed": section.fixed, "free": section.free, "band_hz": band, "hold": section.hold}

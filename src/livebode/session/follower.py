@@ -1,0 +1,36 @@
+"""What a run is followed by."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from numpy import float64
+from numpy.typing import NDArray
+
+from livebode.estimation import Settings
+from livebode.nouns import Block, Event, Responses
+
+
+class Follower(Protocol):
+    """What turns the samples of a run into responses: a Tracker, or a MotionCorrection, which holds some back."""
+
+    settings: Settings
+
+    @property
+    def counts(self) -> dict[str, int]: ...
+
+    def found(self) -> dict[str, Any]: ...
+
+    def process(self, block: Block) -> Responses: ...
+
+    def finish(self) -> Responses | None: ...
+
+    def drain_events(self) -> list[Event]: ...
+
+    def excitation_power(self) -> NDArray[float64]: ...
+
+    def repeatability(self) -> NDArray[float64]: ...
+
+    def snapshot(self) -> bytes: ...
+
+    def restore(self, snapshot: bytes) -> None: ...

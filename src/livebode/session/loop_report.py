@@ -1,0 +1,142 @@
+"""The loop of a run: its margins, over its places, and what would widen them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.fitting import Fit, Fitter, mean_response
+from livebode.margins import Margins, OpenLoop, Tuning, margins, peak_sensitivity_at_lines, tuning, worst
+from livebode.nouns import InputError, Loop, Responses
+from livebode.records import Run
+from livebode.session.axis import Axis, FitSection, LoopSection
+from livebode.session.fits import fit_run
+from livebode.session.said import said
+
+_PLACES = 12
+_PER_ROW = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
+
+
+@dataclass(frozen=True, eq=False)
+class LoopReport:
+    """What a run says of its loop.
+
+    Attributes
+    ----------
+    fit, of
+        The fitted plant, and in words what it was fitted to.
+    loop
+        The open loop around it.
+    margins
+        One row, of `fit`.
+    at_lines
+        Largest |S| at a line with its bound, and that line in Hz: what is known without a model.
+    places
+        Margins over the schedule, for a run that has one; else the same as `margins`.
+    tuning
+        What is proposed, judged over the places.
+    responses
+        What was measured, one row.
+    """
+
+    fit: Fit
+    of: str
+    loop: OpenLoop
+    margins: Margins
+    at_lines: tuple[float, float, float]
+    places: Margins
+    tuning: Tuning
+    responses: Responses
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        bound = self.margins.bound()[0]
+        found = {
+            name: {
+                "value": float(self.margins.value[0, i]),
+                "bound_95": float(bound[i]),
+                "unit": self.margins.units[i],
+                "frequency_hz": float(self.margins.frequency_hz[0, i]),
+                "place": str(self.margins.place[0, i]),
+            }
+            for i, name in enumerate(self.margins.names)
+        }
+        size, around, at_hz = self.at_lines
+        return {
+            "fitted_to": self.of,
+            "model": self.fit.model.name,
+            "status": str(self.margins.status[0]),
+            "margins": found,
+            "peak_sensitivity_at_lines": {"at_least": size, "bound": around, "frequency_hz": at_hz},
+            "places": len(self.places),
+            "worst_over_places": worst(self.places),
+            "tuning": self.tuning.plain(),
+        }
+
+
+def loop_of_run(
+    directory: Path, section: FitSection | None = None, axis: Axis | None = None, peak_sensitivity: float = 2.0
+) -> LoopReport:
+    """The report of a run that was made; its configuration says loop and model where `axis` and `section` do not.
+
+    Raises
+    ------
+    InputError
+        If nobody says what feeds back, or no model could be fitted.
+    """
+    run = Run.open(directory)
+    responses, own_words = run.responses(), said(run.summary)
+    loop = axis.loop if axis is not None else LoopSection.model_validate(own_words.get("loop", {}))
+    if section is None:
+        own = axis.fit if axis is not None else None
+        section = own or FitSection.model_validate(own_words.get("fit", {}))
+    found, words = fit_run(directory, section)
+    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), section, peak_sensitivity)
+
+
+def loop_report(
+    fit: Fit, words: str, responses: Responses, loop: Loop, section: FitSection, peak_sensitivity: float = 2.0
+) -> LoopReport:
+    """The report of a fit, and of the responses that it is of."""
+    if fit.status != "ok":
+        raise InputError(f"margins need a fit, and there is none: {fit.sentence}")
+    around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
+    fits = fit.parameters
+    mean = mean_response(responses)
+    if len(places := _by_place(responses)) > 1:
+        over = Fitter(fit.model, fixed=section.fixed, free=section.free, band_hz=fit.band_hz, hold=fit.hold).process(
+            places
+        )
+        fits = over if over.ok.sum() > len(places) // 2 else fits
+    controller_rate_hz = getattr(getattr(loop.feedback, "velocity", loop.feedback), "rate_hz", None)
+    return LoopReport(
+        fit=fit,
+        of=words,
+        loop=around,
+        margins=margins(fit.parameters, around, fit.band_hz),
+        at_lines=tuple(float(x[0]) for x in peak_sensitivity_at_lines(mean, loop)),  # type: ignore[arg-type]
+        places=margins(fits, around, fit.band_hz),
+        tuning=tuning(
+            fits, around, fit.band_hz, controller_rate_hz=controller_rate_hz, peak_sensitivity=peak_sensitivity
+        ),
+        responses=mean,
+    )
+
+
+def _by_place(responses: Responses) -> Responses:
+    """The mean response at each of a dozen places of the schedule; one row where there is no schedule."""
+    use = np.flatnonzero(responses.valid.all(axis=1) & np.isfinite(responses.schedule))
+    if not use.size:
+        return mean_response(responses)
+    at = responses.schedule[use]
+    edges = np.linspace(at.min(), at.max(), _PLACES + 1)
+    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, _PLACES - 1)
+    groups = [use[place == i] for i in range(_PLACES)]
+    return Responses.join([mean_response(_rows(responses, group)) for group in groups if group.size])
+
+
+def _rows(responses: Responses, rows: np.ndarray) -> Responses:
+    return replace(responses, **{name: getattr(responses, name)[rows] for name in _PER_ROW})

@@ -1,0 +1,72 @@
+"""A run's fitted model judged on another recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from livebode.nouns import Block, InputError
+from livebode.records import Run
+from livebode.session.axis import Axis, FitSection
+from livebode.session.fits import fit_run
+from livebode.session.said import said
+from livebode.sources import open_log
+from livebode.validation import Validation, validate
+
+
+def validate_run(
+    directory: Path, log: Path, sections: list[FitSection], *, lags: int = 40, samples: int | None = None
+) -> tuple[list[Validation], list[str]]:
+    """One verdict for each section's model, all on the same samples of `log`; and why others could not be judged.
+
+    Channels, rate and loop are those of the run's configuration. Of a recording with gaps or samples that are not
+    finite the longest clean stretch is taken; of that the last `samples`, where the start has rung out.
+
+    Raises
+    ------
+    InputError
+        If the recording lacks a channel or has no stretch that is long enough, or no model could be fitted.
+    """
+    own_words = said(Run.open(directory).summary)
+    if "signals" not in own_words:
+        raise InputError(f"{str(directory)!r} does not say which channels it was made of; make it with `livebode run`")
+    axis = Axis.of({key: own_words[key] for key in ("source", "signals", "loop") if key in own_words}, str(directory))
+    signals = axis.signals
+    if signals.input is None:
+        raise InputError("the run names no plant input u, which a model is driven by; run again with --input CHANNEL")
+    names = [signals.input, signals.output, *([signals.excitation] if signals.excitation else [])]
+    block = clean_stretch(log, axis, names)
+    if samples is not None:
+        if samples > len(block):
+            raise InputError(f"{samples=} is more than the {len(block)} clean ones in a row; take fewer")
+        block = block.cut(len(block) - samples, len(block))
+    loop = axis.loop.build(block.rate_hz)
+    roles = {"input": signals.input, "output": signals.output, "excitation": signals.excitation}
+    fits = [fit_run(directory, section)[0] for section in sections]
+    judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
+    refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
+    if not judged:
+        raise InputError("; ".join(refused))
+    return judged, refused
+
+
+def clean_stretch(log: Path, axis: Axis, names: list[str]) -> Block:
+    """The longest stretch of a recording without a gap and with finite samples only."""
+    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    best: list[Block] = []
+    now: list[Block] = []
+    for block in opened.blocks(names):
+        broken = ~np.isfinite(block.data).all(axis=0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[1], broken, [1]])))
+        for first, last in zip(edges[::2], edges[1::2]):
+            if first > 0 or block.gap or not now or now[-1].stop != block.start:
+                now = []
+            now.append(block.cut(int(first), int(last)))
+            if sum(map(len, now)) > sum(map(len, best)):
+                best = list(now)
+            if last < len(block):
+                now = []
+    if not best:
+        raise InputError(f"{str(log)!r} holds no finite sample of {', '.join(names)}; choose another recording")
+    return Block(np.concatenate([b.data for b in best], axis=1), best[0].channels, best[0].rate_hz, best[0].start)

@@ -1,0 +1,6 @@
+"""Fitted models judged on fresh data."""
+
+from livebode.validation.correlation import LIMIT, SMALL, Correlation
+from livebode.validation.validate import Validation, validate
+
+__all__ = ["LIMIT", "SMALL", "Correlation", "Validation", "validate"]

@@ -1,0 +1,201 @@
+"""A fitted model judged on fresh data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting import Fit
+from livebode.nouns import Block, InputError, Loop
+from livebode.validation.correlation import SMALL, Correlation, correlation, own_correlation
+from livebode.validation.simulate import Simulated, simulate
+
+Floats = NDArray[np.float64]
+Verdict = Literal["passes", "small error", "fails"]
+
+_ALPHA = 0.03  # the other side of 97 %
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """What fresh data say of one model.
+
+    Attributes
+    ----------
+    model
+        Its name.
+    samples
+        L, how many samples were used.
+    fit_percent
+        100·(1 − |ε|/|y|), norms over the samples, without start, offset and drift in either.
+    residual_sigma
+        Root mean square of ε, unit of the output.
+    whiteness
+        Probability that a white residual's autocorrelation is as large (Ljung–Box over the same lags).
+    correlations
+        With u, ŷ and, where the excitation is known, w.
+    judged_by
+        Names of the correlations that count for the verdict.
+    simulated, measured
+        For the picture.
+    """
+
+    model: str
+    samples: int
+    fit_percent: float
+    residual_sigma: float
+    whiteness: float
+    correlations: tuple[Correlation, ...]
+    judged_by: tuple[str, ...]
+    simulated: Simulated
+    measured: Floats
+
+    @property
+    def verdict(self) -> Verdict:
+        """ "passes": no correlation that chance would not make; "small error": one, but below 0.15; else "fails"."""
+        counted = self._counted
+        if all(c.p >= _ALPHA / len(counted) for c in counted):
+            return "passes"
+        return "small error" if all(c.largest < SMALL for c in counted) else "fails"
+
+    @property
+    def sentence(self) -> str:
+        """The verdict for people."""
+        shares = ", ".join(f"{c.name} {100 * c.share:.0f} %" for c in self._counted)
+        rest = {
+            "passes": "what is left has nothing to do with the signals",
+            "small error": f"the model misses something, but less than {SMALL}",
+            "fails": "what is left follows the signals: the model lacks something or is of another machine",
+        }[self.verdict]
+        found = f"{self.model} {self.verdict}: {rest} (lags inside: {shares}; fit {self.fit_percent:.1f} %)"
+        if self.doubtful and self.verdict != "passes":
+            found += "; in a loop the colour of the noise alone may do that: name the excitation to be sure"
+        return found
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether u and ŷ had to judge a residual that is not white: in a loop they may then fail a true model."""
+        return self.whiteness < _ALPHA and "w" not in self.judged_by
+
+    @property
+    def _counted(self) -> list[Correlation]:
+        return [c for c in self.correlations if c.name in self.judged_by]
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "model": self.model,
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "samples": self.samples,
+            "fit_percent": self.fit_percent,
+            "residual_sigma": self.residual_sigma,
+            "whiteness_p": self.whiteness,
+            "doubtful": self.doubtful,
+            "judged_by": list(self.judged_by),
+            "correlations": [
+                {
+                    "with": c.name,
+                    "inside": c.share,
+                    "inside_white_limit": c.white_share,
+                    "white_limit": c.white_limit,
+                    "largest": c.largest,
+                    "p": c.p,
+                    "lags": c.lags.tolist(),
+                    "value": c.value.tolist(),
+                    "limit": c.limit.tolist(),
+                    "judged": c.judged.tolist(),
+                }
+                for c in self.correlations
+            ],
+        }
+
+
+def validate(
+    fit: Fit,
+    block: Block,
+    *,
+    input: str,
+    output: str,
+    excitation: str | None = None,
+    loop: Loop | None = None,
+    lags: int = 40,
+) -> Validation:
+    """Judge a fit by samples that it was not made from.
+
+    The model is driven by the recorded u; the residual ε = y − ŷ is correlated with u, with ŷ and, where it is known,
+    with the excitation w. In a loop u and ŷ carry the noise of before: they are correlated with ε at lags at which ε
+    comes first, in every healthy loop, and where ε is not white at the others too. So with u and ŷ only lags from 1 on
+    are judged; the excitation knows nothing of the noise, and all its lags are.
+
+    A white residual is judged by u, ŷ and w, one that is not by w alone where it is known.
+
+    Bias: parameters of a machine that moves or changes during `block` are no constants, and the verdict is then of
+    their mean.
+
+    Parameters
+    ----------
+    fit
+        Of other data; its covariance widens the limits.
+    block
+        Fresh samples, without gaps and numbers that are not finite.
+    input, output, excitation
+        Names of its channels.
+    loop
+        For the ticks between the signals' logging; the normal record by default.
+    lags
+        How far, on both sides.
+
+    Raises
+    ------
+    InputError
+        If the block's rate is not the fit's, it is too short or not finite, or the fit failed.
+    """
+    if abs(block.rate_hz / fit.rate_hz - 1) > 1e-6:
+        raise InputError(f"the model is of {fit.rate_hz:g} Hz and the recording has {block.rate_hz:g} Hz; record alike")
+    loop = loop or Loop()
+    roles = {"input": input, "output": output} | ({"excitation": excitation} if excitation else {})
+    signals = _aligned({role: block[name] for role, name in roles.items()}, loop)
+    count = len(signals["input"])
+    if count < 10 * lags or not all(np.isfinite(x).all() for x in signals.values()):
+        raise InputError(f"{count} samples with {lags} lags: give at least {10 * lags} finite ones in a row")
+    found = simulate(fit, signals["input"], signals["output"])
+    matrix = _correlated(fit)
+    given = [("u", signals["input"], 1), ("ŷ", found.output, 1)]
+    if excitation:
+        given.append(("w", signals["excitation"], -lags))
+    correlations = tuple(
+        correlation(name, found.residual, found.without(x), lags, found.slopes, matrix, first)
+        for name, x, first in given
+    )
+    _, whiteness = own_correlation(found.residual, lags)
+    by = ("w",) if excitation and whiteness < _ALPHA else tuple(c.name for c in correlations)
+    return Validation(
+        model=fit.model.name,
+        samples=count,
+        fit_percent=100
+        * (1 - float(np.linalg.norm(found.residual) / np.linalg.norm(found.without(signals["output"])))),
+        residual_sigma=float(np.sqrt(np.mean(found.residual**2))),
+        whiteness=whiteness,
+        correlations=correlations,
+        judged_by=by,
+        simulated=found,
+        measured=signals["output"],
+    )
+
+
+def _aligned(signals: dict[str, Floats], loop: Loop) -> dict[str, Floats]:
+    """So that all samples with one index speak of one tick."""
+    ahead = {role: loop.advance_ticks(role) for role in signals}  # type: ignore[arg-type]
+    least, most = min(ahead.values()), max(ahead.values())
+    return {role: x[ahead[role] - least : len(x) - (most - ahead[role])] for role, x in signals.items()}
+
+
+def _correlated(fit: Fit) -> Floats:
+    """Correlation matrix of the fit's parameters, nought for those that were held."""
+    sigma = fit.parameters.sigma[0]
+    unit = np.where(sigma > 0, sigma, 1.0)
+    return np.asarray(fit.parameters.covariance[0] / np.outer(unit, unit))

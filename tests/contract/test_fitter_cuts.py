@@ -1,0 +1,112 @@
+"""A Fitter gives the same however its responses arrive, after a snapshot, and says what cannot be."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
+from livebode.nouns import InputError, Lines, Parameters, Responses
+from tests.truth.test_fits import LINES, TRUTH, noisy
+
+BELT = TwoMass(radius_m=0.019)
+ROWS = 70
+
+
+def run() -> Responses:
+    """A wandering stiffness, with some rows that hold nothing."""
+    grid = Grid.of(LINES)
+    values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
+    values[:, 2] *= np.linspace(1.0, 1.4, ROWS)
+    found = noisy(BELT.at(values, grid), LINES, 0.01, ROWS)
+    value = found.value.copy()
+    value[30:34] = np.nan
+    value[50] = 1.0
+    return Responses(**{**vars(found), "value": value, "valid": np.isfinite(value)})
+
+
+def same(one: Parameters, other: Parameters) -> None:
+    assert list(one.status) == list(other.status)
+    assert np.allclose(one.value, other.value, rtol=1e-6, equal_nan=True)
+    assert np.allclose(one.sigma, other.sigma, rtol=1e-6, equal_nan=True)
+    assert np.allclose(one.epsilon, other.epsilon, rtol=1e-6, atol=1e-9, equal_nan=True)
+
+
+@given(st.lists(st.integers(1, 40), max_size=12))
+@settings(max_examples=6, deadline=None)
+def test_any_way_of_cutting_gives_the_same(cuts: list[int]) -> None:
+    every = run()
+    whole = Fitter(BELT)
+    expected = whole.process(every)
+    edges = [0, *np.minimum(np.cumsum(cuts, dtype=int), ROWS).tolist(), ROWS]
+    fitter = Fitter(BELT)
+    parts = [fitter.process(every[a:b]) for a, b in pairwise(edges)]
+    same(Parameters.join(parts), expected)
+    assert [e.kind for e in fitter.drain_events()] == [e.kind for e in whole.drain_events()]
+
+
+def test_a_resumed_fitter_equals_one_that_went_on() -> None:
+    every = run()
+    expected = Fitter(BELT).process(every)
+    first = Fitter(BELT)
+    head = first.process(every[:37])
+    second = Fitter(BELT)
+    second.restore(first.snapshot())
+    same(Parameters.join([head, second.process(every[37:])]), expected)
+    with pytest.raises(InputError, match="other settings"):
+        Fitter(BELT, free=["delay"]).restore(first.snapshot())
+    with pytest.raises(InputError, match="damaged"):
+        second.restore(first.snapshot()[:40])
+
+
+def test_events_tell_where_fits_fail_and_hold_again() -> None:
+    fitter = Fitter(BELT)
+    fitter.process(run())
+    events = fitter.drain_events()
+    assert [e.kind for e in events][:3] == ["fit-resumed", "fit-failed", "fit-resumed"]
+    assert [e.sample for e in events][:3] == [399, 20 * 30 + 399, 20 * 34 + 399]
+    assert events[1].details == {"status": "no response"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "says"),
+    [
+        (("two-masses",), {}, "no model 'two-masses'"),
+        (("rigid",), {"inertia_ratio": 2.0}, "does not take inertia_ratio"),
+        ((BELT,), {"fixed": {"jS": 1.0}}, "did you mean 'Js'"),
+        ((BELT,), {"fixed": {"Js": -1.0}}, "Js = -1 is not between"),
+        ((BELT,), {"free": ["B", "K"]}, "'K'"),
+        ((BELT,), {"fixed": {"Js": 1.0, "mL": 1.0, "Keff": 1e5, "bs": 1.0}}, "every parameter"),
+        ((BELT,), {"band_hz": (50.0, 90.0)}, "2 lines, too few for 4"),
+    ],
+)
+def test_what_cannot_be_is_refused(arguments: tuple, options: dict, says: str) -> None:
+    with pytest.raises(InputError) as refused:
+        Fitter(*arguments, **options).process(run())
+    assert says in str(refused.value)
+
+
+def test_other_lines_and_other_quantities_are_refused() -> None:
+    every = run()
+    fitter = Fitter(BELT)
+    fitter.process(every[:3])
+    with pytest.raises(InputError, match="other lines"):
+        fitter.process(Responses(**{**vars(every), "lines": Lines.parse("20:140:20", 4000, 800)}))
+    with pytest.raises(InputError, match="'closed loop'"):
+        Fitter(BELT).process(Responses(**{**vars(every), "quantity": "closed loop"}))
+    for bad in ({"output": "force"}, {"side": "left"}, {"radius_m": -1.0}):
+        with pytest.raises(InputError, match="=" if "radius_m" not in bad else "radius_m"):
+            model_named("two-mass", **bad)
+
+
+def test_a_failed_fit_evaluates_to_nothing() -> None:
+    nothing = fit(run()[31], BELT)
+    assert nothing.status == "no response"
+    with pytest.raises(InputError, match="there is no fit"):
+        nothing.response(20.0)
+    assert np.isnan(nothing["Keff"])
+    assert np.isnan(nothing.bound("resonance"))
