@@ -12,8 +12,9 @@ from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode import Block, Lines, Response, Settings, Tracker, multisine
 from livebode.fitting import Fit, fit
 from livebode.validation import Validation, validate
-from studies.common import SIGMA, Floats, Result, Study, Table, Verdict
+from studies.common import SIGMA, Floats
 from studies.drawing import LIGHT, figure_of
+from studies.result import Result, Study, Table, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
