@@ -91,7 +91,7 @@ class Run:
                 if whole:
                     yield self._responses(table.slice(0, whole), lines)
         if rest is not None and rest.num_rows:
-            raise InputError(f"the responses in {str(self.path)!r} end within one; they are not what the run wrote")
+            raise InputError(f"the record in {str(self.path)!r} ends within a response; it is not what the run wrote")
 
     def tables(self, name: str, size_bytes_max: int | None = None) -> Iterator[pa.Table]:
         """The rows of "responses", "parameters" or "samples" in order, part by part; none where it was not recorded.
