@@ -46,15 +46,16 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
 
-fuzz: $(BUILT)   ## a long campaign of damaged files against the readers
+fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
+	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends clang
+	apt-get install -y -qq --no-install-recommends clang mosquitto
 
 lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/python -m pip install --quiet uv

@@ -7,7 +7,9 @@ import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import asammdf
 import h5py
+import nptdms
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -61,6 +63,27 @@ def write_npz(path: Path, signals: Signals) -> None:
     np.savez_compressed(path, **dict(signals))
 
 
+def write_tdms(path: Path, signals: Signals) -> None:
+    with nptdms.TdmsWriter(path) as file:
+        for part in range(0, len(next(iter(signals.values()))), 333):
+            file.write_segment(
+                [nptdms.ChannelObject("log", name, values[part : part + 333]) for name, values in signals.items()]
+            )
+
+
+def write_mdf(path: Path, signals: Signals) -> None:
+    """The format has time beside its signals; where none is given it is that of the rate."""
+    time = signals.get("t", np.arange(len(next(iter(signals.values())))) / RATE_HZ)
+    given = [
+        asammdf.Signal(values, time, name=name, master_metadata=("t", 1))
+        for name, values in signals.items()
+        if name != "t"
+    ]
+    with asammdf.MDF(version="4.10") as file:
+        file.append(given, common_timebase=True)
+        file.save(path, overwrite=True, compression=2)
+
+
 def base85(values: NDArray[np.float64]) -> str:
     """Python's base-85 of the same groups of four bytes, in the alphabet of the control."""
     text = base64.b85encode(values.astype(">f8").tobytes())
@@ -101,6 +124,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Signals], None]]] = {
     "matlab73": (".mat", write_mat73),
     "hdf5": (".h5", write_hdf5),
     "npz": (".npz", write_npz),
+    "tdms": (".tdms", write_tdms),
+    "mdf": (".mf4", write_mdf),
     "sinumerik": (".xml", write_sinumerik),
 }
 """Ending and writer for each module of `livebode.sources` that reads a format."""

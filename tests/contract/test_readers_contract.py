@@ -92,7 +92,7 @@ def test_a_misspelt_channel_names_the_nearest(module, tmp_path):
         log.blocks(["inptu"])
 
 
-@pytest.mark.parametrize("module", TIMED)
+@pytest.mark.parametrize("module", [module for module in TIMED if module != "mdf"])  # which always has time
 def test_neither_time_nor_rate(module, tmp_path):
     with pytest.raises(InputError, match="give --rate"):
         open_log(write(module, tmp_path, signals()))

@@ -271,3 +271,12 @@ def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, says: s
     assert done.code == 2
     assert says in done.err
     assert sorted(os.listdir(tmp_path / "run")) == before
+
+
+def test_signals_that_mean_nothing_are_said_and_kept(tmp_path: Path) -> None:
+    silent = replace(machine(SAMPLES), data=data(SAMPLES) * np.array([[0.0], [1.0], [1.0], [1.0]]))
+    record_machine(silent, tmp_path / "run")
+    run = Run.open(tmp_path / "run")
+    assert run.finished
+    assert len(run.responses()) == SAMPLES // SETTINGS.step
+    assert ["constant at 0" in event.message for event in run.events() if event.kind == "doubtful"] == [True]

@@ -169,7 +169,7 @@ def test_the_moving_model_and_what_it_corrects_are_the_machine_without_noise() -
         found = score([recording], [peer(recording)])
         assert found.magnitude_db < 0.02
         assert found.stiffness_percent < 0.1
-        assert found.inertia_percent < 0.02
+        assert found.inertia_percent < 0.05
 
 
 def test_the_smoother_goes_back_as_rauch_tung_and_striebel_wrote_it() -> None:

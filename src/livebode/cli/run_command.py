@@ -11,7 +11,7 @@ from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.cli.pictures import drawing, show
 from livebode.nouns import Event, InputError
 from livebode.records import to_json
-from livebode.session import Axis, Outcome, run
+from livebode.session import Axis, Outcome, run, run_live
 
 
 def run_command(
@@ -54,7 +54,7 @@ def run_command(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Track the frequency response of a machine through a recording.
+    """Track the frequency response of a machine through a recording, or live until it ends or Ctrl-C.
 
     Leaves a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
     """
@@ -111,7 +111,7 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-    draw = drawing(f"{axis.source.log.name}: {axis.signals.output}", names)
+    draw = drawing(f"{axis.source.title}: {axis.signals.output}", names)
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -128,4 +128,5 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
         def tell(event: Event) -> None:
             bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
 
-        return run(axis, directory, force=force, progress=progress, draw=draw, tell=tell)
+        job = run_live if axis.source.live else run
+        return job(axis, directory, force=force, progress=progress, draw=draw, tell=tell)

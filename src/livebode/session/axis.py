@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
+from livebode.sources.live import SourceSettings
 
 _SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
@@ -20,14 +21,6 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class SourceSection(_Section):
-    """[source]: the recording. Relative paths are from the file that names them."""
-
-    log: Annotated[Path, Field(strict=False)]
-    rate_hz: Positive | None = None
-    time: str | None = None
 
 
 class SignalsSection(_Section):
@@ -176,7 +169,7 @@ class FitSection(_Section):
 class Axis(_Section):
     """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
 
-    source: SourceSection
+    source: SourceSettings
     signals: SignalsSection
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
@@ -206,16 +199,18 @@ class Axis(_Section):
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
         axis = cls.of(data, str(path))
-        log = path.parent / axis.source.log
-        return axis.model_copy(update={"source": axis.source.model_copy(update={"log": log})})
+        return axis.model_copy(update={"source": axis.source.beside(path.parent)})
 
     @classmethod
     def of(cls, data: dict[str, Any], origin: str) -> Axis:
         """The Axis in plain data; `origin` names it in messages."""
         try:
-            return cls.model_validate(data)
+            axis = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{origin}: {_sentence(error)}") from None
+        if (axis.source.log is None) == (axis.source.url is None):
+            raise InputError(f"{origin}: [source] needs either a log or a url; 'source.log' is a recording")
+        return axis
 
 
 def _sentence(error: ValidationError) -> str:

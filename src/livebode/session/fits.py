@@ -38,6 +38,11 @@ class Fits:
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
 
+    @classmethod
+    def of(cls, section: FitSection | None, loop: Loop) -> Fits | None:
+        """What a configuration asks for; margins where its loop says what feeds back."""
+        return None if section is None else cls(section, loop if loop.feedback else None)
+
     def take(self, responses: Responses, out: Out) -> None:
         """Fit a batch, and write its parameters and events."""
         fitter = self._fitter or self._begin(responses.unit)

@@ -16,13 +16,27 @@ _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and
 
 def make_follower(axis: Axis, log: Log) -> Follower:
     """A Tracker for this recording, or with [motion] a MotionCorrection; InputError where they do not fit."""
-    settings = make_settings(axis, log)
+    return _follower(axis, make_settings(axis, log))
+
+
+def live_follower(axis: Axis, rate_hz: float) -> Follower:
+    """The same for a machine that sends at `rate_hz`, whose lines and window must be given."""
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if frequencies == "auto" or window == "auto":
+        raise InputError(
+            "lines or window are 'auto', which needs a recording to look at first; give lines.frequencies and "
+            "lines.window for a live source"
+        )
+    return _follower(axis, _settings(axis, rate_hz, Lines.parse(frequencies, rate_hz, window)))
+
+
+def _follower(axis: Axis, settings: Settings) -> Follower:
     if axis.motion is None:
         return Tracker(settings)
     # The simulation, which its model is driven by, takes a while to import.
     from livebode.motion import MotionCorrection
 
-    chunk_samples = round(axis.motion.chunk_s * log.rate_hz)
+    chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
     if chunk_samples < 2 * settings.lines.window:
         raise InputError(
             f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
@@ -35,15 +49,22 @@ def make_follower(axis: Axis, log: Log) -> Follower:
 
 def make_settings(axis: Axis, log: Log) -> Settings:
     """The tracker's settings for this recording; InputError where they do not fit it or each other."""
+    settings = _settings(axis, log.rate_hz, _lines(axis, log))
+    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
+        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
+    return settings
+
+
+def _settings(axis: Axis, rate_hz: float, lines: Lines) -> Settings:
     signals, tracking = axis.signals, axis.tracking
-    settings = Settings(
-        lines=_lines(axis, log),
+    return Settings(
+        lines=lines,
         output=signals.output,
         input=signals.input,
         excitation=signals.excitation,
         schedule=signals.schedule,
         estimator=tracking.estimator,
-        loop=axis.loop.build(log.rate_hz),
+        loop=axis.loop.build(rate_hz),
         quantity=tracking.quantity,
         hop=tracking.hop,
         average=tracking.average,
@@ -54,9 +75,6 @@ def make_settings(axis: Axis, log: Log) -> Settings:
         spikes=tuple(tracking.spikes),
         dtype=tracking.dtype,
     )
-    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
-        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
-    return settings
 
 
 def _lines(axis: Axis, log: Log) -> Lines:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -27,9 +27,10 @@ from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
 from livebode.session.tally import Tally
 from livebode.sources import open_log
+from livebode.sources.live import LiveSource
 
 if TYPE_CHECKING:
-    from livebode.session.segmented import SegmentedRun, Stateful
+    from livebode.session.segmented import SegmentedRun
 
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
@@ -96,12 +97,12 @@ def run(
         segments all that was recorded so far.
     """
     started = time.perf_counter()
+    assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
     about = {"configuration": axis.model_dump(mode="json"), "found": found}
-    loop = tracker.settings.loop
-    fits = None if axis.fit is None else Fits(axis.fit, loop if loop.feedback else None)
+    fits = Fits.of(axis.fit, tracker.settings.loop)
     return record(
         log,
         tracker,
@@ -148,29 +149,20 @@ def record(
     blocks = source.blocks(wanted, **delivery)
     check = ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or "")
     tally = Tally(check, time.perf_counter() if started is None else started)
-    parts: dict[str, Stateful] = {"tracker": tracker, "tally": tally}
-    if fits is not None:
-        parts["fits"] = fits
     begun = _begun(about, tracker, response_unit(source.channels, settings))
-    out: RunDirectory | SegmentedRun
-    if kept is None:
-        out = RunDirectory(directory, force=force)
-    else:
-        from livebode.session.segmented import SegmentedRun  # needs a POSIX system
-
-        channels = {channel.name: channel for channel in source.channels}
-        out = SegmentedRun(
-            directory,
-            kept,
-            summary=begun,
-            channels=[channels[name] for name in wanted],
-            rate_hz=settings.lines.rate_hz,
-            parts=parts,
-            force=force,
-            again=again,
-            ends=source.samples is not None,
-            tell=tell,
-        )
+    channels = {channel.name: channel for channel in source.channels}
+    out = _recorder(
+        directory,
+        kept,
+        force,
+        summary=begun,
+        channels=[channels[name] for name in wanted],
+        rate_hz=settings.lines.rate_hz,
+        parts={"tracker": tracker, "tally": tally, **({"fits": fits} if fits else {})},
+        again=again,
+        ends=source.samples is not None,
+        tell=tell,
+    )
 
     def publish(responses: Responses) -> None:
         overview.add(responses)
@@ -190,11 +182,20 @@ def record(
         _track(source, blocks, tracker, tally, publish, out, progress, None if kept is None else out.write_event)
         summary = _begun(about, tracker, begun["found"]["unit"]) | _done(tracker, tally)
         newest = None if fits is None else fits.newest()
-        if fits is not None:
-            summary |= _fitted(fits, newest, overview.responses())
+        summary |= _said(source) | _fitted(fits, newest, overview.responses())
         label = _schedule_label(source, settings.schedule)
         out.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
     return Outcome(directory, summary, overview.responses(), newest)
+
+
+def _recorder(
+    directory: Path, kept: RecordSection | None, force: bool, **of_segments: Any
+) -> RunDirectory | SegmentedRun:
+    if kept is None:
+        return RunDirectory(directory, force=force)
+    from livebode.session.segmented import SegmentedRun  # needs a POSIX system
+
+    return SegmentedRun(directory, kept, force=force, **of_segments)
 
 
 def _track(
@@ -208,7 +209,6 @@ def _track(
     say: Tell | None,
 ) -> None:
     """Every block through the tracker into the record; where the signals mean nothing, `say` or InputError says so."""
-    settings, check = tracker.settings, tally.check
 
     def follow(step: Callable[[], Responses | None]) -> None:
         """Take one step and publish its responses and events."""
@@ -217,36 +217,55 @@ def _track(
         if responses is not None:
             tally.take(responses, time.perf_counter() - before)
             publish(responses)
-        for event in tracker.drain_events():
+        for event in [*drained(source), *tracker.drain_events()]:
             out.write_event(event)
 
-    def rest() -> None:
-        check.finish()
-        check_length(tally.stop, settings.lines.window)
-        if tally.handed_out != tally.stop:
-            follow(tracker.finish)
-            tally.handed_out = tally.stop
-        check_excitation(tracker, check.variance)
-        check_some_valid(tally.responses, tally.valid_lines, tracker.counts, settings.lines.window)
-
     for block in blocks:
-        check.take(block)
+        tally.check.take(block)
         tally.stop = block.stop
         follow(partial(tracker.process, block))
         progress(tracker.counts["samples"], source.samples)
     if not tally.stop:
         raise InputError("the recording holds no samples")
     try:
-        rest()
+        _judge(tracker, tally, partial(follow, tracker.finish))
     except InputError as error:
-        if say is None:
+        if say is None or not tally.responses:
             raise
-        # What was recorded stays.
-        say(Event("check", tally.stop, tally.stop / settings.lines.rate_hz, str(error)))
+        # What was recorded stays, and says what is wrong with it.
+        say(Event("doubtful", tally.stop, tally.stop / tracker.settings.lines.rate_hz, str(error)))
+    for event in drained(source):
+        out.write_event(event)
 
 
-def _fitted(fits: Fits, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+def _judge(tracker: Follower, tally: Tally, hand_out: Callable[[], None]) -> None:
+    """Hand out what is held back at the end; InputError where the responses mean nothing."""
+    window = tracker.settings.lines.window
+    tally.check.finish()
+    check_length(tally.stop, window)
+    if tally.handed_out != tally.stop:
+        hand_out()
+        tally.handed_out = tally.stop
+    check_excitation(tracker, tally.check.variance)
+    check_some_valid(tally.responses, tally.valid_lines, tracker.counts, window)
+
+
+def drained(source: Source) -> list[Event]:
+    """What a live source has to say; a recording says it all at once."""
+    return source.drain_events() if isinstance(source, LiveSource) else []
+
+
+def _said(source: Source) -> dict[str, Any]:
+    """What run.json says of a live source."""
+    if not isinstance(source, LiveSource):
+        return {}
+    return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
+
+
+def _fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
     """What run.json says of the fits."""
+    if fits is None:
+        return {}
     summary = {"fit": fits.summary()}
     if newest is not None and fits.loop is not None:
         words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
@@ -47,34 +48,57 @@ class DelimitedRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         del rows
+        wanted = list(dict.fromkeys(column.key for column in columns))
+        try:
+            with self._opened() as file:
+                yield from self._parsed(file, columns)
+        except pa.ArrowInvalid as error:
+            raise locate(self.path, self._dialect, wanted, ARROW_BLOCK_BYTES) or InputError(
+                f"cannot read {self.path}: {str(error).splitlines()[0][:200]}; repair the file"
+            ) from error
+
+    def parsed(self, lines: bytes, columns: Sequence[Column]) -> Chunk:
+        """The values of `columns` in whole lines of the table; InputError where one of them does not fit it."""
+        dialect = self._dialect
+        try:
+            chunks = list(self._parsed(Tidied(io.BytesIO(lines), dialect.encoding, dialect.spaced), columns))
+        except pa.ArrowInvalid as error:
+            raise InputError(str(error).splitlines()[0][:200]) from None
+        return [np.concatenate(parts) for parts in zip(*chunks)] if chunks else [np.empty(0) for _ in columns]
+
+    @property
+    def encoding(self) -> str:
+        return self._dialect.encoding
+
+    @property
+    def offset(self) -> int:
+        """Byte at which the rows of values begin."""
+        return self._dialect.offset
+
+    def _parsed(self, file: Any, columns: Sequence[Column]) -> Iterator[Chunk]:
         dialect = self._dialect
         wanted = list(dict.fromkeys(column.key for column in columns))
         names = [str(at) for at in range(dialect.width)]
         moment = pa.timestamp("ns", dialect.zone)
         types = {names[at]: moment if dialect.kinds[at] is Kind.MOMENT else pa.float64() for at in wanted}
-        try:
-            with self._opened() as file, csv.open_csv(
-                file,
-                read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
-                parse_options=csv.ParseOptions(
-                    delimiter=dialect.delimiter or "\x1f",
-                    quote_char=False if dialect.spaced else '"',
-                ),
-                convert_options=csv.ConvertOptions(
-                    column_types=types,
-                    include_columns=[names[at] for at in wanted],
-                    decimal_point=dialect.decimal,
-                    null_values=list(EMPTY),
-                    check_utf8=False,
-                ),
-            ) as reader:  # fmt: skip
-                for batch in reader:
-                    if batch.num_rows:
-                        yield [to_numpy(batch.column(wanted.index(column.key))) for column in columns]
-        except pa.ArrowInvalid as error:
-            raise locate(self.path, dialect, wanted, ARROW_BLOCK_BYTES) or InputError(
-                f"cannot read {self.path}: {str(error).splitlines()[0][:200]}; repair the file"
-            ) from error
+        with csv.open_csv(
+            file,
+            read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
+            parse_options=csv.ParseOptions(
+                delimiter=dialect.delimiter or "\x1f",
+                quote_char=False if dialect.spaced else '"',
+            ),
+            convert_options=csv.ConvertOptions(
+                column_types=types,
+                include_columns=[names[at] for at in wanted],
+                decimal_point=dialect.decimal,
+                null_values=list(EMPTY),
+                check_utf8=False,
+            ),
+        ) as reader:
+            for batch in reader:
+                if batch.num_rows:
+                    yield [to_numpy(batch.column(wanted.index(column.key))) for column in columns]
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:

@@ -57,6 +57,8 @@ FORMATS = (
     Format("MATLAB 7.3", (".mat",), lambda head: head[512:].startswith(HDF5_MAGIC), "matlab73"),
     Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: head.startswith(HDF5_MAGIC), "hdf5"),
     Format("NPZ", (".npz",), lambda head: head.startswith(b"PK\x03\x04"), "npz"),
+    Format("TDMS", (".tdms",), lambda head: head.startswith(b"TDSm"), "tdms"),
+    Format("MDF", (".mf4", ".mdf", ".dat"), lambda head: head.startswith((b"MDF     ", b"UnFinMF ")), "mdf"),
     Format("Sinumerik XML", (".xml",), is_xml, "sinumerik"),
     Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab"), is_text, "delimited"),
 )  # fmt: skip

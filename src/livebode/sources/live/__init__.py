@@ -1,0 +1,24 @@
+"""Live sources: machines that send their samples in batches. docs/live.md says how to connect each."""
+
+from livebode.sources.live.batch import Batch, LiveBlock
+from livebode.sources.live.frame import FrameDecoder, encode_layout, encode_samples
+from livebode.sources.live.health import Health
+from livebode.sources.live.opening import open_source
+from livebode.sources.live.said import KINDS
+from livebode.sources.live.sequencer import Sequencer
+from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live.source import LiveSource
+
+__all__ = [
+    "KINDS",
+    "Batch",
+    "FrameDecoder",
+    "Health",
+    "LiveBlock",
+    "LiveSource",
+    "Sequencer",
+    "SourceSettings",
+    "encode_layout",
+    "encode_samples",
+    "open_source",
+]

@@ -1,0 +1,65 @@
+"""Where a live source is: the URL taken apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from urllib.parse import unquote, urlsplit
+
+from livebode.nouns import InputError
+
+PORTS: dict[str, int | None] = {
+    "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Address:
+    """Kind of source, host, port and what stands behind them; `path` is the topic of MQTT, or a file."""
+
+    scheme: str
+    host: str = ""
+    port: int = 0
+    path: str = ""
+
+    def __str__(self) -> str:
+        if not self.host:
+            return self.path or "stdin:"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}" + (f"/{self.path}" if self.path else "")
+
+
+def parse_address(url: str) -> Address:
+    """The address in a URL.
+
+    Raises
+    ------
+    InputError
+        For a kind that is not known, a port that is none, or a password in it; a password is never repeated.
+
+    Examples
+    --------
+    >>> parse_address("mqtt://broker/plant/axis1")
+    Address(scheme='mqtt', host='broker', port=1883, path='plant/axis1')
+    >>> str(parse_address("udp://127.0.0.1:5000"))
+    'udp://127.0.0.1:5000'
+    """
+    if url in ("stdin:", "stdin://"):
+        return Address("stdin")
+    if "@" in url:
+        raise InputError("a user or password has no place in source.url; give username, and password_env or _file")
+    if not url.isprintable() or len(url) > 2000:
+        raise InputError("source.url is longer than 2000 letters or has one that is not printable")
+    try:
+        parts = urlsplit(url)
+        port, host = parts.port, parts.hostname
+    except ValueError as error:
+        raise InputError(f"source.url = {url!r} is no address: {error}") from None
+    if parts.scheme not in PORTS:
+        raise InputError(f"source.url = {url!r} is of no known kind; give one of {', '.join(PORTS)} or stdin:")
+    port = port or PORTS[parts.scheme]
+    if not host or port is None or "?" in url or "#" in url:
+        raise InputError(f"source.url = {url!r} is no address; give {parts.scheme}://host:port")
+    path = unquote(parts.path.removeprefix("/"))
+    if path and not parts.scheme.startswith(("mqtt", "opc")):
+        raise InputError(f"source.url = {url!r} has a path, which {parts.scheme} does not take; leave out /{path}")
+    return Address(parts.scheme, host, port, path)

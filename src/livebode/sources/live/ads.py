@@ -1,0 +1,167 @@
+"""Beckhoff ADS: samples from a ring buffer in the PLC program, or by notifications with the PLC's timestamps."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections import deque
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from livebode.nouns import InputError
+from livebode.sources.live.address import Address
+from livebode.sources.live.numbered import Numbered
+from livebode.sources.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch
+from livebode.sources.live.settings import SourceSettings, named_channels
+from livebode.sources.live.source import LiveSource, RefusedError
+
+TIMEOUT_MS = 2000
+SYMBOL_BYTES_MAX = 16 << 20
+NOTIFIED_MAX = 100_000
+ALIVE_S = 2.0
+NO_RING_S = 0.25
+_NO_SYMBOL = 0x710
+_REFUSED = {_NO_SYMBOL: "the PLC has no such symbol", 0x0D: "the PLC's port is locked", 0x71B: "access was denied"}
+
+
+class AdsSource(LiveSource):
+    """A symbol of a PLC program, polled as a ring (`mode = "ring"`) or notified at each cycle (`"notify"`)."""
+
+    format: ClassVar[str] = "ads"
+
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        super().__init__(settings, address)
+        self._pyads = import_pyads()
+        if settings.symbol is None or not settings.channels or settings.net_id is None:
+            raise InputError(
+                "source needs net_id, symbol and channels for ads; docs/live.md says what the PLC must have"
+            )
+        if settings.mode == "notify" and settings.rate_hz is None:
+            raise InputError("source needs rate_hz for notifications: that of the PLC task")
+        self._channels = named_channels(settings.channels)
+        try:
+            self._plc_address = self._pyads.AmsAddr(settings.net_id, settings.ams_port)
+        except (ValueError, TypeError):
+            raise InputError(
+                f"source.net_id = {settings.net_id!r} is no AMS net id; it looks like 5.1.2.3.1.1"
+            ) from None
+
+    def _receive(self) -> bool:
+        settings, pyads = self.settings, self._pyads
+        try:
+            if settings.local_net_id is not None:
+                pyads.set_local_address(settings.local_net_id)
+            plc = pyads.Connection(settings.net_id, settings.ams_port, f"{self.address.host}:{self.address.port}")
+            with plc:
+                plc.set_timeout(TIMEOUT_MS)
+                if settings.mode == "ring":
+                    self._poll(plc)
+                else:
+                    self._listen(plc)
+        except pyads.ADSError as error:
+            code = getattr(error, "err_code", None)
+            if code in _REFUSED:
+                raise RefusedError(f"{_REFUSED[code]} ({settings.symbol})") from None
+            raise ConnectionError(str(error).strip()) from None
+        return False
+
+    def _place(self, plc: Any) -> tuple[int, int, int]:
+        """Index group, index offset and size of the symbol."""
+        info = self._pyads.pyads_ex.adsGetSymbolInfo(plc._port, plc._adr, self.settings.symbol)
+        if not 0 < info.size <= SYMBOL_BYTES_MAX:
+            raise RefusedError(f"symbol {self.settings.symbol} has {info.size} bytes, not 1 to {SYMBOL_BYTES_MAX}")
+        return info.iGroup, info.iOffs, info.size
+
+    def _poll(self, plc: Any) -> None:
+        group, offset, size = self._place(plc)
+
+        def read(at: int, length: int) -> bytes:
+            return bytes(plc.read(group, offset + at, ctypes.c_ubyte * length, return_ctypes=True))
+
+        have: int | None = None
+        epoch = 0
+        while not self._stop.is_set():
+            try:
+                ring, dtype = read_ring(read(0, HEADER.size), size)
+                if not self._connected:
+                    self._stands()
+                have = None if ring.epoch != epoch else have
+                for first, last in new_rows(ring, have):
+                    width = ring.channels * dtype.itemsize
+                    raw = read(HEADER.size + first % ring.length * width, (last - first) * width)
+                    after, _ = read_ring(read(0, HEADER.size), size)
+                    self._take_rows(raw, first, ring, after, dtype)
+                have, epoch = ring.count, ring.epoch
+            except InputError as error:
+                self._malformed(error)
+                self._stop.wait(NO_RING_S)
+            self._stop.wait(self.settings.poll_s)
+
+    def _take_rows(self, raw: bytes, first: int, ring: Ring, after: Ring, dtype: np.dtype[np.floating]) -> None:
+        batch = ring_batch(raw, first, ring, after, dtype, self._channels)
+        if batch is not None:
+            self._deliver(batch)
+
+    def _listen(self, plc: Any) -> None:
+        pyads, settings = self._pyads, self.settings
+        group, offset, size = self._place(plc)
+        if size not in (4 * len(self._channels), 8 * len(self._channels)):
+            raise RefusedError(
+                f"symbol {settings.symbol} has {size} bytes; declare it as ARRAY of {len(self._channels)} REAL or LREAL"
+            )
+        assert settings.rate_hz is not None
+        came: deque[tuple[int, bytes]] = deque(maxlen=NOTIFIED_MAX)
+
+        def notified(notification: Any, _: object) -> None:
+            header = notification.contents
+            at = ctypes.addressof(header) + pyads.structs.SAdsNotificationHeader.data.offset
+            came.append((header.nTimeStamp, ctypes.string_at(at, min(header.cbSampleSize, size))))
+
+        numbered = Numbered(self._channels, settings.rate_hz)
+        attributes = pyads.NotificationAttrib(
+            size, pyads.ADSTRANS_SERVERCYCLE, max_delay=1e3 * settings.poll_s, cycle_time=1e3 / settings.rate_hz
+        )
+        handles = plc.add_device_notification((group, offset), attributes, notified)
+        self._stands()
+        try:
+            heard = time.monotonic()
+            while not self._stop.wait(self.settings.poll_s):
+                values = [came.popleft() for _ in range(len(came))]
+                self._take_values(numbered, values)
+                if values:
+                    heard = time.monotonic()
+                elif time.monotonic() - heard > ALIVE_S:
+                    plc.read_state()  # an error where the PLC is gone
+                    heard = time.monotonic()
+        finally:
+            if handles is not None:
+                self._unsubscribe(plc, handles)
+
+    def _take_values(self, numbered: Numbered, values: list[tuple[int, bytes]]) -> None:
+        samples = []
+        for stamp, row in values:
+            try:
+                samples.append(numbered.sample((stamp - FILETIME_1970) / 1e7, row))
+            except InputError as error:
+                self._malformed(error)
+        for batch in numbered.batches(samples):
+            self._deliver(batch)
+
+    def _unsubscribe(self, plc: Any, handles: tuple[int, int | None]) -> None:
+        try:
+            plc.del_device_notification(*handles)
+        except self._pyads.ADSError:
+            return  # the connection is gone, and the notification with it
+
+
+def import_pyads() -> ModuleType:
+    try:
+        import pyads
+    except ImportError:
+        raise InputError("ads needs the ADS library; pip install livebode[ads]") from None
+    return pyads  # type: ignore[no-any-return]
+
+
+SOURCE = AdsSource

@@ -1,0 +1,93 @@
+"""Batch: what a sender delivers at once, and LiveBlock: a Block that knows when it arrived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Block, Channel, InputError
+
+CHANNELS_MAX = 1024
+VALUES_MAX = 1 << 20
+"""Most values in one batch; more are taken for rubbish."""
+SAMPLE_MAX = 1 << 62
+NAME_MAX = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Consecutive samples from one sender, which numbers its samples.
+
+    Parameters
+    ----------
+    first_sample
+        Number that the sender gave the first one; losses, repeats and reordering are told by it.
+    data
+        float64, shape (channels, samples).
+    channels, rate_hz
+        As the sender states them.
+    epoch
+        A number that the sender draws at its start, so that a restart is seen; 0 for a sender without one.
+    stamp_s
+        The sender's clock at the first sample, seconds since 1970; None where it has none.
+    arrived_s
+        `time.monotonic()` when the batch was received.
+
+    Raises
+    ------
+    InputError
+        If it has no samples or too many, shapes disagree, or a number or a name cannot be.
+    """
+
+    first_sample: int
+    data: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    epoch: int = 0
+    stamp_s: float | None = None
+    arrived_s: float = nan
+
+    def __post_init__(self) -> None:
+        if self.data.ndim != 2 or len(self.data) != len(self.channels) or not 0 < self.data.size <= VALUES_MAX:
+            raise InputError(
+                f"a batch of {len(self.channels)} channels has data of shape {self.data.shape}; "
+                f"it takes (channels, samples), at most {VALUES_MAX} values"
+            )
+        if not 0 <= self.first_sample < SAMPLE_MAX:
+            raise InputError(f"first_sample={self.first_sample} is not between 0 and 2^62")
+        if not (np.isfinite(self.rate_hz) and 0 < self.rate_hz < 1e9):
+            raise InputError(f"rate_hz={self.rate_hz} is not a number of samples per second between 0 and 1e9")
+        if self.stamp_s is not None and not abs(self.stamp_s) < 1e11:
+            raise InputError(f"stamp_s={self.stamp_s} is not a number of seconds since 1970")
+        check_channels(self.channels)
+
+    @property
+    def stop(self) -> int:
+        """Number of the sample that would follow the last one."""
+        return self.first_sample + int(self.data.shape[1])
+
+
+def check_channels(channels: tuple[Channel, ...]) -> None:
+    """InputError where a sender's channels have no name, a name twice, or one that no line of text can hold."""
+    if not 0 < len(channels) <= CHANNELS_MAX:
+        raise InputError(f"{len(channels)} channels are not between 1 and {CHANNELS_MAX}")
+    names = {channel.name for channel in channels}
+    if len(names) != len(channels):
+        raise InputError("two channels share a name; each needs its own")
+    for channel in channels:
+        text = channel.name + channel.unit
+        if not channel.name or len(channel.name) > NAME_MAX or len(channel.unit) > NAME_MAX or not text.isprintable():
+            raise InputError(f"channel name {channel.name[:40]!r} is empty, too long or not printable")
+
+
+@dataclass(frozen=True, eq=False)
+class LiveBlock(Block):
+    """A Block from a live source.
+
+    `arrived_s` is `time.monotonic()` when its last sample was received; other parameters as in `Block`.
+    """
+
+    arrived_s: float = nan

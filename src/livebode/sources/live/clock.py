@@ -1,0 +1,92 @@
+"""The sender's clock against its sample numbers: a clock that was set, and a rate that is not what it says."""
+
+from __future__ import annotations
+
+from collections import deque
+from statistics import median
+
+from livebode.sources.live.said import Said
+
+JUMP_S = 0.1
+"""A clock that goes wrong by this much from one batch to the next, and right again after, was set."""
+RATE_TOLERANCE = 0.02
+"""From batch to batch stamps jitter, so the median of their ratio has to be off by this much."""
+DRIFT_TOLERANCE = 1e-3
+DRIFT_S_MIN = 10.0
+_INTERVALS = 15
+_INTERVALS_MIN = 4
+
+
+class ClockWatch:
+    """Compares stamps with sample numbers of batches in order. Sample numbers are time; stamps only tell.
+
+    A step in the stamps alone is a clock that was set (``clock-jump``). Stamps whose intervals disagree with the rate
+    one after another are a wrong rate (``wrong-rate``): at once from 2 %, and from 0.1 % after ten seconds. An interval
+    is judged when the next one is known.
+    """
+
+    def __init__(self, said: Said, rate_hz: float) -> None:
+        self._said, self._rate_hz = said, rate_hz
+        self._wrong = False
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew: the sender did."""
+        self._last: tuple[int, float] | None = None
+        self._ratios: deque[float] = deque(maxlen=_INTERVALS)
+        self._odd: tuple[float, int] | None = None
+        self._drift_s = self._length_s = 0.0
+        self.offset_s: float | None = None
+        """The sender's clock at sample 0 of its numbering, from the newest stamp."""
+
+    def take(self, sample: int, stamp_s: float, number: int) -> None:
+        """Sample `sample` of the sender, number `number` of the Blocks, was taken at `stamp_s`."""
+        self.offset_s = stamp_s - sample / self._rate_hz
+        last, self._last = self._last, (sample, stamp_s)
+        if last is None or sample <= last[0]:
+            return
+        length_s = (sample - last[0]) / self._rate_hz
+        error_s = stamp_s - last[1] - length_s
+        usual = median(self._ratios) if len(self._ratios) >= _INTERVALS_MIN else 1.0
+        odd = abs(error_s - (usual - 1) * length_s) > JUMP_S
+        self._ratios.append(1 + error_s / length_s)
+        if odd:
+            # Two odd intervals in a row are no jump of the clock but another pace.
+            self._odd = (error_s, number) if self._odd is None else None
+            return
+        if self._odd is not None and len(self._ratios) > _INTERVALS_MIN:
+            self._jumped(*self._odd)
+        self._odd = None
+        self._drift_s += error_s
+        self._length_s += length_s
+        self._judge_rate(number)
+
+    def _jumped(self, step_s: float, number: int) -> None:
+        self._said.say(
+            "clock-jump",
+            f"the sender's clock was set by {step_s:+.3f} s at sample {number}; time goes on by sample numbers",
+            sample=number,
+            rate_hz=self._rate_hz,
+            step_s=step_s,
+        )
+
+    def _judge_rate(self, number: int) -> None:
+        if len(self._ratios) < _INTERVALS_MIN:
+            return
+        ratio = median(self._ratios)
+        wrong = abs(ratio - 1) > RATE_TOLERANCE
+        if not wrong and self._length_s > DRIFT_S_MIN and abs(self._drift_s) > DRIFT_TOLERANCE * self._length_s:
+            ratio, wrong = 1 + self._drift_s / self._length_s, True
+        if wrong and not self._wrong:
+            measured_hz = self._rate_hz / ratio if ratio > 0 else None
+            self._said.say(
+                "wrong-rate",
+                f"by the sender's clock it samples at {measured_hz:.6g} Hz, not at {self._rate_hz:.6g} Hz; "
+                "every frequency is wrong by as much, so correct the rate"
+                if measured_hz
+                else "the sender's clock stands still or runs backwards; its rate cannot be checked",
+                sample=number,
+                rate_hz=self._rate_hz,
+                measured_hz=measured_hz,
+            )
+        self._wrong = wrong

@@ -1,0 +1,85 @@
+"""Whether a batch is of the stream that was begun: its channels, units and rate against those of the first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from livebode.nouns import Channel
+from livebode.sources.live.batch import Batch
+from livebode.sources.live.said import Said
+
+SAME_RATE = 1e-9
+
+
+class Face:
+    """Channels and rate of a stream. A batch that states others is left out, for its values would mean something else.
+
+    Channels that come in another order or beside new ones are put in order and taken.
+
+    Parameters
+    ----------
+    said
+        Where changes are told, once for each.
+    rate_hz
+        The rate that must be, where it is known beforehand.
+    """
+
+    def __init__(self, said: Said, rate_hz: float | None = None) -> None:
+        self._said = said
+        self.channels: tuple[Channel, ...] = ()
+        self.rate_hz = rate_hz
+        self._seen: tuple[tuple[Channel, ...], float] | None = None
+        self._rows: list[int] | None = None
+
+    def aligned(self, batch: Batch) -> Batch | None:
+        """The batch with the stream's channels; None where it is not of the stream."""
+        stated = (batch.channels, batch.rate_hz)
+        if not self.channels:
+            self.channels = batch.channels
+            self.rate_hz = self.rate_hz or batch.rate_hz
+        if stated != self._seen:
+            self._seen = stated
+            self._rows = self._compared(batch)
+        if self._rows is None:
+            return None
+        if batch.channels == self.channels:
+            return batch
+        return replace(batch, data=np.ascontiguousarray(batch.data[self._rows]), channels=self.channels)
+
+    def _compared(self, batch: Batch) -> list[int] | None:
+        """Rows of the stream's channels in the batch; None where it cannot be taken. Says what changed."""
+        assert self.rate_hz is not None
+        if abs(batch.rate_hz / self.rate_hz - 1) > SAME_RATE:
+            self._said.say(
+                "wrong-rate",
+                f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are left out",
+                stated_hz=batch.rate_hz,
+                rate_hz_expected=self.rate_hz,
+            )
+            return None
+        units = {channel.name: channel.unit for channel in batch.channels}
+        names = list(units)
+        if missing := [channel.name for channel in self.channels if channel.name not in units]:
+            self._said.say(
+                "layout-changed",
+                f"the sender no longer has channel {missing[0]!r}; its samples are left out until it is back",
+                channels=names,
+            )
+            return None
+        for channel in self.channels:
+            if channel.unit != units[channel.name]:
+                self._said.say(
+                    "unit-changed",
+                    f"channel {channel.name!r} came in {channel.unit!r} and now comes in {units[channel.name]!r}; "
+                    "its samples are left out",
+                    channel=channel.name,
+                    unit=units[channel.name],
+                )
+                return None
+        if names != [channel.name for channel in self.channels]:
+            self._said.say(
+                "layout-changed", "the sender's channels changed; those known before are taken by name", channels=names
+            )
+        return [names.index(channel.name) for channel in self.channels]

@@ -1,0 +1,87 @@
+"""Standard input: batches as NDJSON from a program that is piped into livebode."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from typing import ClassVar
+
+from livebode.nouns import InputError
+from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
+from livebode.sources.live.source import TICK_S, LiveSource
+
+_PIECE_BYTES = 1 << 16
+
+
+class StdinSource(LiveSource):
+    """Lines of JSON on standard input; ends where it ends, and lets its writer wait where it is too fast."""
+
+    format: ClassVar[str] = "ndjson"
+    waits: ClassVar[bool] = True
+
+    def _receive(self) -> bool:
+        decoder, splitter = LineDecoder(self.settings.rate_hz), LineSplitter()
+        number = sys.stdin.fileno()
+        self._stands()
+        while not self._stop.is_set():
+            if not select.select([number], [], [], TICK_S)[0]:
+                continue
+            piece = os.read(number, _PIECE_BYTES)
+            for line in splitter.feed(piece):
+                self._decode(decoder, line)
+            if splitter.cut:
+                self._malformed(f"{splitter.cut} lines were longer than {LINE_BYTES_MAX} bytes")
+                splitter.cut = 0
+            if not piece:
+                return True
+        return False
+
+    def _decode(self, decoder: LineDecoder, line: bytes) -> None:
+        try:
+            batch = decoder.decode(line)
+        except InputError as error:
+            self._malformed(error)
+            return
+        self._deliver(batch)
+
+
+class LineSplitter:
+    r"""Cuts a stream of bytes into lines; one that is too long is left out, so that memory stays bounded.
+
+    >>> splitter = LineSplitter()
+    >>> splitter.feed(b"a\nb"), splitter.feed(b"c\n\n"), splitter.feed(b"")
+    ([b'a'], [b'bc'], [])
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = 0
+        self.cut = 0
+        """Lines that were too long."""
+
+    def feed(self, piece: bytes) -> list[bytes]:
+        """Lines that `piece` completes, empty ones left out; an empty piece is the end, and completes the last one."""
+        *ends, rest = piece.split(b"\n")
+        lines = []
+        for end in ends:
+            self._add(end)
+            lines += self._line()
+        self._add(rest)
+        return lines if piece else self._line()
+
+    def _add(self, part: bytes) -> None:
+        self._size += len(part)
+        if self._size <= LINE_BYTES_MAX:
+            self._parts.append(part)
+        else:
+            self._parts.clear()
+
+    def _line(self) -> list[bytes]:
+        self.cut += self._size > LINE_BYTES_MAX
+        line = b"".join(self._parts).strip() if self._size <= LINE_BYTES_MAX else b""
+        self._parts, self._size = [], 0
+        return [line] if line else []
+
+
+SOURCE = StdinSource

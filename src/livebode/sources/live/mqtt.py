@@ -1,0 +1,165 @@
+"""MQTT: frames, or NDJSON lines, that a broker passes on."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+from typing import Any, ClassVar
+
+from livebode.nouns import InputError
+from livebode.sources.live.address import Address
+from livebode.sources.live.frame import FRAME_BYTES_MAX, FrameDecoder
+from livebode.sources.live.ndjson import LineDecoder
+from livebode.sources.live.secret import existing, password
+from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
+
+KEEPALIVE_S = 15
+SESSION_S = 3600
+"""How long a broker keeps what comes while a client with a `client_id` is away."""
+PACKET_BYTES_MAX = 8 * FRAME_BYTES_MAX
+_TOPIC_BYTES_MAX = 65535
+_REFUSALS = {0x84, 0x85, 0x86, 0x87, 0x8A, 0x8C, 0x9D}
+_UNANSWERED_MAX = 3
+
+
+class MqttSource(LiveSource):
+    """Subscribes to one topic with QoS 1; each message is a frame, or an object of JSON."""
+
+    format: ClassVar[str] = "mqtt"
+    reorders: ClassVar[bool] = True
+
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        super().__init__(settings, address)
+        try:
+            from paho.mqtt import client as mqtt
+        except ImportError:
+            raise InputError("mqtt needs its library; pip install livebode[mqtt]") from None
+        self._mqtt = mqtt
+        topic = address.path
+        if not topic or "+" in topic or "#" in topic or len(topic.encode()) > _TOPIC_BYTES_MAX:
+            raise InputError(
+                f"the topic {topic[:40]!r} is empty, too long or has a wildcard; give mqtt://broker/one/topic"
+            )
+        self._password = password(settings)
+        self._tls = tls_context(settings) if address.scheme == "mqtts" else None
+        self._frames, self._lines = FrameDecoder(), LineDecoder(settings.rate_hz)
+        self._unanswered = 0
+        self._refusal: RefusedError | None = None
+        self._answered = False
+
+    def _receive(self) -> bool:
+        client = self._client()
+        self._answered = False
+        try:
+            self._connect(client)
+            while not self._stop.is_set():
+                code = client.loop(timeout=TICK_S)
+                if self._refusal is not None:
+                    raise self._refusal
+                if code:
+                    self._gone(code)
+            client.disconnect()
+        finally:
+            client.on_disconnect = None
+            client._sock_close()
+        return False
+
+    def _client(self) -> Any:
+        mqtt, settings = self._mqtt, self.settings
+        client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, client_id=settings.client_id or "", protocol=mqtt.MQTTv5)
+        client.on_connect, client.on_subscribe, client.on_message = (
+            self._on_connect,
+            self._on_subscribe,
+            self._on_message,
+        )
+        client.on_socket_open = no_delay
+        if settings.username is not None or self._password is not None:
+            client.username_pw_set(settings.username or "", self._password)
+        if self._tls is not None:
+            client.tls_set_context(self._tls)
+        return client
+
+    def _connect(self, client: Any) -> None:
+        from paho.mqtt.packettypes import PacketTypes
+        from paho.mqtt.properties import Properties
+
+        properties: Any = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        properties.MaximumPacketSize = PACKET_BYTES_MAX
+        if self.settings.client_id:
+            properties.SessionExpiryInterval = SESSION_S
+        try:
+            client.connect(
+                self.address.host,
+                self.address.port,
+                KEEPALIVE_S,
+                clean_start=not self.settings.client_id,
+                properties=properties,
+            )
+        except ssl.SSLError as error:
+            close_left(error)
+            raise RefusedError(
+                f"no TLS with the broker: {getattr(error, 'verify_message', '') or error.reason}"
+            ) from None
+
+    def _gone(self, code: int) -> None:
+        if not self._answered:
+            self._unanswered += 1
+            if self._tls is not None and self._unanswered >= _UNANSWERED_MAX:
+                raise RefusedError(
+                    "the broker ends the connection before it answers; does it want a certificate of ours?"
+                )
+        raise ConnectionError(self._mqtt.error_string(code).rstrip("."))
+
+    def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        self._answered, self._unanswered = True, 0
+        if reason.value in _REFUSALS:
+            self._refusal = RefusedError(f"the broker refused: {reason}")
+        elif not reason.is_failure:
+            client.subscribe(self.address.path, qos=1)
+
+    def _on_subscribe(self, _client: Any, _data: Any, _number: int, reasons: list[Any], _properties: Any) -> None:
+        if any(reason.is_failure for reason in reasons):
+            self._refusal = RefusedError(f"the broker does not let us read {self.address.path}: {reasons[0]}")
+        else:
+            self._stands()
+
+    def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
+        payload = message.payload
+        try:
+            batch = self._lines.decode(payload) if payload[:1] == b"{" else self._frames.decode(payload)
+        except InputError as error:
+            self._malformed(error)
+            return
+        if batch is not None:
+            self._deliver(batch)
+
+
+def tls_context(settings: SourceSettings) -> ssl.SSLContext:
+    """What TLS needs: the authority that is trusted, and our own certificate where one is given."""
+    authority = None if settings.ca_file is None else existing(settings.ca_file, "ca_file")
+    try:
+        context = ssl.create_default_context(cafile=authority)
+        if settings.certificate_file is not None:
+            key = None if settings.key_file is None else existing(settings.key_file, "key_file")
+            context.load_cert_chain(existing(settings.certificate_file, "certificate_file"), key)
+    except ssl.SSLError as error:
+        raise InputError(f"a certificate or key of source cannot be used: {error.reason or error}") from None
+    return context
+
+
+def close_left(error: ssl.SSLError) -> None:
+    """Close the socket that paho leaves open where the handshake fails; nothing but the error still knows it."""
+    trace = error.__traceback__
+    while trace is not None:
+        for left in trace.tb_frame.f_locals.values():
+            if isinstance(left, ssl.SSLSocket):
+                left.close()
+        trace = trace.tb_next
+
+
+def no_delay(_client: Any, _data: Any, link: socket.socket) -> None:
+    link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+SOURCE = MqttSource

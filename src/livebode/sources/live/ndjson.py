@@ -1,0 +1,123 @@
+"""Batches as JSON, one object a line: for programs that have no binary frame at hand."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Channel, InputError
+from livebode.sources.live.batch import CHANNELS_MAX, VALUES_MAX, Batch
+from livebode.sources.live.settings import named_channels
+
+LINE_BYTES_MAX = 8 << 20
+KEYS = {"sample", "data", "channels", "rate_hz", "epoch", "stamp_s"}
+
+
+def encode_line(batch: Batch) -> bytes:
+    r"""A batch as one line.
+
+    >>> encode_line(Batch(3, np.array([[1.0, 2.5]]), (Channel("w", "N m"),), 4000.0))
+    b'{"sample":3,"rate_hz":4000.0,"channels":["w [N m]"],"data":[[1.0,2.5]]}\n'
+    """
+    said: dict[str, Any] = {
+        "sample": batch.first_sample,
+        "rate_hz": batch.rate_hz,
+        "channels": [
+            f"{channel.name} [{channel.unit}]" if channel.unit else channel.name for channel in batch.channels
+        ],
+        "data": batch.data.tolist(),
+    }
+    said |= {"epoch": batch.epoch} if batch.epoch else {}
+    said |= {"stamp_s": batch.stamp_s} if batch.stamp_s is not None else {}
+    return json.dumps(said, separators=(",", ":")).encode() + b"\n"
+
+
+class LineDecoder:
+    """Turns lines into Batches; what a line leaves out of channels, rate and epoch is as in the one before.
+
+    Parameters
+    ----------
+    rate_hz
+        The rate, where lines do not state it.
+    """
+
+    def __init__(self, rate_hz: float | None = None) -> None:
+        self._channels: tuple[Channel, ...] = ()
+        self._rate_hz = rate_hz
+        self._epoch = 0
+
+    def decode(self, line: bytes, arrived_s: float = float("nan")) -> Batch:
+        """The batch in a line: an object with `sample`, `data` (a list of numbers for each channel; null is NaN), and
+        where they are new `channels` ("name [unit]"), `rate_hz`, `epoch` and `stamp_s`.
+
+        Raises
+        ------
+        InputError
+            Where the line is too long, no JSON object, or has a key or value that cannot be.
+        """
+        if len(line) > LINE_BYTES_MAX:
+            raise InputError(f"a line is longer than {LINE_BYTES_MAX} bytes")
+        said = _object(line)
+        channels = _channels(said["channels"]) if "channels" in said else self._channels
+        rate_hz = _number(said, "rate_hz") if "rate_hz" in said else self._rate_hz
+        epoch = _whole(said, "epoch") if "epoch" in said else self._epoch
+        stamp_s = _number(said, "stamp_s") if said.get("stamp_s") is not None else None
+        if not channels or rate_hz is None:
+            raise InputError("the first line names no channels or no rate_hz; add them")
+        batch = Batch(_whole(said, "sample"), _data(said), channels, rate_hz, epoch, stamp_s, arrived_s)
+        self._channels, self._rate_hz, self._epoch = channels, rate_hz, epoch
+        return batch
+
+
+def _object(line: bytes) -> dict[str, Any]:
+    try:
+        said = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"a line is not JSON: {type(error).__name__}") from None
+    if not isinstance(said, dict):
+        raise InputError("a line is JSON but no object")
+    if unknown := sorted(said.keys() - KEYS):
+        raise InputError(f"a line has the key {unknown[0][:40]!r}; known are {', '.join(sorted(KEYS))}")
+    if missing := {"sample", "data"} - said.keys():
+        raise InputError(f"a line has no {min(missing)!r}")
+    return said
+
+
+def _channels(names: object) -> tuple[Channel, ...]:
+    if not isinstance(names, list) or len(names) > CHANNELS_MAX or not all(isinstance(n, str) for n in names):
+        raise InputError("channels is not a list of names")
+    return named_channels(names)
+
+
+def _number(said: dict[str, Any], key: str) -> float:
+    value = said[key]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{key} is not a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"{key} is larger than any float") from None
+
+
+def _whole(said: dict[str, Any], key: str) -> int:
+    value = said[key]
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 64:
+        raise InputError(f"{key} is not a whole number from 0 to 2^64")
+    return value
+
+
+def _data(said: dict[str, Any]) -> NDArray[np.float64]:
+    rows = said["data"]
+    if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        raise InputError("data is not a list of one list for each channel")
+    if sum(map(len, rows)) > VALUES_MAX or len({len(row) for row in rows}) != 1:
+        raise InputError(f"the lists in data are not equally long, or have more than {VALUES_MAX} values")
+    if not all(type(value) in (int, float, type(None)) for row in rows for value in row):
+        raise InputError("data has something else than numbers and null")
+    try:
+        return np.array(rows, dtype=np.float64)
+    except (OverflowError, ValueError, TypeError):
+        raise InputError("data has a number that is larger than any float") from None

@@ -1,0 +1,196 @@
+"""OPC UA: arrays of samples with source timestamps, from a server's data changes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import OrderedDict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+from livebode.sources.live.address import Address
+from livebode.sources.live.batch import VALUES_MAX, Batch
+from livebode.sources.live.numbered import Numbered
+from livebode.sources.live.secret import existing, password
+from livebode.sources.live.settings import SourceSettings, named_channels
+from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
+
+REQUEST_S = 5.0
+PUBLISH_MS = 50
+QUEUE = 1000
+"""Batches that the server is asked to keep between two publications."""
+INCOMPLETE_MAX = 64
+_REFUSALS = (
+    "BadCertificate", "BadSecurityChecksFailed", "BadIdentityToken", "BadUserAccessDenied", "BadSecurityPolicyRejected",
+    "BadNodeId", "BadUserSignatureInvalid", "BadSecurityModeRejected",
+)  # fmt: skip
+
+
+class Gathered:
+    """Puts together what belongs to one moment: one array for each channel, and the number of its first sample.
+
+    At most 64 moments wait for their missing parts; older ones are given up and become gaps.
+    """
+
+    def __init__(self, nodes: dict[str, str], rate_hz: float, sample_node: str | None) -> None:
+        self._keys = list(nodes.values())
+        self._channels = named_channels(list(nodes))
+        self._rate_hz, self._sample_node = rate_hz, sample_node
+        self._wanted = {*self._keys, *([sample_node] if sample_node else [])}
+        self._numbered = Numbered(self._channels, rate_hz)
+        self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
+
+    def take(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
+        """A new value of node `key`; the batch that it completes. InputError for what no batch can be made of."""
+        if stamp is None:
+            raise InputError(f"node {key} has no source timestamp; the server must give one for each array")
+        found = whole(value) if key == self._sample_node else numbers(value)
+        moment = self._moments.setdefault(stamp, {})
+        moment[key] = found
+        if moment.keys() != self._wanted:
+            while len(self._moments) > INCOMPLETE_MAX:
+                self._moments.popitem(last=False)
+            return None
+        del self._moments[stamp]
+        rows = [moment[key] for key in self._keys]
+        if len({len(row) for row in rows}) != 1 or not len(rows[0]):
+            raise InputError(f"the arrays of one moment have the lengths {[len(row) for row in rows][:8]}")
+        stamp_s = stamp.replace(tzinfo=stamp.tzinfo or UTC).timestamp()
+        first = moment[self._sample_node] if self._sample_node else self._numbered.number(stamp_s, len(rows[0]))
+        return Batch(first, np.stack(rows), self._channels, self._rate_hz, 0, stamp_s)
+
+
+def numbers(value: Any) -> NDArray[np.float64]:
+    """A variant's value as samples; a single number is an array of one.
+
+    >>> numbers([1, 2.5]), numbers(True)
+    (array([1. , 2.5]), array([1.]))
+    """
+    values = value if isinstance(value, list) else [value]
+    if len(values) > VALUES_MAX or not all(isinstance(x, bool | int | float) for x in values):
+        raise InputError("a node's value is no array of numbers, or too long")
+    try:
+        return np.array(values, dtype=np.float64)
+    except OverflowError:
+        raise InputError("a node's value has a number that is larger than any float") from None
+
+
+def whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError("the value of sample_node is no whole number")
+    return value
+
+
+class OpcUaSource(LiveSource):
+    """Subscribes to one array node for each channel."""
+
+    format: ClassVar[str] = "opc ua"
+
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        super().__init__(settings, address)
+        try:
+            import asyncua
+        except ImportError:
+            raise InputError("opc.tcp needs the OPC UA library; pip install livebode[opcua]") from None
+        self._asyncua: Any = asyncua
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # else it says on its own what we say in Events
+        if not settings.nodes or settings.rate_hz is None:
+            raise InputError("source needs nodes and rate_hz for opc.tcp; docs/live.md says what the server must have")
+        for node in [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]:
+            self._checked_node(node)
+        self._password = password(settings)
+        self._files = self._security_files()
+
+    def _checked_node(self, node: str) -> None:
+        try:
+            self._asyncua.ua.NodeId.from_string(node)
+        except Exception:
+            raise InputError(
+                f"source.nodes has {node[:80]!r}, which is no node id; it looks like ns=2;s=axis.w"
+            ) from None
+
+    def _security_files(self) -> tuple[str, str, str] | None:
+        s = self.settings
+        given = {name: getattr(s, name) for name in ("certificate_file", "key_file", "server_certificate_file")}
+        if s.security is None:
+            if named := [name for name, file in given.items() if file is not None]:
+                raise InputError(f"source.{named[0]} needs source.security, such as 'Basic256Sha256'")
+            return None
+        if missing := [name for name, file in given.items() if file is None]:
+            raise InputError(f"source.security needs {missing[0]} too; without it nobody is who they say")
+        certificate, key, server = (existing(file, name) for name, file in given.items())
+        return certificate, key, server
+
+    def _receive(self) -> bool:
+        ua = self._asyncua.ua
+        try:
+            asyncio.run(self._session())
+        except ua.UaError as error:
+            name = type(error).__name__
+            if name.startswith(_REFUSALS):
+                raise RefusedError(f"the server refused ({name})") from None
+            raise ConnectionError(f"{name}: {error}"[:200]) from None
+        return False
+
+    async def _session(self) -> None:
+        settings = self.settings
+        client = self._asyncua.Client(str(self.address), timeout=REQUEST_S)
+        if settings.username is not None:
+            client.set_user(settings.username)
+        if self._password is not None:
+            client.set_password(self._password)
+        if self._files is not None:
+            await self._secure(client, *self._files)
+        assert settings.rate_hz is not None
+        gathered = Gathered(settings.nodes, settings.rate_hz, settings.sample_node)
+        wanted = [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]
+        async with client:
+            by_node = {client.get_node(text): text for text in wanted}
+            subscription: Any = await client.create_subscription(PUBLISH_MS, Handler(self, gathered, by_node))
+            items = await subscription.subscribe_data_change(list(by_node), queuesize=QUEUE, sampling_interval=0)
+            for text, item in zip(by_node.values(), items):
+                if isinstance(item, self._asyncua.ua.StatusCode):
+                    raise RefusedError(f"the server does not give node {text} ({item.name})")
+            self._stands()
+            while not self._stop.is_set():
+                await asyncio.sleep(TICK_S)
+                await client.check_connection()
+
+    async def _secure(self, client: Any, certificate: str, key: str, server: str) -> None:
+        from asyncua.crypto import security_policies, uacrypto
+
+        policy = getattr(security_policies, f"SecurityPolicy{self.settings.security}")
+        try:
+            expected = await uacrypto.load_certificate(Path(server))
+            # Asked without security: only what comes next proves that the server has the key as well.
+            plain = self._asyncua.Client(str(self.address), timeout=REQUEST_S)
+            shown = {endpoint.ServerCertificate for endpoint in await plain.connect_and_get_server_endpoints()}
+            if uacrypto.der_from_x509(expected) not in shown:  # type: ignore[no-untyped-call]
+                raise RefusedError("the server shows another certificate than source.server_certificate_file")
+            await client.set_security(policy, certificate, key, server_certificate=server)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"a certificate or key of source cannot be read: {str(error)[:100]}") from None
+
+
+class Handler:
+    """Where asyncua brings data changes."""
+
+    def __init__(self, source: OpcUaSource, gathered: Gathered, by_node: dict[Any, str]) -> None:
+        self._source, self._gathered, self._by_node = source, gathered, by_node
+
+    def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
+        """A node has a new value."""
+        try:
+            batch = self._gathered.take(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
+            if batch is not None:
+                self._source._deliver(batch)
+        except InputError as error:
+            self._source._malformed(error)
+
+
+SOURCE = OpcUaSource

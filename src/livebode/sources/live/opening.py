@@ -1,0 +1,42 @@
+"""From the settings to the source: a new kind is one line in MODULES."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from livebode.nouns import InputError
+from livebode.sources.live.address import Address, parse_address
+from livebode.sources.live.follow import FollowSource
+from livebode.sources.live.settings import SourceSettings, check_keys
+from livebode.sources.live.source import LiveSource
+
+MODULES = {
+    "udp": "udp",
+    "tcp": "tcp",
+    "stdin": "lines",
+    "mqtt": "mqtt",
+    "mqtts": "mqtt",
+    "opc.tcp": "opcua",
+    "ads": "ads",
+}
+"""The module of each kind of URL; it ends with SOURCE, and imports its library when the source is made."""
+
+
+def open_source(settings: SourceSettings) -> LiveSource:
+    """The source at `settings.url`, or the `log` that grows; connected, its channels and rate known.
+
+    Raises
+    ------
+    InputError
+        Where the settings do not fit the kind of source, its library is missing, the peer refuses us, or no samples
+        come within `timeout_s`.
+    """
+    if settings.url is None:
+        check_keys(settings, "log")
+        if settings.log is None or not settings.follow:
+            raise InputError("source names no machine; give url, such as udp://0.0.0.0:5000, or log with follow = true")
+        return FollowSource(settings, Address("follow", path=str(settings.log))).open()
+    address = parse_address(settings.url)
+    check_keys(settings, address.scheme)
+    kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
+    return kind(settings, address).open()

@@ -1,0 +1,73 @@
+"""What a live source has to say: counts without limit, Events at a bounded pace."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from livebode.nouns import Event
+
+KINDS = (
+    "connected", "disconnected", "refused", "loss", "repeat", "reordered", "restart", "clock-jump", "wrong-rate",
+    "layout-changed", "unit-changed", "malformed", "foreign", "overflow",
+)  # fmt: skip
+"""Kinds of Events of live sources; docs/live.md says what each means."""
+
+BURST = 50
+PER_SECOND = 5.0
+PENDING_MAX = 1000
+MESSAGE_MAX = 500
+
+
+class Said:
+    """Collects Events from any thread. Of each kind 50 may come at once and then 5 a second.
+
+    Those held back are counted, and the next Event of their kind says how many in ``details["more"]``: a flood of
+    rubbish fills neither memory nor disk.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._events: list[Event] = []
+        self._tokens: dict[str, tuple[float, float]] = {}
+        self._held: Counter[str] = Counter()
+        self._counts = Counter(dict.fromkeys(KINDS, 0))
+        self.position: tuple[int, float] = (0, 0.0)
+        """Sample and time that Events speak for which do not say it themselves."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How often each kind happened."""
+        with self._lock:
+            return dict(self._counts)
+
+    def say(self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any) -> None:
+        """Count `kind`, and make an Event of it if there is room."""
+        with self._lock:
+            self._counts[kind] += 1
+            if not self._room(kind):
+                self._held[kind] += 1
+                return
+            at, time_s = self.position if sample is None else (sample, sample / rate_hz)
+            if held := self._held.pop(kind, 0):
+                details["more"] = held
+            self._events.append(Event(kind, at, time_s, message[:MESSAGE_MAX], details))
+
+    def drain(self) -> list[Event]:
+        """Events since the last call."""
+        with self._lock:
+            events, self._events = self._events, []
+        return events
+
+    def _room(self, kind: str) -> bool:
+        if len(self._events) >= PENDING_MAX:
+            return False
+        now = self._clock()
+        tokens, then = self._tokens.get(kind, (float(BURST), now))
+        tokens = min(float(BURST), tokens + (now - then) * PER_SECOND)
+        self._tokens[kind] = (tokens - 1 if tokens >= 1 else tokens, now)
+        return tokens >= 1

@@ -1,0 +1,238 @@
+"""LiveSource: what every live source has in common. A new one implements `_receive`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from livebode.nouns import Channel, Event, InputError, missing_channel
+from livebode.sources.live.address import Address
+from livebode.sources.live.batch import Batch, LiveBlock
+from livebode.sources.live.health import Health
+from livebode.sources.live.inbox import Inbox
+from livebode.sources.live.pauses import Pauses
+from livebode.sources.live.said import Said
+from livebode.sources.live.sequencer import CONFIRMED, Sequencer
+from livebode.sources.live.settings import SourceSettings
+
+TICK_S = 0.1
+"""How soon a request to end is seen."""
+
+
+class RefusedError(Exception):
+    """The peer does not let us in (certificate, password, policy): trying again would not help."""
+
+
+class LiveSource(ABC):
+    """A machine that sends its samples in batches, as a source of Blocks.
+
+    A thread receives and reconnects by itself with growing pauses; `blocks` puts the batches in order. A source that is
+    not emptied fast enough drops what comes then, which becomes a gap, unless its sender can wait.
+
+    Use it as a context manager, or call `close`.
+    """
+
+    format: ClassVar[str]
+    reorders: ClassVar[bool] = False
+    """Whether batches can arrive in another order than they were sent."""
+    waits: ClassVar[bool] = False
+    """Whether the sender can wait until there is room."""
+
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        self.settings, self.address = settings, address
+        self._said = Said()
+        self._inbox = Inbox()
+        self._sequencer = Sequencer(
+            self._said,
+            reorder=settings.reorder_batches if self.reorders else 0,
+            rate_hz=settings.rate_hz,
+            confirmed=CONFIRMED if self.reorders else 1,
+        )
+        self._stop = threading.Event()
+        self._pauses = Pauses()
+        self._thread = threading.Thread(target=self._work, name=f"livebode {address.scheme}", daemon=True)
+        self._ready: deque[LiveBlock] = deque()
+        self._connected = False
+        self._outage = False
+        self._failure: BaseException | None = None
+        self._refused: str | None = None
+        self._trouble = "nobody sent anything"
+        self._first: tuple[float, int] | None = None
+        self._newest: tuple[float, float | None] | None = None
+        self._received = 0
+
+    @abstractmethod
+    def _receive(self) -> bool:
+        """Connect and call `_deliver` for what comes, until `_stop` is set (then False) or the sender's end (True).
+
+        Raises
+        ------
+        OSError
+            Where there is no connection, or no longer one; it is tried again.
+        RefusedError
+            Where trying again would not help.
+        """
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Channels of the stream, as its first batch named them."""
+        return self._sequencer.face.channels
+
+    @property
+    def rate_hz(self) -> float:
+        assert self._sequencer.face.rate_hz is not None
+        return self._sequencer.face.rate_hz
+
+    @property
+    def samples(self) -> int | None:
+        """None: it has no end that is known."""
+        return None
+
+    @property
+    def first_sample(self) -> int | None:
+        """The sender's number of the sample at which it was begun (or begun anew)."""
+        return self._sequencer.first_sample
+
+    @property
+    def health(self) -> Health:
+        clock, newest, first = self._sequencer.clock, self._newest, self._first
+        measured = None
+        if first is not None and newest is not None and newest[0] > first[0]:
+            measured = (self._received - first[1]) / (newest[0] - first[0])
+        return Health(
+            connected=self._connected,
+            counts=self._said.counts,
+            lost=self._sequencer.lost,
+            silent_s=None if newest is None else time.monotonic() - newest[0],
+            measured_hz=measured,
+            clock_offset_s=None if clock is None else clock.offset_s,
+            latency_s=None if newest is None else newest[1],
+            waiting_bytes=self._inbox.bytes,
+        )
+
+    def open(self) -> Self:
+        """Begin to receive, and wait for the first batch; InputError where none comes within `timeout_s`."""
+        self._thread.start()
+        until = time.monotonic() + self.settings.timeout_s
+        while not self.channels:
+            if self._inbox.ended or time.monotonic() > until:
+                self.close()
+                self._raise_failure()
+                why = self._refused or f"no samples came within {self.settings.timeout_s:g} s ({self._trouble})"
+                raise InputError(f"{self.address}: {why}")
+            self._take(TICK_S)
+        return self
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock]:
+        """The samples of `channels` as they come, from the first received; ends with the sender or with `close`.
+
+        There is one stream: what one iteration took, another does not see.
+
+        Raises
+        ------
+        InputError
+            At once for a missing channel.
+        """
+        names = [channel.name for channel in self.channels]
+        for name in channels or ():
+            if name not in names:
+                raise InputError(missing_channel(name, names))
+        rows = [names.index(name) for name in (names if channels is None else channels)]
+        labels = tuple(self.channels[row] for row in rows)
+        return (replace(block, data=block.data[rows], channels=labels) for block in self._stream())
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
+        return self._said.drain()
+
+    def stop(self) -> None:
+        """Ask it to end: `blocks` gives what was received and then ends. May be called from a signal handler."""
+        self._stop.set()
+
+    def close(self) -> None:
+        """End it and wait until its connection is closed."""
+        self.stop()
+        self._inbox.close()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _stream(self) -> Iterator[LiveBlock]:
+        while True:
+            while self._ready:
+                yield self._ready.popleft()
+            if self._inbox.ended:
+                break
+            self._take(TICK_S)
+        yield from self._sequencer.finish()
+        self._raise_failure()
+
+    def _take(self, timeout_s: float) -> None:
+        batch = self._inbox.get(timeout_s)
+        if batch is None:
+            self._ready += self._sequencer.poll(time.monotonic())
+        else:
+            self._ready += self._sequencer.push(batch)
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _work(self) -> None:
+        try:
+            while not self._stop.is_set():
+                try:
+                    if self._receive():
+                        break
+                except OSError as error:
+                    self._lost_connection(str(error.strerror or error) or type(error).__name__)
+                    self._stop.wait(self._pauses.next_s())
+        except RefusedError as error:
+            self._refused = str(error)
+            self._said.say("refused", f"{self.address}: {error}; it is not tried again")
+        except BaseException as error:  # of ours, or the library's: it must not vanish with the thread
+            self._failure = error
+        finally:
+            self._connected = False
+            self._inbox.close()
+
+    def _stands(self) -> None:
+        """A connection stands."""
+        self._connected, self._outage = True, False
+        self._said.say("connected", f"connected to {self.address}")
+
+    def _lost_connection(self, why: str) -> None:
+        if not self._outage:
+            self._said.say("disconnected", f"{self.address}: {why}; it is tried again with growing pauses")
+        self._connected, self._outage, self._trouble = False, True, why
+
+    def _malformed(self, why: object) -> None:
+        self._said.say("malformed", f"{self.address}: {why}")
+        self._trouble = str(why)
+
+    def _deliver(self, batch: Batch) -> None:
+        now = time.monotonic()
+        self._pauses.reset()
+        samples = batch.data.shape[1]
+        latency = None
+        if batch.stamp_s is not None:
+            latency = time.time() - (batch.stamp_s + (samples - 1) / batch.rate_hz)
+        self._newest = (now, latency)
+        self._received += samples
+        self._first = self._first or (now, self._received)
+        if np.isnan(batch.arrived_s):
+            batch = replace(batch, arrived_s=now)
+        if not self._inbox.put(batch, self.waits) and not self._stop.is_set():
+            self._said.say("overflow", f"{samples} samples came faster than they were taken and were dropped")

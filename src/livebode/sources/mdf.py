@@ -1,0 +1,123 @@
+"""MDF 4 and 3, the file of measurement systems in vehicles: channel groups streamed by asammdf."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from livebode.nouns import InputError
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+
+
+class MdfRecording(Recording):
+    """An MDF file. A channel goes by its name, or by group/name (groups from 0) where the name stands in several.
+
+    Groups have their own time each: those of one length count together, as series in other formats do. Values are
+    physical; a sample that the file marks as invalid is NaN.
+    """
+
+    format: ClassVar[str] = "mdf"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        columns: list[Column] = []
+        skipped: list[Skipped] = []
+        with opened(path) as file:
+            for at, group in enumerate(file.groups):
+                if len(columns) + len(group.channels) > COLUMNS_MAX:
+                    raise InputError(f"{path} has more than {COLUMNS_MAX} channels; is it a recording?")
+                samples = int(group.channel_group.cycles_nr)
+                self._check_size(file, at, samples)
+                for index, channel in enumerate(group.channels):
+                    self._check_place(channel, int(group.channel_group.samples_byte_nr))
+                    column = Column(channel.name, unit_of(channel), samples, key=(at, index))
+                    first = file.get(group=at, index=index, record_count=1, ignore_invalidation_bits=True)
+                    if first.samples.ndim == 1 and first.samples.dtype.kind in "fiub":
+                        columns.append(replace(column, unit=str(first.unit or column.unit)))
+                    else:
+                        skipped.append(Skipped(channel.name, "its values are not single numbers"))
+        count = Counter(column.name for column in columns)
+        self.columns = tuple(
+            replace(column, name=f"{column.key[0]}/{column.name}") if count[column.name] > 1 else column
+            for column in columns
+        )
+        self.skipped = tuple(skipped)
+
+    def _check_size(self, file: Any, at: int, samples: int) -> None:
+        """InputError where a group declares more than the file can hold, uncompressed data as compressed by 1000."""
+        width = int(file.groups[at].channel_group.samples_byte_nr)
+        if samples * max(width, 1) > 1000 * self.path.stat().st_size:
+            raise InputError(f"{self.path} declares {samples} samples of {width} bytes, more than it can hold")
+
+    def _check_place(self, channel: Any, record_bytes: int) -> None:
+        """InputError where a channel lies outside its record: asammdf would read what is behind it in memory."""
+        if hasattr(channel, "byte_offset"):
+            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
+        else:
+            end = channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0) + channel.bit_count
+        if end > 8 * record_bytes:
+            raise InputError(f"{self.path}: channel {channel.name!r} ends at bit {end} of {record_bytes} bytes")
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        samples = columns[0].samples or 0
+        with opened(self.path) as file:
+            for first in range(0, samples, rows):
+                count = min(rows, samples - first)
+                chunk = [self._values(file, column, first, count) for column in columns]
+                if any(len(found) != count for found in chunk):
+                    raise InputError(f"{self.path} ends before its {samples} samples; is it whole?")
+                yield chunk
+
+    def _values(self, file: Any, column: Column, first: int, count: int) -> Any:
+        group, index = column.key
+        found, invalid = file.get(
+            group=group, index=index, record_offset=first, record_count=count, samples_only=True,
+            ignore_invalidation_bits=True,
+        )  # fmt: skip
+        if invalid is not None and np.any(invalid):
+            found = np.where(invalid, np.nan, found)
+        return found
+
+
+def unit_of(channel: Any) -> str:
+    return str(getattr(channel, "unit", "") or "")
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise InputError(f"{path} needs the MDF library; pip install livebode[mdf]") from None
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says is in the error that follows
+    with path.open("rb") as raw:  # by its name it would be mapped, and a mapped file that shrinks kills the process
+        try:
+            file = MDF(raw)
+        except Exception as error:
+            abandon(error)
+            raise
+        try:
+            yield file
+        finally:
+            file.close()
+
+
+def abandon(error: Exception) -> None:
+    """Close what asammdf left half made, which would complain on standard error when it is collected."""
+    trace = error.__traceback__
+    while trace is not None:
+        half: Any = trace.tb_frame.f_locals.get("self")
+        if hasattr(half, "_tempfile") and not getattr(half, "_closed", True):
+            half._closed = True
+            half._tempfile.close()
+        trace = trace.tb_next
+
+
+READER = MdfRecording

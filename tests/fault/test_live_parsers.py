@@ -1,0 +1,289 @@
+"""Whatever arrives: a batch that is what was sent, or one clear sentence. Bounded memory and time.
+
+LIVEBODE_LIVE_FUZZ=1000000 runs so many cases of each parser; the tests run a seeded share.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import struct
+import zlib
+
+import numpy as np
+import pytest
+
+from livebode.nouns import Channel, InputError
+from livebode.sources.live import Batch, FrameDecoder, Sequencer, SourceSettings, encode_layout, encode_samples
+from livebode.sources.live.address import parse_address
+from livebode.sources.live.frame import FRAME_BYTES_MAX, HEADER, FrameSplitter
+from livebode.sources.live.lines import LineSplitter
+from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_line
+from livebode.sources.live.said import Said
+from livebode.sources.live.settings import check_keys
+
+CASES = int(os.environ.get("LIVEBODE_LIVE_FUZZ", "10000"))
+CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
+ODD = [0, 1, 2**7, 2**8 - 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1, 2**62, 2**63, 2**64 - 1]
+
+
+def batch(first: int = 100, samples: int = 8) -> Batch:
+    rng = np.random.default_rng(first)
+    return Batch(first, rng.standard_normal((2, samples)), CHANNELS, 4000.0, epoch=5, stamp_s=1.7e9)
+
+
+def with_crc(raw: bytes) -> bytes:
+    """The same bytes with the right length and CRC, so that what lies behind those checks is reached."""
+    body = bytearray(raw[:-4])
+    if len(body) >= HEADER.size:
+        body[8:12] = struct.pack("<I", len(raw))
+    return bytes(body) + struct.pack("<I", zlib.crc32(body))
+
+
+def damaged(raw: bytes, rng: random.Random) -> bytes:
+    out = bytearray(raw)
+    for _ in range(rng.choice([1, 1, 2, 5])):
+        at = rng.randrange(len(out)) if out else 0
+        what = rng.randrange(5)
+        if what == 0:
+            out[at : at + 1] = rng.randbytes(1)
+        elif what == 1 and out:
+            out[at] ^= 1 << rng.randrange(8)
+        elif what == 2:
+            size = rng.choice([1, 2, 4, 8])
+            out[at : at + size] = (rng.choice(ODD) % 256**size).to_bytes(size, "little")
+        elif what == 3:
+            del out[at : at + rng.randrange(1, 20)]
+        else:
+            out[at:at] = rng.randbytes(rng.randrange(1, 9))
+    return bytes(out)
+
+
+def refused(error: pytest.ExceptionInfo[InputError] | InputError) -> None:
+    message = str(getattr(error, "value", error))
+    assert message
+    assert "\n" not in message
+    assert len(message) < 1000
+
+
+def test_damaged_frames_give_batches_or_a_sentence():
+    rng = random.Random(1)
+    seeds = [
+        encode_layout(CHANNELS, 4000.0, epoch=5),
+        encode_samples(batch()),
+        encode_samples(batch(), double=True),
+        encode_layout([Channel("ä" * 50, "°")], 1.0),
+    ]
+    decoder, sequencer = FrameDecoder(), Sequencer(Said())
+    decoder.decode(seeds[0])
+    decoded = 0
+    for _ in range(CASES):
+        raw = damaged(rng.choice(seeds), rng)
+        raw = with_crc(raw) if rng.random() < 0.7 else raw
+        try:
+            found = decoder.decode(raw)
+        except InputError as error:
+            refused(error)
+            continue
+        if found is not None:
+            decoded += 1
+            assert found.data.size <= len(raw) / 4
+            sequencer.push(found)  # a hostile batch that is well formed must not harm the stream either
+    assert decoded > CASES // 100
+    assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
+    assert len(sequencer._waiting) + len(sequencer._doubted) < 64
+
+
+def test_a_stream_of_bytes_finds_its_frames_behind_rubbish():
+    rng = random.Random(2)
+    for round_ in range(max(20, CASES // 100)):
+        frames = [encode_samples(batch(8 * i), sequence=i) for i in range(10)]
+        pieces = []
+        for frame in frames:
+            if rng.random() < 0.5:
+                rubbish = rng.randbytes(rng.randrange(200)).replace(b"LBOD", b"    ")
+                pieces.append(rng.choice([rubbish, rubbish + b"LBO", b"LBOD" + b"\x07" * 70]))
+            pieces.append(frame)
+        raw = b"".join(pieces)
+        splitter, found = FrameSplitter(), []
+        while raw:
+            size = rng.choice([1, 3, 50, 1000])
+            found += splitter.feed(raw[:size])
+            raw = raw[size:]
+        assert found == frames, round_
+        assert splitter.skipped == sum(map(len, pieces)) - sum(map(len, frames))
+
+
+def test_damaged_streams_keep_memory_bounded():
+    rng = random.Random(3)
+    splitter, decoder = FrameSplitter(), FrameDecoder()
+    decoder.decode(encode_layout(CHANNELS, 4000.0, epoch=5))
+    frame = encode_samples(batch())
+    for _ in range(CASES):
+        for found in splitter.feed(damaged(frame, rng)):
+            with contextlib.suppress(InputError):
+                decoder.decode(found)
+        assert len(splitter._bytes) <= FRAME_BYTES_MAX
+
+
+def test_damaged_lines_give_batches_or_a_sentence():
+    rng = random.Random(4)
+    seeds = [encode_line(batch()), b'{"sample":1,"data":[[1,null],[2,3e8]]}', b'{"sample":1,"data":[[],[]]}']
+    tokens = [
+        b"[",
+        b"]",
+        b"{",
+        b"}",
+        b'"',
+        b",",
+        b"null",
+        b"1e999",
+        b"-1",
+        b"NaN",
+        b"9" * 400,
+        b"true",
+        b"\\u0000",
+        b":",
+    ]
+    decoder, decoded = LineDecoder(), 0
+    decoder.decode(seeds[0])
+    for _ in range(CASES):
+        raw = bytearray(rng.choice(seeds))
+        if rng.random() < 0.5:
+            raw = bytearray(damaged(bytes(raw), rng))
+        else:
+            at = rng.randrange(len(raw))
+            raw[at : at + rng.randrange(4)] = rng.choice(tokens)
+        try:
+            decoder.decode(bytes(raw))
+            decoded += 1
+        except InputError as error:
+            refused(error)
+    assert decoded > CASES // 100
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (b"[" * 100_000, "not JSON"),
+        (b'{"a":' * 100_000, "not JSON"),
+        (b"[1]", "no object"),
+        (b"\xff\xfe", "not JSON"),
+        (b'{"sample":1,"data":[["1"]]}', "something else than numbers"),
+        (b'{"sample":1,"data":[[true]]}', "something else than numbers"),
+        (b'{"sample":1,"data":[[1],[1,2]]}', "not equally long"),
+        (b'{"sample":1.5,"data":[[1],[1]]}', "not a whole number"),
+        (b'{"sample":-1,"data":[[1],[1]]}', "not a whole number"),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":"4"}', "rate_hz is not a number"),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":-4}', "rate_hz=-4"),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":1' + b"0" * 400 + b"}", "larger than any float"),
+        (b'{"sample":1,"data":[[1],[1' + b"0" * 400 + b"]]}", "larger than any float"),
+        (b'{"sample":1,"data":[[1],[1]],"smaple":1}', "key 'smaple'"),
+        (b'{"data":[[1]]}', "no 'sample'"),
+        (b'{"sample":1,"data":[[1],[1]],"channels":["w","w"]}', "share a name"),
+        (b'{"sample":1,"data":[[1],[1]],"channels":["w","\\n"]}', "not printable"),
+        (b" " * (LINE_BYTES_MAX + 1), "longer than"),
+        (b'{"sample":1,"data":[[' + b"1," * (1 << 20) + b"1],[]]}", "more than"),
+    ],
+)
+def test_lines_that_are_refused(line, message):
+    decoder = LineDecoder()
+    decoder.decode(encode_line(batch()))
+    with pytest.raises(InputError, match=message) as caught:
+        decoder.decode(line)
+    refused(caught)
+
+
+def test_a_line_without_end_does_not_fill_the_memory():
+    splitter = LineSplitter()
+    for _ in range(3 * LINE_BYTES_MAX // 65536):
+        assert splitter.feed(b"x" * 65536) == []
+        assert sum(map(len, splitter._parts)) <= LINE_BYTES_MAX
+    assert splitter.feed(b'\n{"sample":1}\n') == [b'{"sample":1}']
+    assert splitter.cut == 1
+
+
+def test_lines_are_cut_anywhere_alike():
+    rng = random.Random(5)
+    lines = [json.dumps({"sample": i}).encode() for i in range(50)]
+    raw = b"\n".join(lines)
+    for _ in range(max(20, CASES // 100)):
+        splitter, found, at = LineSplitter(), [], 0
+        while at < len(raw):
+            size = rng.randrange(1, 30)
+            found += splitter.feed(raw[at : at + size])
+            at += size
+        assert found + splitter.feed(b"") == lines
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [
+        (b"", "0 bytes"),
+        (b"HTTP/1.1 200 OK" * 10, "begins with b'HTTP'"),
+        (encode_samples(batch())[:-1], "declares"),
+        (encode_samples(batch())[:-4] + b"\0\0\0\0", "CRC"),
+        (with_crc(b"LBOD\x02" + encode_samples(batch())[5:]), "version 2"),
+        (with_crc(b"LBOD\x01\x03" + encode_samples(batch())[6:]), "kind 3"),
+        (with_crc(b"LBOD\x01\x01\x80" + encode_samples(batch())[7:]), "flags 128"),
+        (with_crc(encode_samples(batch())[:54] + b"\x07\x00" + encode_samples(batch())[56:]), "7 samples"),
+        (with_crc(encode_layout(CHANNELS, 1.0)[:-4] + b"x\n" + b"    "), "not the one that its header names"),
+    ],
+)
+def test_frames_that_are_refused(frame, message):
+    decoder = FrameDecoder()
+    decoder.decode(encode_layout(CHANNELS, 4000.0))
+    with pytest.raises(InputError, match=message) as caught:
+        decoder.decode(frame)
+    refused(caught)
+
+
+URLS = [
+    "udp://0.0.0.0:5000", "tcp://plc:1", "mqtt://broker/a/b", "mqtts://[::1]:8883/x", "opc.tcp://h:4840/server", "ads://h",
+    "stdin:",
+]  # fmt: skip
+
+
+def test_damaged_addresses_give_an_address_or_a_sentence():
+    rng = random.Random(6)
+    for _ in range(CASES):
+        url = damaged(rng.choice(URLS).encode(), rng).decode("utf-8", "replace")
+        try:
+            address = parse_address(url)
+        except InputError as error:
+            refused(error)
+        else:
+            assert parse_address(str(address)) == address
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("http://h:1", "no known kind"),
+        ("udp://:5000", "udp://host:port"),
+        ("udp://h", "udp://host:port"),
+        ("udp://h:99999", "no address"),
+        ("tcp://h:1/path", "leave out /path"),
+        ("mqtt://h?x=1", "no address"),
+        ("5000", "no known kind"),
+        ("udp://h:1\n", "not printable"),
+    ],
+)
+def test_addresses_that_are_refused(url, message):
+    with pytest.raises(InputError, match=message):
+        parse_address(url)
+
+
+def test_a_password_in_the_url_is_refused_and_not_repeated():
+    with pytest.raises(InputError) as caught:
+        parse_address("mqtt://user:hunter2@broker/topic")
+    assert "hunter2" not in str(caught.value)
+    assert "password_env" in str(caught.value)
+
+
+def test_a_key_of_another_kind_of_source_is_refused():
+    settings = SourceSettings(url="udp://h:1", nodes={"w": "ns=2;s=w"})
+    with pytest.raises(InputError, match=r"source\.nodes means nothing for udp; it takes rate_hz,"):
+        check_keys(settings, "udp")

@@ -1,0 +1,210 @@
+"""Wrong certificates and passwords are refused, said once, not tried again; no secret is ever repeated."""
+
+from __future__ import annotations
+
+import ssl
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.nouns import InputError
+from livebode.session import Axis
+from livebode.sources.live import SourceSettings, encode_layout, encode_samples, open_source
+from tests.peers.broker import TOPIC, Mosquitto, publisher, stop
+from tests.peers.certificates import Authority, self_signed
+from tests.peers.opcua import OpcUaPeer
+from tests.peers.peer import CHANNELS, RATE_HZ, Feeding, batches, program, until
+
+SECRET = "correct horse battery"
+
+
+@pytest.fixture(scope="module")
+def pki(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an authority, what it signed for the broker and for us, another authority, and a password file."""
+    folder = tmp_path_factory.mktemp("pki")
+    folder.chmod(0o755)
+    ours, other = Authority(folder, "authority"), Authority(folder, "other")
+    ours.sign("broker")
+    ours.sign("client")
+    other.sign("stranger")
+    self_signed(folder, "server", "urn:freeopcua:python:server")
+    self_signed(folder, "us", "urn:example.org:FreeOpcUa:opcua-asyncio")
+    self_signed(folder, "them", "urn:freeopcua:python:server")
+    (folder / "users").write_text(f"plc:{SECRET}\n")
+    mosquitto = Path(program("mosquitto"))
+    subprocess.run([mosquitto.parent / "../bin/mosquitto_passwd", "-U", folder / "users"], check=True)
+    (folder / "users").chmod(0o644)
+    (folder / "password").write_text(SECRET + "\n")
+    return folder
+
+
+@pytest.fixture
+def broker(pki: Path, tmp_path: Path):
+    """mosquitto that wants a certificate of its authority and a password."""
+    lines = (
+        f"cafile {pki / 'authority.crt'}", f"certfile {pki / 'broker.crt'}", f"keyfile {pki / 'broker.key'}",
+        "require_certificate true", f"password_file {pki / 'users'}",
+    )  # fmt: skip
+    with Mosquitto(tmp_path, lines) as found:
+        yield found
+
+
+def settings(broker: Mosquitto, pki: Path, **changes: object) -> dict[str, object]:
+    given = {
+        "url": f"mqtts://127.0.0.1:{broker.port}/{TOPIC}",
+        "ca_file": pki / "authority.crt",
+        "certificate_file": pki / "client.crt",
+        "key_file": pki / "client.key",
+        "username": "plc",
+        "password_file": pki / "password",
+        "reorder_batches": 0,
+        "timeout_s": 20.0,
+    } | changes
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def test_mqtt_with_certificates_and_a_password(broker, pki):
+    given = batches(20)
+    context = ssl.create_default_context(cafile=pki / "authority.crt")
+    context.load_cert_chain(pki / "client.crt", pki / "client.key")
+    client = publisher(broker.port, context, ("plc", SECRET))
+
+    def script() -> None:
+        until(lambda: broker.logged("Sending SUBACK"), "a subscription")
+        client.publish(TOPIC, encode_layout(CHANNELS, RATE_HZ), qos=1)
+        for batch in given:
+            client.publish(TOPIC, encode_samples(batch, double=True), qos=1)
+
+    with Feeding(script), open_source(SourceSettings(**settings(broker, pki))) as source:
+        parts = []
+        for block in source.blocks():
+            parts.append(block["y"])
+            if block["w"][-1] == given[-1].stop - 1:
+                break
+        told = repr(source.drain_events()) + repr(source.health)
+    stop(client)
+    np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
+    assert SECRET not in told
+
+
+@pytest.mark.parametrize(
+    ("changes", "message", "attempts"),
+    [
+        ({"ca_file": "other.crt"}, "no TLS with the broker: .*certificate", 1),
+        ({"username": "somebody"}, "the broker refused: Not authorized", 1),
+        ({"password_file": "users"}, "the broker refused: Not authorized", 1),
+        ({"certificate_file": "stranger.crt", "key_file": "stranger.key"}, "does it want a certificate", 3),
+        ({"certificate_file": None, "key_file": None}, "does it want a certificate", 3),
+    ],
+)
+def test_mqtt_refusals_are_said_once(broker, pki, changes, message, attempts):
+    changes = {key: value if value is None or key == "username" else pki / value for key, value in changes.items()}
+    before = broker.logged("New connection")
+    with pytest.raises(InputError, match=message) as caught:
+        open_source(SourceSettings(**settings(broker, pki, **changes)))
+    assert SECRET not in str(caught.value)
+    assert broker.logged("New connection") - before <= attempts
+
+
+def opcua(peer: OpcUaPeer, pki: Path, **changes: object) -> SourceSettings:
+    given = {
+        "username": "plc",
+        "password_file": pki / "password",
+        "security": "Basic256Sha256",
+        "certificate_file": pki / "us.der",
+        "key_file": pki / "us.pem",
+        "server_certificate_file": pki / "server.der",
+        "timeout_s": 20.0,
+    } | changes
+    return SourceSettings(**peer.settings, **given)
+
+
+def test_opc_ua_signed_and_encrypted(pki, tmp_path):
+    given = batches(20)
+    with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer:
+
+        def script() -> None:
+            peer.wait_ready()
+            for batch in given:
+                peer.send(batch)
+
+        with Feeding(script), open_source(opcua(peer, pki)) as source:
+            parts = []
+            for block in source.blocks():
+                parts.append(block["y"])
+                if block["w"][-1] == given[-1].stop - 1:
+                    break
+            told = repr(source.drain_events()) + repr(source.health)
+    np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
+    assert SECRET not in told
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"server_certificate_file": "them.der"}, "another certificate than source.server_certificate_file"),
+        ({"password_file": "users"}, "the server refused"),
+    ],
+)
+def test_opc_ua_refusals_are_said_once(pki, tmp_path, changes, message):
+    with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer, pytest.raises(InputError, match=message) as caught:
+        open_source(opcua(peer, pki, **{key: pki / value for key, value in changes.items()}))
+    assert SECRET not in str(caught.value)
+
+
+def test_a_node_that_is_not_there_is_refused(tmp_path):
+    with (
+        OpcUaPeer(tmp_path) as peer,
+        pytest.raises(InputError, match=r"does not give node ns=2;s=axis.z \(BadNodeIdUnknown\)"),
+    ):
+        open_source(SourceSettings(**peer.settings | {"nodes": {"w": "ns=2;s=axis.z"}, "timeout_s": 20.0}))
+
+
+def test_secrets_stay_out_of_the_configuration_that_is_recorded(tmp_path, monkeypatch):
+    monkeypatch.setenv("PLC_PASSWORD", SECRET)
+    (tmp_path / "axis.toml").write_text(
+        '[source]\nurl = "mqtt://h/t"\nusername = "plc"\npassword_env = "PLC_PASSWORD"\n[signals]\noutput = "y"\n'
+    )
+    axis = Axis.read(tmp_path / "axis.toml")
+    assert SECRET not in repr(axis) + axis.model_dump_json()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"password_env": "NOT_SET_ANYWHERE"}, "the environment has no 'NOT_SET_ANYWHERE'"),
+        ({"password_file": "/nowhere"}, "/nowhere cannot be read"),
+        ({"password_env": "A", "password_file": "B"}, "both password_env and password_file"),
+    ],
+)
+def test_secrets_that_are_not_there(given, message):
+    with pytest.raises(InputError, match=message):
+        open_source(SourceSettings(url="mqtt://127.0.0.1:1/t", **given))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"url": "mqtt://h/a/+"}, "wildcard"),
+        ({"url": "mqtt://h"}, "topic '' is empty"),
+        ({"url": "mqtts://h/t", "ca_file": "/nowhere"}, "no file /nowhere for source.ca_file"),
+        ({"url": "opc.tcp://h", "rate_hz": 1.0}, "needs nodes and rate_hz"),
+        ({"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "rubbish"}}, "no node id"),
+        ({"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "key_file": "k"}, "needs source.security"),
+        (
+            {"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "security": "Basic256Sha256"},
+            "needs certificate_file too",
+        ),
+        ({"url": "ads://h"}, "needs net_id, symbol and channels"),
+        ({"url": "ads://h", "net_id": "1.2", "symbol": "MAIN.x", "channels": ["w"]}, "no AMS net id"),
+        (
+            {"url": "ads://h", "net_id": "1.2.3.4.1.1", "symbol": "M.x", "channels": ["w"], "mode": "notify"},
+            "needs rate_hz for notifications",
+        ),
+    ],
+)
+def test_settings_that_cannot_be(given, message):
+    with pytest.raises(InputError, match=message):
+        open_source(SourceSettings(**given))

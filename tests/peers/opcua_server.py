@@ -1,0 +1,77 @@
+"""An asyncua server in a process of its own, told over standard input what to write.
+
+Lines in: {"sample": …, "data": […, …], "stamp_s": …}. Lines out: "serving" once, and "ready" when every node is
+subscribed to.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import sys
+from datetime import UTC, datetime
+
+from asyncua import Server, ua
+from asyncua.crypto.permission_rules import User, UserRole
+
+NODES = ("w", "y", "sample")
+
+
+class Users:
+    """One user with a password, as the command line says."""
+
+    def __init__(self, name: str, password: str) -> None:
+        self._login = (name, password)
+
+    def get_user(self, _server, username=None, password=None, certificate=None):
+        del certificate
+        return User(role=UserRole.User) if (username, password) == self._login else None
+
+
+async def serve(port: int, folder: str | None, login: list[str]) -> None:
+    server = Server(user_manager=Users(*login)) if login else Server()
+    await server.init()
+    server.set_endpoint(f"opc.tcp://127.0.0.1:{port}/livebode")
+    if folder:
+        server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
+        await server.load_certificate(f"{folder}/server.der")
+        await server.load_private_key(f"{folder}/server.pem")
+    axis = await server.nodes.objects.add_object(2, "axis")
+    variables = {}
+    for name in NODES:
+        empty = ua.Variant(0, ua.VariantType.Int64) if name == "sample" else ua.Variant([0.0], ua.VariantType.Double)
+        variables[name] = await axis.add_variable(ua.NodeId(f"axis.{name}", 2), name, empty)
+    async with server:
+        print("serving", flush=True)
+        await asyncio.gather(obey(server, variables), tell_ready(server))
+
+
+async def obey(server: Server, variables: dict) -> None:
+    loop = asyncio.get_running_loop()
+    while line := await loop.run_in_executor(None, sys.stdin.readline):
+        said = json.loads(line)
+        stamp = datetime.fromtimestamp(said["stamp_s"], UTC).replace(tzinfo=None)
+        values = {
+            "w": ua.Variant(said["data"][0], ua.VariantType.Double),
+            "y": ua.Variant(said["data"][1], ua.VariantType.Double),
+            "sample": ua.Variant(said["sample"], ua.VariantType.Int64),
+        }
+        for name, value in values.items():
+            await server.write_attribute_value(variables[name].nodeid, ua.DataValue(value, SourceTimestamp=stamp))
+    sys.exit(0)
+
+
+async def tell_ready(server: Server) -> None:
+    service = server.iserver.subscription_service
+    while True:
+        for subscription in service.subscriptions.values():
+            if len(subscription.monitored_item_srv._monitored_items) >= len(NODES):
+                print("ready", flush=True)
+                return
+        await asyncio.sleep(0.01)
+
+
+if __name__ == "__main__":
+    logging.disable(logging.CRITICAL)
+    asyncio.run(serve(int(sys.argv[1]), sys.argv[2] or None, sys.argv[3:]))

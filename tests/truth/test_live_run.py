@@ -1,0 +1,125 @@
+"""`livebode run` on a machine that sends: the same responses as from its recording, and a whole run directory."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from livebode.nouns import Channel
+from livebode.records import Run
+from livebode.sources.live import Batch, encode_layout, encode_samples
+from livebode.sources.live.ndjson import encode_line
+from tests.command import RATE_HZ, livebode, signals, write_parquet
+from tests.peers.peer import PATIENCE_S
+from tests.peers.plain import TcpPeer
+
+CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
+REST = """
+[signals]
+excitation = "w"
+input = "u"
+output = "y"
+[lines]
+frequencies = "50,100,200"
+window = 100
+[tracking]
+hop = 20
+"""
+
+
+def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch]:
+    columns = signals(samples)
+    data = np.array([columns[name] for name in "wuy"])
+    return [
+        Batch(first + at, data[:, at : at + size].copy(), CHANNELS, float(RATE_HZ), 9) for at in range(0, samples, size)
+    ]
+
+
+def axis(folder: Path, source: str, rest: str = REST) -> Path:
+    path = folder / "axis.toml"
+    path.write_text(f"[source]\n{source}\n{rest}")
+    return path
+
+
+def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
+    command = [Path(sys.executable).with_name("livebode"), "run", str(path), "--out", str(out), "--json"]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def table(out: Path) -> dict[str, np.ndarray]:
+    table = pa.concat_tables(Run.open(out).tables("responses"))
+    return {name: np.array(column) for name, column in table.to_pydict().items()}
+
+
+def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):
+    process = started(axis(tmp_path, 'url = "stdin:"'), tmp_path / "live")
+    out, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    assert (process.returncode, err) == (0, b"")
+    log = write_parquet(tmp_path / "log.parquet", signals())
+    livebode("run", axis(tmp_path, f'log = "{log}"'), "--out", tmp_path / "recorded")
+    live, recorded = table(tmp_path / "live"), table(tmp_path / "recorded")
+    for name in recorded:
+        np.testing.assert_array_equal(live[name], recorded[name], err_msg=name)
+    summary = json.loads(out)
+    assert summary["counts"]["samples"] == 2000
+    assert summary["source"]["first_sample"] == 70_000
+    assert summary["source"]["lost"] == 0
+    assert summary["found"]["format"] == "ndjson"
+
+
+def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
+    class Machine(TcpPeer):
+        layout = encode_layout(CHANNELS, float(RATE_HZ), epoch=9)
+
+    with Machine(tmp_path) as peer:
+        process = started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live")
+        peer.wait_ready()
+        for at, batch in enumerate(sent()):
+            if at not in (20, 21):
+                peer._link.sendall(encode_samples(batch, double=True))
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(2.0)  # it goes on, for the machine may send more
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, err) == (0, b"")
+    summary = json.loads(out)
+    assert summary["counts"]["samples"] == 1920
+    assert summary["counts"]["missing"] == summary["source"]["lost"] == 80
+    events = [json.loads(line) for line in (tmp_path / "live" / "events.jsonl").read_text().splitlines()]
+    assert [event["kind"] for event in events] == ["connected", "loss", "gap"]
+    assert (tmp_path / "live" / "bode.png").is_file()
+
+
+def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
+    path = axis(tmp_path, 'url = "stdin:"', REST.replace("window = 100", ""))
+    process = started(path, tmp_path / "live")
+    _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    assert process.returncode == 2
+    assert b"give lines.frequencies and lines.window for a live source" in err
+    assert not (tmp_path / "live").exists()
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("", "needs either a log or a url"),
+        ('log = "a"\nurl = "udp://h:1"', "needs either a log or a url"),
+        ('url = "udp://h"', "give udp://host:port"),
+        ('url = "udp://h:1"\nsymbol = "x"', "source.symbol means nothing for udp"),
+        ('url = "udp://h:1"\nreorder_batches = 1000', "source.reorder_batches = 1000 is not usable"),
+        ('url = "mqtt://me:secret@h/t"', "has no place in source.url"),
+        ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
+    ],
+)
+def test_sources_that_cannot_be(tmp_path, source, message):
+    result = livebode("run", axis(tmp_path, source), "--out", tmp_path / "live")
+    assert result.code == 2
+    assert message in result.err
+    assert "secret" not in result.err

@@ -1,0 +1,232 @@
+"""Batches in any order that the bound allows come out as they were taken; what is lost is exactly the gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from livebode.nouns import Channel
+from livebode.sources.live import Batch, LiveBlock, Sequencer
+from livebode.sources.live.said import BURST, Said
+
+CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
+RATE_HZ = 4000.0
+
+
+def stream(lengths: list[int], first: int = 0, epoch: int = 1, stamp_s: float | None = None) -> list[Batch]:
+    """Batches of these lengths; the value of a sample is its number, and minus it in the second channel."""
+    edges = first + np.concatenate([[0], np.cumsum(lengths)])
+    return [
+        Batch(
+            int(a),
+            np.arange(a, b) * np.array([[1.0], [-1.0]]),
+            CHANNELS,
+            RATE_HZ,
+            epoch,
+            None if stamp_s is None else stamp_s + (a - first) / RATE_HZ,
+            arrived_s=0.0,
+        )
+        for a, b in pairwise(edges)
+    ]
+
+
+def passed(batches: list[Batch], said: Said | None = None, **options: int) -> list[LiveBlock]:
+    sequencer = Sequencer(said or Said(), **options)
+    return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
+
+
+def content(blocks: list[LiveBlock]) -> list[tuple[int, bool, bytes]]:
+    return [(block.start, block.gap, block.data.tobytes()) for block in blocks]
+
+
+def displaced(batches: list[Batch], bound: int, draw: st.DataObject) -> list[Batch]:
+    """An order in which no batch is more than `bound` places late."""
+    left, order = list(range(len(batches))), []
+    for place in range(len(batches)):
+        due = [i for i in left if place - i >= bound]
+        pick = due[0] if due else left[draw.draw(st.integers(0, min(bound, len(left) - 1)))]
+        left.remove(pick)
+        order.append(pick)
+    assert max(order.index(i) - i for i in range(len(batches))) <= bound
+    return [batches[i] for i in order]
+
+
+@given(
+    lengths=st.lists(st.integers(1, 5), min_size=1, max_size=25),
+    first=st.integers(0, 10**12),
+    bound=st.integers(0, 8),
+    data=st.data(),
+)
+def test_reordering_within_the_bound_and_repeats_change_nothing(lengths, first, bound, data):
+    batches = stream(lengths, first)
+    order = displaced(batches, bound, data)
+    for _ in range(data.draw(st.integers(0, 20))):
+        again = data.draw(st.integers(0, len(order) - 1))
+        order.insert(data.draw(st.integers(again, len(order))), order[again])
+    said = Said()
+    blocks = passed(order, said, reorder=bound)
+    assert content(blocks) == content(passed(batches, reorder=bound))
+    assert [b.start for b in blocks] == [b.first_sample - first for b in batches]
+    assert said.counts["repeat"] == len(order) - len(batches)
+    assert said.counts["loss"] == said.counts["restart"] == said.counts["foreign"] == 0
+    latest, late = -1, 0
+    for at in dict.fromkeys(b.first_sample for b in order):
+        late += at < latest
+        latest = max(latest, at)
+    assert said.counts["reordered"] == late
+
+
+@given(
+    lengths=st.lists(st.integers(1, 5), min_size=3, max_size=40),
+    bound=st.integers(0, 6),
+    data=st.data(),
+)
+def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
+    batches = stream(lengths, 7)
+    lost = data.draw(st.sets(st.integers(1, len(batches) - 2)))
+    kept = [batch for i, batch in enumerate(batches) if i not in lost]
+    said = Said()
+    blocks = passed(displaced(kept, bound, data), said, reorder=bound)
+    truth = [(b.first_sample - 7, b.data.tobytes()) for b in kept]
+    assert [(b.start, b.data.tobytes()) for b in blocks] == truth
+    assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
+    events = [event for event in said.drain() if event.kind == "loss"]
+    missing = [b.first_sample - a.stop for a, b in pairwise(kept) if a.stop != b.first_sample]
+    assert [event.details["missing_samples"] for event in events] == missing
+    assert [event.sample for event in events] == [b.start for b in blocks if b.gap]
+
+
+@given(st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=60), st.integers(0, 8))
+def test_whatever_comes_samples_are_right_and_ascend(pieces, bound):
+    """Batches that overlap, repeat and leave holes as they like: every sample that comes out is at its place, once."""
+    batches = [stream([length], first)[0] for first, length in pieces]
+    blocks = passed(batches, reorder=bound)
+    numbers = np.concatenate([block.data[0] for block in blocks]) if blocks else np.empty(0)
+    places = np.concatenate([np.arange(block.start, block.stop) for block in blocks]) if blocks else np.empty(0)
+    assert np.all(np.diff(places) > 0)
+    if len(batches) < 32:  # else numbers that go back may be a restart
+        assert np.all(np.diff(numbers) == np.diff(places))
+
+
+def test_a_missing_batch_is_waited_for_no_longer_than_its_time():
+    a, _, c = stream([4, 4, 4])
+    sequencer = Sequencer(Said(), reorder=8, wait_s=1.0)
+    assert sequencer.push(a) == []
+    assert len(sequencer.poll(1.1)) == 1
+    assert sequencer.push(replace(c, arrived_s=2.0)) == []
+    assert sequencer.poll(2.9) == []
+    (block,) = sequencer.poll(3.1)
+    assert (block.start, block.gap, sequencer.lost) == (8, True, 4)
+
+
+@pytest.mark.parametrize("epoch", [2, 1])
+@pytest.mark.parametrize("reorder", [0, 4])
+def test_a_restart_is_a_gap_of_unknown_length_and_loses_nothing(epoch, reorder):
+    """With a new epoch at once; without one when the numbers begin anew far enough back."""
+    old, new = stream([100] * 5000, 1000), stream([100] * 20, 0, epoch)
+    said = Said()
+    blocks = passed(old + new, said, reorder=reorder)
+    assert np.array_equal(np.concatenate([b.data[0] for b in blocks[5000:]]), np.arange(2000))
+    assert [b.gap for b in blocks[4999:5002]] == [False, True, False]
+    assert [b.start for b in blocks[4999:5002]] == [499_900, 500_000, 500_100]
+    assert said.counts["restart"] == 1
+    assert said.counts["loss"] == said.counts["repeat"] == said.counts["clock-jump"] == 0
+
+
+def test_a_restart_soon_after_the_start_without_an_epoch():
+    said = Said()
+    blocks = passed(stream([10] * 100) + stream([10] * 100), said)
+    assert [block.gap for block in blocks].count(True) == said.counts["restart"] == 1
+    assert sum(map(len, blocks)) == 2000
+    assert said.counts["repeat"] == 0
+
+
+def test_a_second_sender_does_not_take_turns():
+    a, b = stream([10] * 50, 0, 1), stream([10] * 50, 0, 2)
+    said = Said()
+    blocks = passed([batch for pair in zip(a, b) for batch in pair], said, reorder=0)
+    assert said.counts["restart"] == 1
+    assert said.counts["foreign"] >= 48
+    assert [block.gap for block in blocks].count(True) == 1
+
+
+def test_one_stray_batch_far_away_does_not_derail_the_stream():
+    batches = stream([10] * 50)
+    stray = stream([10], 10**15)
+    said = Said()
+    blocks = passed(batches[:20] + stray + batches[20:], said, reorder=3)
+    assert content(blocks) == content(passed(batches, reorder=3))
+    assert said.counts["foreign"] == 1
+
+
+def counts_of(batches: list[Batch], **options: float) -> dict[str, int]:
+    said = Said()
+    passed(batches, said, **options)
+    return {kind: count for kind, count in said.counts.items() if count}
+
+
+def test_what_goes_wrong_is_told_apart():
+    """Each fault alone gives its own kind and no other."""
+    good = stream([100] * 40, stamp_s=1e9)
+    assert counts_of(good) == {}
+    set_clock = [replace(b, stamp_s=b.stamp_s + 3600 * (i >= 20)) for i, b in enumerate(good)]
+    assert counts_of(set_clock) == {"clock-jump": 1}
+    twice_as_fast = [replace(b, stamp_s=1e9 + b.first_sample / 8000) for b in good]
+    assert counts_of(twice_as_fast) == {"wrong-rate": 1}
+    slow_batches = stream([8000] * 20, stamp_s=1e9)
+    assert counts_of([replace(b, stamp_s=1e9 + b.first_sample / 2000) for b in slow_batches]) == {"wrong-rate": 1}
+    stated = [replace(b, rate_hz=8000.0) if i >= 20 else b for i, b in enumerate(good)]
+    assert counts_of(stated) == {"wrong-rate": 1}
+    renamed = [replace(b, channels=(CHANNELS[0], Channel("z"))) if i >= 20 else b for i, b in enumerate(good)]
+    assert counts_of(renamed) == {"layout-changed": 1}
+    scaled = [replace(b, channels=(CHANNELS[0], Channel("y", "rpm"))) if i >= 20 else b for i, b in enumerate(good)]
+    assert counts_of(scaled) == {"unit-changed": 1}
+    assert counts_of(good[:20] + stream([100] * 20, 0, 2, stamp_s=1e9 + 60)) == {"restart": 1}
+    assert counts_of(good[:20] + good[21:]) == {"loss": 1}
+    assert counts_of([*good[:20], good[21], good[20], *good[22:]]) == {"reordered": 1}
+    assert counts_of([*good[:20], good[19], *good[20:]]) == {"repeat": 1}
+
+
+def test_a_rate_that_is_a_little_wrong_shows_after_ten_seconds():
+    batches = stream([400] * 200, stamp_s=1e9)
+    rng = np.random.default_rng(0)
+    jitter = rng.normal(scale=1e-3, size=200)
+    assert counts_of([replace(b, stamp_s=b.stamp_s + e) for b, e in zip(batches, jitter)]) == {}
+    off = [replace(b, stamp_s=1e9 + b.first_sample / 4010 + e) for b, e in zip(batches, jitter)]
+    said = Said()
+    passed(off, said)
+    (event,) = said.drain()
+    assert event.kind == "wrong-rate"
+    assert event.details["measured_hz"] == pytest.approx(4010, abs=1)
+
+
+def test_changed_layouts_that_still_hold_the_channels_are_taken_by_name():
+    good = stream([10] * 20)
+    wider = (*reversed(CHANNELS), Channel("extra", "V"))
+    changed = [
+        replace(b, channels=wider, data=np.vstack([b.data[1], b.data[0], b.data[0] * 0])) if i >= 10 else b
+        for i, b in enumerate(good)
+    ]
+    said = Said()
+    assert content(passed(changed, said)) == content(passed(good))
+    assert [event.kind for event in said.drain()] == ["layout-changed"]
+
+
+def test_a_flood_of_events_is_counted_and_held_back():
+    now = [0.0]
+    said = Said(lambda: now[0])
+    for _ in range(100_000):
+        said.say("malformed", "x" * 100_000)
+    events = said.drain()
+    assert len(events) == BURST
+    assert max(len(event.message) for event in events) <= 500
+    now[0] = 1.0
+    said.say("malformed", "y")
+    (event,) = said.drain()
+    assert event.details["more"] == 100_000 - BURST
+    assert said.counts["malformed"] == 100_001
