@@ -5,7 +5,7 @@ BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring fuzz system-packages lock clean
+.PHONY: help demo test lint bench peers studies monitoring fuzz crash system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -52,6 +52,9 @@ monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault 
 fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
+
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments
+	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

@@ -1,6 +1,7 @@
 """`python -m bench`: the kernel beside what a user would pick instead, all in one run.
 
-With --long the error over 1e9 samples, with --accuracy that of the named variants, with --job the whole job.
+With --long the error over 1e9 samples, with --accuracy that of the named variants, with --job the whole job, with
+--record what a record in segments costs.
 """
 
 import argparse
@@ -44,6 +45,7 @@ def main() -> None:
     parser.add_argument("--samples", type=float, default=1e9, help="of the long run")
     parser.add_argument("--accuracy", action="store_true", help="the error of the named variants, instead of speed")
     parser.add_argument("--job", action="store_true", help="the whole job `livebode run`, instead of the kernel")
+    parser.add_argument("--record", action="store_true", help="what a record in segments costs, instead of the kernel")
     parser.add_argument("--seconds", type=float, default=0.5, help="per contender and cell")
     parser.add_argument("--sets", nargs="+", default=list(instruction_sets()[1:]) or list(instruction_sets()))
     options = parser.parse_args()
@@ -57,6 +59,11 @@ def main() -> None:
 
         name, result = "job", dict(job.measure())
         job.report(result)
+    elif options.record:
+        from bench import record
+
+        name, result = "record", dict(record.measure())
+        record.report(result)
     else:
         name, result = "kernel", speed(options.seconds, options.sets)
     RESULTS.mkdir(exist_ok=True)

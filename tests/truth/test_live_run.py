@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
+import pyarrow as pa
 import pytest
 
 from livebode.nouns import Channel
+from livebode.records import Run
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.command import RATE_HZ, livebode, signals, write_parquet
@@ -53,7 +54,8 @@ def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
 
 
 def table(out: Path) -> dict[str, np.ndarray]:
-    return {name: np.array(column) for name, column in pq.read_table(out / "responses.parquet").to_pydict().items()}
+    table = pa.concat_tables(Run.open(out).tables("responses"))
+    return {name: np.array(column) for name, column in table.to_pydict().items()}
 
 
 def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):

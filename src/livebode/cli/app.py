@@ -17,6 +17,7 @@ from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
 from livebode.cli.margins_command import margins_command
+from livebode.cli.query_command import query_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
 from livebode.nouns import InputError
@@ -33,6 +34,7 @@ app.command("run")(run_command)
 app.command("fit")(fit_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
+app.command("query")(query_command)
 app.command("export")(export_command)
 app.command("margins")(margins_command)
 app.command("validate")(validate_command)

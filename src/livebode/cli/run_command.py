@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.cli.pictures import drawing, show
-from livebode.nouns import InputError
+from livebode.nouns import Event, InputError
 from livebode.records import to_json
 from livebode.session import Axis, Outcome, run, run_live
 
@@ -55,6 +55,10 @@ def run_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
+    go_on: Annotated[
+        bool,
+        typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Track the frequency response of a machine through a recording, or live until it ends or Ctrl-C.
@@ -78,7 +82,7 @@ def run_command(
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
-    axis = _axis(target, given)
+    axis = _axis(target, given, go_on)
     outcome = _run(axis, out or Path("runs") / target.stem, force, quiet=as_json)
     if as_json:
         print(to_json({"directory": str(outcome.directory)} | outcome.summary))
@@ -86,9 +90,11 @@ def run_command(
         show(outcome)
 
 
-def _axis(target: Path, given: dict[str, dict[str, Any]]) -> Axis:
+def _axis(target: Path, given: dict[str, dict[str, Any]], go_on: bool) -> Axis:
     """The configuration in the file, or of the recording, with the options given over it."""
     said = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
+    if go_on:
+        said["record"] = {}
     if target.suffix.lower() == ".toml":
         base = Axis.read(target).model_dump(exclude_unset=True)
         data = {section: base.get(section, {}) | said.get(section, {}) for section in base.keys() | said.keys()}
@@ -127,5 +133,8 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
         def progress(done: int, total: int | None) -> None:
             bar.update(task, completed=done, total=total)
 
+        def tell(event: Event) -> None:
+            bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
+
         job = run_live if axis.source.live else run
-        return job(axis, directory, force=force, progress=progress, draw=draw)
+        return job(axis, directory, force=force, progress=progress, draw=draw, tell=tell)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra, Rows
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.watch import Watch
-from livebode.nouns import Block, Event, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -155,7 +156,7 @@ class Tracker:
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         moment = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
         with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
-            responses = self._responses(rows, moment, _unit(block, s))
+            responses = self._responses(rows, moment, response_unit(block.channels, s))
         self._nothing = responses[0:0]
         return responses
 
@@ -249,8 +250,8 @@ class Tracker:
         return ratio, sigma, dof
 
 
-def _unit(block: Block, settings: Settings) -> str:
+def response_unit(channels: Sequence[Channel], settings: Settings) -> str:
     """Unit of the response where both signals have one; open loop, closed loop and sensitivity have none."""
-    through = settings.channel(settings.method.denominator) or ""
-    over, under = (block.channels[block.index(name)].unit for name in (settings.output, through))
+    units = {channel.name: channel.unit for channel in channels}
+    over, under = (units[name] for name in (settings.output, settings.channel(settings.method.denominator) or ""))
     return f"{over}/({under})" if over and under and settings.quantity == "plant" else ""

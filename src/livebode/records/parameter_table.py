@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.nouns import Parameters
+from livebode.records.table import Table
 
 SCHEMA = pa.schema(
     [
@@ -27,6 +28,8 @@ SCHEMA = pa.schema(
 """Columns: those of the response; model, parameter or derived quantity, its value and standard deviation (NaN where the
 status is not "ok"), unit, status, and what the model lacks as a share of |G|."""
 
+PARAMETERS = Table(SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
+
 _GROUP_ROWS = 1 << 17
 
 
@@ -42,7 +45,7 @@ class ParameterTable:
         """Append what was fitted and what follows from it, of the same responses."""
         for parameters in parts:
             if len(parameters):
-                self._waiting.append(_as_batch(parameters))
+                self._waiting.append(parameter_rows(parameters))
                 self._rows += self._waiting[-1].num_rows
         if self._rows >= _GROUP_ROWS:
             self._flush()
@@ -57,7 +60,8 @@ class ParameterTable:
         self._waiting, self._rows = [], 0
 
 
-def _as_batch(parameters: Parameters) -> pa.RecordBatch:
+def parameter_rows(parameters: Parameters) -> pa.RecordBatch:
+    """The parameters in long form."""
     rows, n = parameters.value.shape
     columns = [
         *(np.repeat(x, n) for x in (parameters.sample, parameters.time_s, parameters.schedule)),

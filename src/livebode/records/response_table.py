@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.nouns import Responses
+from livebode.records.table import Table
 
 SCHEMA = pa.schema(
     [
@@ -28,8 +29,7 @@ SCHEMA = pa.schema(
 """Columns: oldest and newest sample that went in, time of the centre (s), scheduling signal there, line (Hz), complex
 response, sigma with its degrees of freedom, coherence, validity. NaN where there is no value."""
 
-# Columns that repeat over the lines or rows compress by a dictionary; the measured ones never do.
-_REPEATING = ["first", "sample", "time_s", "schedule", "frequency_hz", "dof"]
+RESPONSES = Table(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 _GROUP_ROWS = 1 << 18
 
 
@@ -37,7 +37,7 @@ class ResponseTable:
     """Appends Responses to a Parquet file in long form, by row groups of bounded size."""
 
     def __init__(self, path: Path) -> None:
-        self._file = pq.ParquetWriter(path, SCHEMA, use_dictionary=_REPEATING, compression="lz4")
+        self._file = pq.ParquetWriter(path, SCHEMA, use_dictionary=list(RESPONSES.repeating), compression="lz4")
         self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
 

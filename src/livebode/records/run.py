@@ -13,13 +13,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.nouns import Event, InputError, Lines, Responses
+from livebode.records.response_table import SCHEMA
+from livebode.records.segments import json_lines, reading
+from livebode.records.segments.manifest import Manifest, Segment
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
 
 
 @dataclass(frozen=True)
 class Run:
-    """The directory of a finished run.
+    """The directory of a run: finished, stopped, killed, or still being written.
+
+    What is read is what was committed when it is read; a run that is being written has more a moment later.
 
     Attributes
     ----------
@@ -62,32 +67,76 @@ class Run:
         found = self.found
         return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
 
-    def responses(self) -> Responses:
-        """All responses, as they were written."""
-        return Responses.join(list(self.batches()))
+    @property
+    def finished(self) -> bool:
+        """Whether its source came to its end and everything is written."""
+        return bool(self.summary.get("record", {}).get("finished", True))
 
-    def batches(self) -> Iterator[Responses]:
-        """All responses in order, in parts of bounded size."""
-        lines, name = self.lines, self.path / "responses.parquet"
+    def responses(self) -> Responses:
+        """All responses, as they were written; none before the first."""
+        return Responses.join(list(self.batches()) or [self._responses(SCHEMA.empty_table(), self.lines)])
+
+    def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
+        """All responses in order, in parts of bounded size; or the newest, from files of no more than this."""
+        lines = self.lines
+        rest: pa.Table | None = None
+        for part in self.tables("responses", size_bytes_max):
+            if part.schema.names != SCHEMA.names:
+                raise InputError(f"the responses in {str(self.path)!r} have other columns than a run writes")
+            for start in range(0, part.num_rows, _ROWS):
+                piece = part.slice(start, _ROWS)
+                table = piece if rest is None else pa.concat_tables([rest, piece])
+                whole = table.num_rows // len(lines) * len(lines)
+                rest = table.slice(whole)
+                if whole:
+                    yield self._responses(table.slice(0, whole), lines)
+        if rest is not None and rest.num_rows:
+            raise InputError(f"the record in {str(self.path)!r} ends within a response; it is not what the run wrote")
+
+    def tables(self, name: str, size_bytes_max: int | None = None) -> Iterator[pa.Table]:
+        """The rows of "responses", "parameters" or "samples" in order, part by part; none where it was not recorded.
+
+        Raises
+        ------
+        InputError
+            While iterating, if a part cannot be read or is not what was written.
+        """
+        file = self.path / name
         try:
-            with pq.ParquetFile(name) as file:
-                rest = file.schema_arrow.empty_table()
-                for batch in file.iter_batches(_ROWS):
-                    table = pa.concat_tables([rest, pa.Table.from_batches([batch])])
-                    whole = table.num_rows // len(lines) * len(lines)
-                    rest = table.slice(whole)
-                    if whole:
-                        yield self._responses(table.slice(0, whole), lines)
-        except (OSError, pa.ArrowException, KeyError) as error:
-            raise InputError(f"{str(name)!r} cannot be read: {error}") from None
-        if rest.num_rows:
-            raise InputError(f"{str(name)!r} ends within a response; it is not the file that the run wrote")
+            if reading.in_segments(self.path):
+                yield from reading.tables(self.path, name, size_bytes_max, finished=self.finished)
+            elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
+                with pq.ParquetFile(file) as parquet:
+                    yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
+        except (OSError, pa.ArrowException, KeyError, TypeError) as error:
+            raise InputError(f"{str(file)!r} cannot be read: {error}") from None
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The closed segments that stand, by age; none where the run is not kept in segments."""
+        return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
+
+    def parts(self, name: str) -> tuple[list[Path], list[pa.Table]]:
+        """The Parquet files of a table, and the rows that are in none yet."""
+        try:
+            if not reading.in_segments(self.path):
+                file = self.path / f"{name}.parquet"
+                return ([file] if file.exists() else []), []
+            segments, rows = reading.parts(self.path, name, finished=self.finished)
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"the {name} of {str(self.path)!r} cannot be read: {error}") from None
+        return [self.path / segment.name for segment in segments], rows
 
     def events(self) -> list[Event]:
-        """What is in events.jsonl."""
+        """What is in events.jsonl; of a run that is not finished, up to the first line that is not whole."""
         name = self.path / "events.jsonl"
         try:
-            return [Event(**json.loads(line)) for line in name.read_text("utf-8").splitlines()]
+            data = name.read_bytes()
+            lines, end = json_lines.whole_lines(data)
+            if end < len(data) and self.finished:
+                json_lines.from_line(data[end:].split(b"\n")[0])
+                raise ValueError("its last line is not whole")
+            return [Event(**line) for line in lines]
         except (OSError, ValueError, TypeError) as error:
             raise InputError(f"{str(name)!r} cannot be read: {error}") from None
 

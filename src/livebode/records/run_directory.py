@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -91,14 +91,17 @@ class RunDirectory:
         with _disk_errors(self.path):
             self._events.write(to_json(asdict(event)) + "\n")
 
-    def write_summary(self, summary: dict[str, Any]) -> None:
-        """Write run.json."""
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        """Write run.json, and let `draw` add pictures to the directory it is called with."""
         with _disk_errors(self.path):
             (self.partial / "run.json").write_text(to_json(summary, indent=2) + "\n", encoding="utf-8")
+            draw(self.partial)
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():
             return
+        if not self._force and (self.path / "open").is_dir():
+            raise InputError(f"{str(self.path)!r} is kept in segments; --continue goes on with it, --force replaces it")
         if not self._force:
             raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
         if not (self.path / "run.json").is_file() and (not self.path.is_dir() or any(self.path.iterdir())):

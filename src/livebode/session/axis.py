@@ -14,6 +14,7 @@ from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, Position
 from livebode.sources.live import SourceSettings
 
 _SAME_RATE = 1e-6
+BUDGET_BYTES_MIN = 16 << 20
 Ticks = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -150,6 +151,14 @@ class LoopSection(_Section):
         return Gain(-self.entry_gain) * feedback
 
 
+class RecordSection(_Section):
+    """[record]: where it stands, the run is kept in segments that outlast a kill (docs/run-directory.md)."""
+
+    samples: bool = False
+    budget_bytes: Annotated[int, Field(ge=BUDGET_BYTES_MIN)] | None = None
+    segment_s: Annotated[float, Field(gt=0, le=86400)] = 300.0
+
+
 class FitSection(_Section):
     """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
 
@@ -172,6 +181,7 @@ class Axis(_Section):
     lines: LinesSection = LinesSection()
     tracking: TrackingSection = TrackingSection()
     loop: LoopSection = LoopSection()
+    record: RecordSection | None = None
     motion: MotionSection | None = None
     fit: FitSection | None = None
     monitoring: MonitoringSection = MonitoringSection()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from livebode.estimation import Settings
@@ -40,6 +42,14 @@ class ChannelCheck:
                 self._unvaried[name] = value = finite[0]
             if np.any(finite != value):
                 del self._unvaried[name]
+
+    def state(self) -> dict[str, Any]:
+        """All that was seen, as plain data."""
+        return {"unvaried": self._unvaried, "moments": self._moments.tolist()}
+
+    def load(self, state: dict[str, Any]) -> None:
+        self._unvaried = dict(state["unvaried"])
+        self._moments = np.array(state["moments"])
 
     @property
     def variance(self) -> float:

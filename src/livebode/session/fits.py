@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
-from livebode.nouns import Loop, Parameters, Response, Responses
-from livebode.records import Run, RunDirectory
+from livebode.nouns import Event, Loop, Parameters, Response, Responses
+from livebode.records import Run
 from livebode.session.axis import FitSection
 from livebode.session.live_margins import live_margins
 
+_ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
 _POSITIONS = ("rad", "m", "deg", "mm")
+
+
+class Out(Protocol):
+    """Where parameters and events go: a RunDirectory, or a SegmentedRun."""
+
+    def write_parameters(self, *parts: Parameters) -> None: ...
+
+    def write_event(self, event: Event) -> None: ...
 
 
 class Fits:
@@ -33,14 +43,13 @@ class Fits:
         """What a configuration asks for; margins where its loop says what feeds back."""
         return None if section is None else cls(section, loop if loop.feedback else None)
 
-    def take(self, responses: Responses, out: RunDirectory) -> Parameters:
+    def take(self, responses: Responses, out: Out) -> Parameters:
         """Fit a batch, and write its parameters and events."""
-        if self._fitter is None:
-            self._fitter = fitter_of(self.section, responses.unit)
-        found = self._fitter.process(responses)
-        around = () if self.loop is None else live_margins(found, self._fitter, self.loop)
-        out.write_parameters(found, self._fitter.derived(found), *around)
-        for event in self._fitter.drain_events():
+        fitter = self._fitter or self._begin(responses.unit)
+        found = fitter.process(responses)
+        around = () if self.loop is None else live_margins(found, fitter, self.loop)
+        out.write_parameters(found, fitter.derived(found), *around)
+        for event in fitter.drain_events():
             out.write_event(event)
         for word, count in zip(*np.unique(found.status, return_counts=True)):
             self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
@@ -48,6 +57,32 @@ class Fits:
         if good.size:
             self._newest = found[good[-1:]]
         return found
+
+    def snapshot(self) -> bytes:
+        """All that the next fit depends on as bytes; see `restore`."""
+        if self._fitter is None:
+            return b""
+        newest = None if self._newest is None else {name: getattr(self._newest, name).tolist() for name in _ROWS}
+        state = {"unit": self._unit, "counts": self._counts, "newest": newest}
+        return json.dumps(state).encode() + b"\n" + self._fitter.snapshot()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot."""
+        if not snapshot:
+            return
+        head, _, own = snapshot.partition(b"\n")
+        state = json.loads(head)
+        fitter = self._begin(state["unit"])
+        fitter.restore(own)
+        self._counts = state["counts"]
+        if state["newest"] is not None:
+            rows = {name: np.array(values) for name, values in state["newest"].items()}
+            self._newest = Parameters(fitter.model.name, fitter.names, fitter.model.units, **rows)
+
+    def _begin(self, unit: str) -> Fitter:
+        self._unit = unit
+        self._fitter = fitter_of(self.section, unit)
+        return self._fitter
 
     def newest(self) -> Fit | None:
         """The newest fit that holds."""

@@ -8,21 +8,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from livebode.session.axis import Axis
+from livebode.session.axis import Axis, RecordSection
 from livebode.session.fits import Fits
 from livebode.session.plan import live_follower
-from livebode.session.tracking import Draw, Outcome, Progress, record
+from livebode.session.tracking import Draw, Outcome, Progress, Tell, record
 from livebode.session.watching import make_watching
 from livebode.sources.live import LiveSource, open_source
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def run_live(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
-    """Track a machine while it works and leave a run directory; parameters as in `run`.
+def run_live(
+    axis: Axis,
+    directory: Path,
+    *,
+    force: bool = False,
+    progress: Progress,
+    draw: Draw,
+    tell: Tell = lambda _: None,
+) -> Outcome:
+    """Track a machine while it works and leave a run directory in segments; parameters as in `run`.
 
     Ends where the source ends, and whole, with what has come, on the first Ctrl-C (SIGINT or SIGTERM); a second one
-    leaves nothing.
+    leaves what was recorded. The same axis in the same directory goes on with the run, behind a gap.
 
     Raises
     ------
@@ -36,11 +44,20 @@ def run_live(axis: Axis, directory: Path, *, force: bool = False, progress: Prog
             "found": {"format": source.format, "rate_from": "the sender"},
         }
         fits = Fits.of(axis.fit, tracker.settings.loop)
-        watching = make_watching(axis, tracker.settings)
         return record(
-            source, tracker, directory, about=about, force=force, progress=progress, draw=draw, fits=fits,
-            watching=watching,
-        )  # fmt: skip
+            source,
+            tracker,
+            directory,
+            about=about,
+            force=force,
+            progress=progress,
+            draw=draw,
+            fits=fits,
+            watching=make_watching(axis, tracker.settings),
+            kept=axis.record or RecordSection(),
+            again=False,
+            tell=tell,
+        )
 
 
 @contextmanager

@@ -9,28 +9,34 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from livebode.estimation import response_unit
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
 from livebode.nouns import Block, Channel, Event, InputError, Model, Responses
 from livebode.records import RunDirectory
-from livebode.session.axis import Axis
+from livebode.session.axis import Axis, RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
 from livebode.session.loop_report import loop_report
 from livebode.session.overview import Overview
 from livebode.session.plan import make_follower
+from livebode.session.tally import Tally
 from livebode.session.watching import Watching, make_watching
 from livebode.sources import open_log
 from livebode.sources.live import LiveSource
 
+if TYPE_CHECKING:
+    from livebode.session.segmented import SegmentedRun
+
 Progress = Callable[[int, int | None], None]
 Watch = Callable[[Responses], None]
 Draw = Callable[[Responses, Path, str, Model | None], None]
+Tell = Callable[[Event], None]
 
 
 class Source(Protocol):
@@ -57,7 +63,15 @@ class Outcome:
     fit: Fit | None = None
 
 
-def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress, draw: Draw) -> Outcome:
+def run(
+    axis: Axis,
+    directory: Path,
+    *,
+    force: bool = False,
+    progress: Progress,
+    draw: Draw,
+    tell: Tell = lambda _: None,
+) -> Outcome:
     """Track a recording and leave a run directory.
 
     Parameters
@@ -65,7 +79,8 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     axis
         Recording, signals, lines and options.
     directory
-        Where the run is to stand; appears only when whole.
+        Where the run is to stand; appears only when whole, unless [record] asks for segments: then it is there from
+        the beginning, and an unfinished one of this axis is gone on with.
     force
         Replace an earlier run there.
     progress
@@ -73,11 +88,14 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     draw
         Called with the thinned responses, the directory before it is put in place, the scheduling signal's name
         with its unit, and the newest fit, to add pictures.
+    tell
+        Called with what the record in segments itself has to say: that it goes on, pauses or removes what is oldest.
 
     Raises
     ------
     InputError
-        For anything in the recording or the configuration that cannot be; nothing is left in `directory` then.
+        For anything in the recording or the configuration that cannot be; nothing is left in `directory` then, or in
+        segments all that was recorded so far.
     """
     started = time.perf_counter()
     assert axis.source.log is not None
@@ -88,9 +106,19 @@ def run(axis: Axis, directory: Path, *, force: bool = False, progress: Progress,
     fits = Fits.of(axis.fit, tracker.settings.loop)
     watching = make_watching(axis, tracker.settings)
     return record(
-        log, tracker, directory, about=about, force=force, progress=progress, draw=draw, started=started, fits=fits,
+        log,
+        tracker,
+        directory,
+        about=about,
+        force=force,
+        progress=progress,
+        draw=draw,
+        started=started,
+        fits=fits,
         watching=watching,
-    )  # fmt: skip
+        kept=axis.record,
+        tell=tell,
+    )
 
 
 def record(
@@ -106,104 +134,152 @@ def record(
     watching: Watching | None = None,
     started: float | None = None,
     fits: Fits | None = None,
+    kept: RecordSection | None = None,
+    again: bool = True,
+    tell: Tell = lambda _: None,
     **delivery: Any,
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
     `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
     opening the source began, where that is to count in the speed; `fits` are made of every response; `watching` tells
-    changes; `delivery` goes to the source's `blocks`.
+    changes; `kept` asks for a record in segments, which goes on where it ended, and which `tell` hears of; `again` says
+    whether the source begins with the same samples each time; `delivery` goes to its `blocks`.
     """
-    started = time.perf_counter() if started is None else started
     _keep_freed_memory()
-    overview = Overview()
-    with RunDirectory(directory, force=force) as out:
+    settings, overview = tracker.settings, Overview()
+    signals = [name for role in settings.roles if (name := settings.channel(role))]
+    wanted = list(dict.fromkeys(signals + ([settings.schedule] if settings.schedule else [])))
+    blocks = source.blocks(wanted, **delivery)
+    check = ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or "")
+    tally = Tally(check, time.perf_counter() if started is None else started)
+    begun = _begun(about, tracker, response_unit(source.channels, settings))
+    channels = {channel.name: channel for channel in source.channels}
+    out = _recorder(
+        directory,
+        kept,
+        force,
+        summary=begun,
+        channels=[channels[name] for name in wanted],
+        rate_hz=settings.lines.rate_hz,
+        parts={"tracker": tracker, "tally": tally} | {k: p for k, p in (("fits", fits), ("watching", watching)) if p},
+        again=again,
+        ends=source.samples is not None,
+        tell=tell,
+    )
 
-        def publish(responses: Responses) -> None:
-            overview.add(responses)
-            out.write(responses)
-            parameters = None if fits is None else fits.take(responses, out)
-            if watching is not None:
-                watching.follow(responses, parameters, out.write_event)
-            if watch is not None and len(responses):
-                watch(responses)
+    def publish(responses: Responses) -> None:
+        overview.add(responses)
+        out.write(responses)
+        parameters = None if fits is None else fits.take(responses, out)
+        if watching is not None:
+            watching.follow(responses, parameters, out.write_event)
+        if watch is not None and len(responses):
+            watch(responses)
 
-        counts, tracked_s = _track(source, tracker, publish, out, progress, delivery, watching)
-        responses = overview.responses()
-        summary = _summary(about, tracker, responses) | {"counts": counts}
-        if isinstance(source, LiveSource):
-            summary["source"] = asdict(source.health) | {"first_sample": source.first_sample}
+    with out:
+        if not isinstance(out, RunDirectory):
+            for responses in out.before():
+                overview.add(responses)
+                if fits is not None:
+                    fits.take(responses[0:0], out)  # which tells it the lines
+            blocks = out.feed(blocks)
+        if watching is not None:
+            blocks = watching.over(blocks, out.write_event)
+        _track(source, blocks, tracker, tally, publish, out, progress, None if kept is None else out.write_event)
+        summary = _begun(about, tracker, begun["found"]["unit"]) | _done(tracker, tally)
+        newest = None if fits is None else fits.newest()
+        summary |= _said(source) | _fitted(fits, newest, overview.responses())
         if watching is not None:
             summary["monitoring"] = watching.finish(out.write_event)
-        summary["speed"] = _speed(tracker, tracked_s, time.perf_counter() - started)
-        newest = None
-        if fits is not None:
-            newest, summary["fit"] = fits.newest(), fits.summary()
-            if newest is not None and fits.loop is not None:
-                words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
-                summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
-        out.write_summary(summary)
-        draw(responses, out.partial, _schedule_label(source, tracker.settings.schedule), newest)
-    return Outcome(directory, summary, responses, newest)
+        label = _schedule_label(source, settings.schedule)
+        out.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
+    return Outcome(directory, summary, overview.responses(), newest)
+
+
+def _recorder(
+    directory: Path, kept: RecordSection | None, force: bool, **of_segments: Any
+) -> RunDirectory | SegmentedRun:
+    if kept is None:
+        return RunDirectory(directory, force=force)
+    from livebode.session.segmented import SegmentedRun  # needs a POSIX system
+
+    return SegmentedRun(directory, kept, force=force, **of_segments)
 
 
 def _track(
     source: Source,
+    blocks: Iterator[Block],
     tracker: Follower,
+    tally: Tally,
     publish: Watch,
-    out: RunDirectory,
+    out: RunDirectory | SegmentedRun,
     progress: Progress,
-    delivery: dict[str, Any],
-    watching: Watching | None,
-) -> tuple[dict[str, int], float]:
-    """Counts of samples and responses, and seconds spent in the tracker."""
-    settings, tracked_s, totals = tracker.settings, 0.0, np.zeros(3, dtype=int)
-    channels = [name for role in settings.roles if (name := settings.channel(role))]
-    check = ChannelCheck(tuple(channels), settings.channel(settings.method.reference) or "")
-    wanted = list(dict.fromkeys(channels + ([settings.schedule] if settings.schedule else [])))
+    say: Tell | None,
+) -> None:
+    """Every block through the tracker into the record; where the signals mean nothing, `say` or InputError says so."""
 
-    def follow(step: Callable[[], Responses | None]) -> float:
-        """Seconds of one step, whose responses and events are published."""
+    def follow(step: Callable[[], Responses | None]) -> None:
+        """Take one step and publish its responses and events."""
         before = time.perf_counter()
         responses = step()
-        took_s = time.perf_counter() - before
         if responses is not None:
-            totals[:] += (
-                len(responses), np.count_nonzero(~responses.valid.all(axis=1)), np.count_nonzero(responses.valid)
-            )  # fmt: skip
+            tally.take(responses, time.perf_counter() - before)
             publish(responses)
         for event in [*drained(source), *tracker.drain_events()]:
             out.write_event(event)
-        return took_s
 
-    block: Block | None = None
-    for block in source.blocks(wanted, **delivery):
-        check.take(block)
-        if watching is not None:
-            watching.take(block, out.write_event)
-        tracked_s += follow(partial(tracker.process, block))
+    for block in blocks:
+        tally.check.take(block)
+        tally.stop = block.stop
+        follow(partial(tracker.process, block))
         progress(tracker.counts["samples"], source.samples)
-    if block is None:
+    if not tally.stop:
         raise InputError("the recording holds no samples")
-    tracked_s += follow(tracker.finish)
     try:
-        check.finish()
-        check_length(block.stop, settings.lines.window)
-        check_excitation(tracker, check.variance)
-        check_some_valid(int(totals[0]), int(totals[2]), tracker.counts, settings.lines.window)
+        _judge(tracker, tally, partial(follow, tracker.finish))
     except InputError as error:
-        if not (isinstance(source, LiveSource) and totals[0]):
+        if say is None or not tally.responses:
             raise
-        # What a machine did cannot be had again: the run stays, and says what is wrong with it.
-        out.write_event(Event("doubtful", block.stop, block.time_s[-1], str(error)))
+        # What was recorded stays, and says what is wrong with it.
+        say(Event("doubtful", tally.stop, tally.stop / tracker.settings.lines.rate_hz, str(error)))
     for event in drained(source):
         out.write_event(event)
-    return tracker.counts | {"responses": int(totals[0]), "invalid_responses": int(totals[1])}, tracked_s
+
+
+def _judge(tracker: Follower, tally: Tally, hand_out: Callable[[], None]) -> None:
+    """Hand out what is held back at the end; InputError where the responses mean nothing."""
+    window = tracker.settings.lines.window
+    tally.check.finish()
+    check_length(tally.stop, window)
+    if tally.handed_out != tally.stop:
+        hand_out()
+        tally.handed_out = tally.stop
+    check_excitation(tracker, tally.check.variance)
+    check_some_valid(tally.responses, tally.valid_lines, tracker.counts, window)
 
 
 def drained(source: Source) -> list[Event]:
     """What a live source has to say; a recording says it all at once."""
     return source.drain_events() if isinstance(source, LiveSource) else []
+
+
+def _said(source: Source) -> dict[str, Any]:
+    """What run.json says of a live source."""
+    if not isinstance(source, LiveSource):
+        return {}
+    return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
+
+
+def _fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+    """What run.json says of the fits."""
+    if fits is None:
+        return {}
+    summary = {"fit": fits.summary()}
+    if newest is not None and fits.loop is not None:
+        words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+        summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
+    return summary
 
 
 def _keep_freed_memory() -> None:
@@ -217,8 +293,9 @@ def _schedule_label(source: Source, name: str | None) -> str:
     return f"{name} in {unit}" if name and unit else name or ""
 
 
-def _summary(about: dict[str, Any], tracker: Follower, responses: Responses) -> dict[str, Any]:
-    found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}
+def _begun(about: dict[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
+    """What run.json says from the beginning."""
+    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
     versions = {
         "livebode": version("livebode"),
         "numpy": np.__version__,
@@ -228,13 +305,16 @@ def _summary(about: dict[str, Any], tracker: Follower, responses: Responses) -> 
     return about | {"found": about.get("found", {}) | found, "versions": versions}
 
 
-def _speed(tracker: Follower, tracked_s: float, whole_s: float) -> dict[str, float]:
-    samples = tracker.counts["samples"]
+def _done(tracker: Follower, tally: Tally) -> dict[str, Any]:
+    """What run.json says at the end."""
+    samples, run_s = tracker.counts["samples"], tally.run_s
     recorded_s = samples / tracker.settings.lines.rate_hz
-    return {
+    speed = {
         "recorded_s": recorded_s,
-        "run_s": whole_s,
-        "tracking_s": tracked_s,
-        "times_real_time": recorded_s / whole_s,
-        "samples_per_s": samples / tracked_s,
+        "run_s": run_s,
+        "tracking_s": tally.tracked_s,
+        "times_real_time": recorded_s / run_s,
+        "samples_per_s": samples / tally.tracked_s,
     }
+    counts = tracker.counts | {"responses": tally.responses, "invalid_responses": tally.invalid}
+    return {"counts": counts, "speed": speed}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.nouns import Block, Event, InputError, Parameters, Responses
 from livebode.session.axis import Axis
 
 if TYPE_CHECKING:
@@ -26,10 +27,12 @@ class Watching:
         self._monitor, self._baseline = monitor, baseline
         self._alarms: list[str] = []
 
-    def take(self, block: Block, write: Write) -> None:
-        """A block of samples."""
-        if self._monitor is not None:
-            self._publish(self._monitor.process_samples(block), write)
+    def over(self, blocks: Iterator[Block], write: Write) -> Iterator[Block]:
+        """The same blocks, each looked at before it goes on."""
+        for block in blocks:
+            if self._monitor is not None:
+                self._publish(self._monitor.process_samples(block), write)
+            yield block
 
     def follow(self, responses: Responses, parameters: Parameters | None, write: Write) -> None:
         """What became of the samples."""
@@ -42,6 +45,20 @@ class Watching:
             return {"baseline": None, "message": _CANNOT_TELL}
         self._publish(self._monitor.finish(), write)
         return {"baseline": self._baseline} | self._monitor.summary() | {"alarms": self._alarms}
+
+    def snapshot(self) -> bytes:
+        """What it said, and what the next event depends on; see `restore`."""
+        said = json.dumps(self._alarms).encode()
+        return len(said).to_bytes(4, "little") + said + (self._monitor.snapshot() if self._monitor is not None else b"")
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot under the same baseline; InputError where it is another's."""
+        rest = 4 + int.from_bytes(snapshot[:4], "little")
+        if (self._monitor is None) != (len(snapshot) == rest):
+            raise InputError("the run was begun with another baseline or none; go on with that, or take another --out")
+        if self._monitor is not None:
+            self._monitor.restore(snapshot[rest:])
+        self._alarms = json.loads(snapshot[4:rest])
 
     def _publish(self, events: list[Event], write: Write) -> None:
         for event in events:

@@ -1,0 +1,84 @@
+"""What a record in segments costs beside the tracker that feeds it: 16 axes at once, and the snapshots that it stores.
+
+Each axis has 21 lines in a window of 400 at 4 kHz, 20 responses a second, in blocks of a quarter of a second as they
+come from a machine. One axis is measured; its processor time counts 16 times.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bench.job import LINES, RATE_HZ, WINDOW, best_s, signals
+from livebode.estimation import Settings, Tracker
+from livebode.nouns import Block, Channel
+from livebode.session.axis import RecordSection
+from livebode.session.checks import ChannelCheck
+from livebode.session.segmented import SegmentedRun
+from livebode.session.tally import Tally
+
+AXES, SECONDS, HOP = 16, 600, 200
+NAMES = ("w", "u", "y")
+TARGET = 0.05
+
+
+def tracker_at(hop: int) -> Tracker:
+    return Tracker(Settings(lines=LINES, excitation="w", input="u", output="y", hop=hop))
+
+
+def measure() -> dict[str, float]:
+    """Cost of the record by what it is, and of snapshots at three hops."""
+    data, found = signals()[:, : SECONDS * RATE_HZ], {}
+    for hop in (1, 20, 200):
+        tracker = tracker_at(hop)
+        tracker.process(Block(data[:, : 4 * WINDOW], NAMES, RATE_HZ))
+        found[f"snapshot at hop {hop}, kB"] = len(tracker.snapshot()) / 1e3
+        found[f"snapshot at hop {hop}, ms"] = 1e3 * best_s(tracker.snapshot, 20)
+    for label, samples in (("responses", False), ("with samples", True)):
+        recording_s, tracking_s, pause_s, left = record(data, samples)
+        found |= {
+            f"{label}: share of one core for {AXES} axes": AXES * recording_s / SECONDS,
+            f"{label}: the same of the tracker": AXES * tracking_s / SECONDS,
+            f"{label}: longest pause of one axis, ms": 1e3 * pause_s,
+            f"{label}: kB/s left on the disk by one axis": left / SECONDS / 1e3,
+        }
+    return found
+
+
+def record(data: np.ndarray, samples: bool) -> tuple[float, float, float, int]:
+    """Processor seconds of the record and of the tracker, the record's longest pause, and the bytes that it left."""
+    tracker, tally = tracker_at(HOP), Tally(ChannelCheck(NAMES, "w"), time.perf_counter())
+    recording_s = tracking_s = pause_s = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        run = SegmentedRun(
+            Path(folder) / "run", RecordSection(samples=samples), summary={"configuration": {}, "found": {}},
+            channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ, parts={"tracker": tracker, "tally": tally},
+            force=False, again=True, ends=True, tell=print,
+        )  # fmt: skip
+        size = RATE_HZ // 4
+        blocks = (Block(data[:, i : i + size], NAMES, RATE_HZ, start=i) for i in range(0, data.shape[1], size))
+        with run as out:
+            began, began_cpu = time.perf_counter(), time.process_time()
+            for block in out.feed(blocks):
+                recording_s += time.process_time() - began_cpu
+                pause_s = max(pause_s, time.perf_counter() - began)
+                began_cpu = time.process_time()
+                responses = tracker.process(block)
+                tracking_s += time.process_time() - began_cpu
+                began, began_cpu = time.perf_counter(), time.process_time()
+                out.write(responses)
+            out.finish({}, lambda _: None)
+        left = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+    return recording_s, tracking_s, pause_s, left
+
+
+def report(result: dict[str, float]) -> None:
+    print(f"a record in segments, {len(LINES)} lines, window {WINDOW}, {RATE_HZ // HOP} responses a second")
+    for label, value in result.items():
+        print(f"{label:60}{value:12.4g}")
+    for label in ("responses", "with samples"):
+        share = result[f"{label}: share of one core for {AXES} axes"]
+        print(f"target ≤ {TARGET:g} of one core, {label}: {share:.3f} ({'reached' if share <= TARGET else 'SHORT'})")

@@ -1,0 +1,58 @@
+"""`livebode query`: SQL on a run."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.nouns import InputError
+from livebode.records import Run, to_json
+
+
+def query_command(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run, also one that is being written.")],
+    sql: Annotated[str, typer.Argument(help="SQL on the tables responses, parameters, samples and events.")],
+    rows: Annotated[int, typer.Option(min=1, max=10_000_000, help="Most rows to print.")] = 1000,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print the result as CSV.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Ask a run, by DuckDB's SQL.
+
+    The query sees the tables of the run and no file. DuckDB, pandas or Polars read them without us as well.
+    """
+    from livebode.records.query import query  # with Arrow's data sets
+
+    if as_csv and as_json:
+        raise InputError("--csv and --json are two forms of the same; take one")
+    found = query(Run.open(run), sql, rows)
+    if as_json:
+        plain = [[_plain(value) for value in row] for row in found.rows]
+        print(to_json({"columns": found.columns, "rows": plain, "more": found.more}))
+    elif as_csv:
+        csv.writer(sys.stdout, lineterminator="\n").writerows([found.columns, *found.rows])
+    else:
+        _show(found.columns, found.rows)
+    if found.more:
+        print(f"livebode: only the first {rows} rows; give --rows for more", file=sys.stderr)
+
+
+def _show(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        table.add_row(*(f"{value:.9g}" if isinstance(value, float) else str(value) for value in row))
+    # A file or a pipe has no width to keep to.
+    Console(width=None if sys.stdout.isatty() else 1 << 14, markup=False, highlight=False).print(table)
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,95 @@
+"""SQL on a run, by DuckDB (extra `query`)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.dataset as ds
+
+from livebode.nouns import InputError
+from livebode.records.plain_json import to_json
+from livebode.records.run import Run
+
+_TABLES = ("responses", "parameters", "samples")
+_EVENTS = pa.schema(
+    [
+        ("kind", pa.string()),
+        ("sample", pa.int64()),
+        ("time_s", pa.float64()),
+        ("message", pa.string()),
+        ("details", pa.string()),
+    ]
+)
+# Reads nothing but what it is given and writes nothing: a query that came by mail can be run.
+_CONFINED = (
+    "SET memory_limit = '2GB'",
+    "SET temp_directory = ''",
+    "SET python_enable_replacements = false",
+    "SET enable_external_access = false",
+    "SET lock_configuration = true",
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The rows that a query gave; `more` where there were others that were left out."""
+
+    columns: tuple[str, ...]
+    rows: list[tuple[Any, ...]]
+    more: bool
+
+
+def query(run: Run, sql: str, rows_max: int) -> Found:
+    """The first rows that a query of the tables responses, parameters, samples and events gives.
+
+    Parameters
+    ----------
+    run
+        Finished, killed, or being written; what was committed when it is asked counts.
+    sql
+        DuckDB's SQL. It sees these tables and no file.
+    rows_max
+        Most rows to give.
+
+    Raises
+    ------
+    InputError
+        If DuckDB is not installed, the query cannot be run, or the run cannot be read.
+    """
+    try:
+        import duckdb
+    except ImportError:
+        raise InputError("DuckDB is not installed; pip install 'livebode[query]'") from None
+    with duckdb.connect(":memory:") as database:
+        known = _show(run, database)
+        for setting in _CONFINED:
+            database.execute(setting)
+        try:
+            answer = database.execute(sql)
+            rows = answer.fetchmany(rows_max + 1)
+        except duckdb.Error as error:
+            # Below the sentence stands the query again, with an arrow.
+            sentence = " ".join(str(error).split("\n\n")[0].split())
+            raise InputError(f"the query cannot be run: {sentence} (this run has {', '.join(known)})") from None
+        columns = tuple(column[0] for column in answer.description or ())
+    return Found(columns, rows[:rows_max], len(rows) > rows_max)
+
+
+def _show(run: Run, database: Any) -> list[str]:
+    """Make the tables of the run known to the database; their names."""
+    known = ["events"]
+    events = [asdict(event) | {"details": to_json(event.details)} for event in run.events()]
+    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
+    for table in _TABLES:
+        files, rows = run.parts(table)
+        if not files and not rows:
+            continue
+        parts = [ds.dataset(files, format="parquet")] if files else []
+        for number, part in enumerate([*parts, *rows]):
+            database.register(f"_{table}_{number}", part)
+        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts) + len(rows)))
+        database.execute(f"CREATE VIEW {table} AS {united}")
+        known.append(table)
+    return known

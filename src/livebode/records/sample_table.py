@@ -1,0 +1,32 @@
+"""samples: the raw samples of the channels in use, one row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.nouns import Block, Channel
+from livebode.records.table import Table
+
+_OWN = ("sample", "time_s")
+
+
+def samples_of(channels: Sequence[Channel]) -> Table:
+    """The table: number of the sample, its time (s), and a column for each channel with its unit in the metadata.
+
+    A channel that is called like one of the first two columns gets an underscore behind its name.
+    """
+    own = [pa.field("sample", pa.int64()), pa.field("time_s", pa.float64())]
+    columns = [
+        pa.field(c.name + "_" * (c.name in _OWN), pa.float64(), metadata={"unit": c.unit} if c.unit else None)
+        for c in channels
+    ]
+    return Table(pa.schema(own + columns))
+
+
+def as_rows(block: Block, table: Table) -> pa.RecordBatch:
+    """The samples of a Block whose channels are those of the table."""
+    number = np.arange(block.start, block.stop, dtype=np.int64)
+    return pa.record_batch([pa.array(c) for c in (number, block.time_s, *block.data)], schema=table.schema)

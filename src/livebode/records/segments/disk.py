@@ -1,0 +1,107 @@
+"""What is asked of the file system: bytes that are appended whole, and files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from pathlib import Path
+
+_WORDS = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk quota is used up",
+    errno.EIO: "the disk has a fault",
+    errno.EFBIG: "the file may grow no further",
+    errno.EROFS: "the disk can only be read",
+}
+
+
+def why(error: OSError) -> str:
+    """What the system says of a failure, in words.
+
+    >>> why(OSError(errno.ENOSPC, "No space left on device"))
+    'the disk is full'
+    """
+    return _WORDS.get(error.errno or 0, error.strerror or str(error))
+
+
+def put_whole(path: Path, data: bytes | memoryview) -> None:
+    """A file that holds all of `data` or is as it was before, also after a power cut; OSError where it is not put."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+        try:
+            _write_all(file, data)
+            os.fsync(file)
+        finally:
+            os.close(file)
+        os.replace(partial, path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.unlink(partial)
+        raise
+    sync_directory(path.parent)
+
+
+def sync_directory(path: Path) -> None:
+    """See that the names in a directory outlast a power cut."""
+    directory = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
+
+
+class AppendFile:
+    """A file that grows at its end by whole pieces: what was written in part is cut off before the next piece.
+
+    Parameters
+    ----------
+    path
+        Made where it is not there.
+    length
+        Bytes that it is cut to, when it is longer; None keeps them all.
+    """
+
+    def __init__(self, path: Path, length: int | None = None) -> None:
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        size = os.fstat(self._file).st_size
+        self.length = size if length is None else min(size, length)
+        self._torn = size > self.length
+
+    def append(self, data: bytes) -> None:
+        """Write all of it, or raise OSError; what was written of it counts as not written."""
+        if self._torn:
+            os.ftruncate(self._file, self.length)
+        self._torn = True
+        _write_all(self._file, data)
+        self._torn = False
+        self.length += len(data)
+
+    def back_to(self, length: int) -> None:
+        """Give up what is beyond this length."""
+        self._torn = True
+        self.length = length
+
+    def sync(self) -> None:
+        """See that what was written outlasts a power cut; OSError where that is not known."""
+        getattr(os, "fdatasync", os.fsync)(self._file)  # macOS has none
+
+    def append_synced(self, data: bytes) -> None:
+        """Both; after an OSError neither counts as done."""
+        before = self.length
+        try:
+            self.append(data)
+            self.sync()
+        except OSError:
+            self.back_to(before)
+            raise
+
+    def close(self) -> None:
+        os.close(self._file)
+
+
+def _write_all(file: int, data: bytes | memoryview) -> None:
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(file, rest) :]

@@ -1,0 +1,32 @@
+"""One process at a time records in a directory."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+
+from livebode.nouns import InputError
+
+
+class Lock:
+    """Holds a directory until it is released or the process ends, however it ends.
+
+    Raises
+    ------
+    InputError
+        If another process holds it.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = os.open(directory, os.O_RDONLY)
+        try:
+            fcntl.flock(self._directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._directory)
+            raise InputError(
+                f"another process records in {str(directory)!r}; end it first, or take another --out"
+            ) from None
+
+    def release(self) -> None:
+        os.close(self._directory)

@@ -1,0 +1,136 @@
+"""The closed segments of a run: journals become Parquet, and the oldest segments leave when the budget is used up."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.records.segments import journal, manifest
+from livebode.records.segments.disk import AppendFile, put_whole, sync_directory
+from livebode.records.segments.journal import Journal
+from livebode.records.segments.manifest import Manifest, Segment
+from livebode.records.table import Table
+
+FIRST_TO_GO = "samples"
+
+
+class Shelf:
+    """Closes journals and keeps the budget.
+
+    What the manifest says counts: a segment is written before its line, a journal removed after it, and a segment
+    removed after the line that says so, so that a kill between two steps leaves only files that nobody counts.
+
+    Parameters
+    ----------
+    run
+        Directory of the run.
+    tables
+        Its tables by name.
+    found
+        Its manifest.
+    sealed
+        Numbers of journals that are complete and not closed yet.
+    """
+
+    def __init__(self, run: Path, tables: Mapping[str, Table], found: Manifest, sealed: list[int]) -> None:
+        self._run, self._tables = run, tables
+        self._file = AppendFile(run / manifest.NAME, found.length)
+        self._segments = list(found.segments)
+        self._sealed = list(sealed)
+        self._unwanted: list[Path] = []
+
+    @property
+    def used_bytes(self) -> int:
+        """Of the manifest and the segments that stand."""
+        return self._file.length + sum(segment.size_bytes for segment in self._segments)
+
+    def seal(self, number: int) -> None:
+        """This journal is complete; another one goes on."""
+        self._sealed.append(number)
+
+    def close_journals(self) -> None:
+        """Turn the sealed journals into segments; OSError leaves those that are not turned as they were."""
+        self.discard()
+        while self._sealed:
+            self._turn(self._sealed[0])
+            del self._sealed[0]
+
+    def make_room(self, bytes_max: int) -> list[Segment]:
+        """Remove the oldest segments until no more than this is used: of samples first, then of all others alike."""
+        gone: list[Segment] = []
+        excess = self.used_bytes - bytes_max
+        order = sorted(self._segments, key=lambda segment: segment.table != FIRST_TO_GO)
+        for segment in order:
+            if excess <= 0:
+                break
+            gone.append(segment)
+            excess -= segment.size_bytes
+        if gone:
+            self._file.append_synced(manifest.removal_line(gone))
+            self._segments = [segment for segment in self._segments if segment not in gone]
+            self.discard(*(self._run / segment.name for segment in gone))
+        return gone
+
+    def discard(self, *paths: Path) -> None:
+        """Remove files that nobody counts; those that cannot be removed now are tried again the next time."""
+        self._unwanted = [path for path in (*self._unwanted, *paths) if not _removed(path)]
+
+    def close(self) -> None:
+        """Close the manifest."""
+        self._file.close()
+
+    def _turn(self, number: int) -> None:
+        path = journal.path_of(self._run, number)
+        rows = Journal.read(path).rows
+        segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in rows.items()]
+        self._file.append_synced(manifest.closing_line(number, segments))
+        self._segments += segments
+        self.discard(path)
+
+    def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
+        folder = self._run / table
+        if not folder.is_dir():
+            os.mkdir(folder)
+            sync_directory(self._run)
+        sink = pa.BufferOutputStream()
+        pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
+        data = memoryview(sink.getvalue())
+        name = f"{table}/{number:06d}.parquet"
+        put_whole(self._run / name, data)
+        sample, time_s = rows["sample"], rows["time_s"]
+        return Segment(
+            name=name,
+            table=table,
+            rows=rows.num_rows,
+            first_sample=sample[0].as_py(),
+            last_sample=sample[-1].as_py(),
+            first_s=time_s[0].as_py(),
+            last_s=time_s[-1].as_py(),
+            size_bytes=len(data),
+            sha256=hashlib.sha256(data).hexdigest(),
+        )
+
+
+def sweep(run: Path, found: Manifest) -> None:
+    """Remove files that a kill left between two steps: half written ones, closed journals, segments nobody counts."""
+    known = {segment.name for segment in found.segments}
+    for path in [*run.glob(".*.partial"), *run.glob("*/.*.partial"), *run.glob("*/[0-9]*.parquet")]:
+        if path.relative_to(run).as_posix() not in known:
+            _removed(path)
+    for number in journal.numbers(run):
+        if number in found.closed:
+            _removed(journal.path_of(run, number))
+
+
+def _removed(path: Path) -> bool:
+    try:
+        os.unlink(path)
+    except OSError as error:
+        return error.errno == errno.ENOENT
+    return True

@@ -1,0 +1,266 @@
+"""Store: writes the record of a run so that a kill at any moment costs at most the last second."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from livebode.nouns import Event, InputError
+from livebode.records.plain_json import to_json
+from livebode.records.segments import journal
+from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
+from livebode.records.segments.event_log import EventLog
+from livebode.records.segments.journal import Commit
+from livebode.records.segments.limits import Limits
+from livebode.records.segments.lock import Lock
+from livebode.records.segments.manifest import Manifest
+from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
+from livebode.records.segments.shelf import Shelf
+from livebode.records.segments.waiting import Waiting
+from livebode.records.table import Table
+
+
+class Store:
+    """The record of one run, written by one process; see docs/run-directory.md for what it leaves.
+
+    Use it as a context manager. Rows and events are kept until `commit` writes them together with the state to go on
+    from. Leaving it writes nothing more, whatever the reason; `finish` does.
+
+    A disk that takes nothing pauses the record and never raises: `commit` tries again each time, and Events say when it
+    paused, when it went on, and what was lost.
+
+    Parameters
+    ----------
+    path
+        Directory of the run; made where it is not there.
+    tables
+        Tables by name.
+    limits
+        How it is cut.
+
+    Attributes
+    ----------
+    last
+        The commit to go on from; None in a new directory, which `begin` makes a run.
+
+    Raises
+    ------
+    InputError
+        On entering: if another process records there, something else is there, or the run is finished or damaged.
+    """
+
+    def __init__(self, path: Path, tables: Mapping[str, Table], limits: Limits) -> None:
+        self.path, self.limits = path, limits
+        self.last: Commit | None = None
+        self._tables = dict(tables)
+        self._waiting = Waiting(tuple(self._tables))
+        self._log = EventLog()
+        self._pause: Event | None = None
+        self._committed_s = self._synced_s = 0.0
+
+    def __enter__(self) -> Store:
+        with _refusing(self.path, "cannot be recorded in"), contextlib.ExitStack() as files:
+            self.path.mkdir(parents=True, exist_ok=True)
+            files.callback(Lock(self.path).release)
+            self._files = files
+            found = recover(self.path)
+            if found is not None:
+                self._go_on(found)
+            self._files = files.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._files.close()
+
+    def begin(self, summary: dict[str, Any], sample: int, time_s: float, states: Mapping[str, bytes]) -> None:
+        """Make the directory a run, with this run.json, that begins at this sample; InputError if the disk refuses."""
+        commit = Commit(sample, time_s, time.time(), 0, dict(states))
+        with _refusing(self.path, "cannot be recorded in"):
+            os.mkdir(self.path / journal.FOLDER)
+            self._open_files(Manifest(), [], 0)
+            self._open_journal(1, commit)
+            self._files.callback(lambda: self._journal.close())
+            self._write_summary(summary, finished=False)
+            sync_directory(self.path.parent)
+            self.last = commit
+
+    def write(self, table: str, rows: pa.RecordBatch) -> None:
+        """Append rows to a table with the next commit."""
+        self._waiting.add(table, rows)
+
+    def write_event(self, event: Event) -> None:
+        """Append an event with the next commit."""
+        self._log.add(event)
+
+    def drain_events(self) -> list[Event]:
+        """What the record itself has to say since the last call; it is written already, or will be."""
+        return self._log.drain()
+
+    def due(self, sample: int) -> bool:
+        """Whether it is time for a commit, when the next sample has this number."""
+        assert self.last is not None
+        long = time.monotonic() - self._committed_s >= self.limits.interval_s
+        return long or sample - self._committed >= self.limits.interval_samples
+
+    def commit(self, sample: int, time_s: float, states: Mapping[str, bytes]) -> bool:
+        """Make everything up to before this sample part of the record, with the states that go on from there.
+
+        Returns whether the disk took it.
+        """
+        self._committed_s, self._committed = time.monotonic(), sample
+        self._waiting.gather()
+        try:
+            self._log.write(self._events)
+            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
+            self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
+            self._waiting.written()
+            full = self._full(sample)
+            if full or self._committed_s - self._synced_s >= self.limits.interval_s:
+                self._sync()
+            self.last = commit
+        except OSError as error:
+            self._failed(error, sample, time_s)
+            return False
+        self._go_on_after_pause(sample, time_s)
+        if full:
+            # Where there is no room for it, the journal grows on and this is tried again at the next commit.
+            with contextlib.suppress(OSError):
+                self._close_segment()
+        return True
+
+    def finish(self, summary: dict[str, Any], *, finished: bool) -> None:
+        """Close what is open and write run.json; a run that is not `finished` may be gone on with later.
+
+        Raises
+        ------
+        InputError
+            If the disk refuses; the record is then as if it had been killed.
+        """
+        with _refusing(self.path, "could not be finished in"):
+            assert self.last is not None
+            self._not_paused()
+            self._sync()
+            self._close_segment()
+            self.commit(self.last.sample, self.last.time_s, self.last.states)  # with what closing had to say
+            self._not_paused()
+            self._write_summary(summary, finished=finished)
+            if finished:
+                self._shelf.discard(journal.path_of(self.path, self._number))
+
+    def _not_paused(self) -> None:
+        if self._pause is not None:
+            raise InputError(f"the run in {str(self.path)!r} could not be finished: {self._pause.message}")
+
+    def _full(self, sample: int) -> bool:
+        limits = self.limits
+        return self._journal.length >= limits.journal_bytes_max or sample - self._began >= limits.segment_samples
+
+    def _go_on(self, found: Found) -> None:
+        self.last, self._number = found.commit, found.number
+        self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
+        self._journal = AppendFile(journal.path_of(self.path, found.number), found.length)
+        self._files.callback(lambda: self._journal.close())
+        self._safe_bytes = found.length
+        self._began = self._committed = found.commit.sample
+        away_s = max(0.0, time.time() - found.commit.unix_s)
+        self._log.say(
+            "record-continued",
+            found.commit.sample,
+            found.commit.time_s,
+            f"the record goes on at sample {found.commit.sample}, {away_s:.1f} s after it ended there",
+            away_s=away_s,
+            torn_bytes=found.torn_bytes,
+        )
+
+    def _open_files(self, found: Manifest, sealed: list[int], events_bytes: int) -> None:
+        self._shelf = Shelf(self.path, self._tables, found, sealed)
+        self._files.callback(self._shelf.close)
+        self._events = AppendFile(self.path / EVENTS, events_bytes)
+        self._files.callback(self._events.close)
+
+    def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
+        text = to_json(summary | {"record": {"finished": finished, "tables": list(self._tables)}}, indent=2) + "\n"
+        put_whole(self.path / RUN, text.encode())
+
+    def _open_journal(self, number: int, commit: Commit) -> None:
+        path = journal.path_of(self.path, number)
+        put_whole(path, journal.head(self._tables) + commit.to_frame())
+        self._journal, self._number = AppendFile(path), number
+        self._safe_bytes = self._journal.length
+        self._began = self._committed = commit.sample
+
+    def _sync(self) -> None:
+        self._journal.sync()
+        self._synced_s, self._safe_bytes = time.monotonic(), self._journal.length
+        self._waiting.safe()
+
+    def _close_segment(self) -> None:
+        """Go on in a new journal, and turn the one before into segments."""
+        assert self.last is not None
+        before, number = self._journal, self._number
+        self._open_journal(number + 1, self.last)
+        before.close()
+        self._shelf.seal(number)
+        self._keep_budget()
+        self._shelf.close_journals()
+
+    def _keep_budget(self) -> None:
+        if self.limits.budget_bytes is None:
+            return
+        room = self.limits.budget_bytes - self._events.length - 2 * self.limits.journal_bytes_max
+        gone = self._shelf.make_room(room)
+        if gone:
+            assert self.last is not None
+            names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
+            self._log.say(
+                "record-removed",
+                self.last.sample,
+                self.last.time_s,
+                f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
+                removed=[segment.name for segment in gone],
+            )
+
+    def _failed(self, error: OSError, sample: int, time_s: float) -> None:
+        self._journal.back_to(self._safe_bytes)
+        self._waiting.failed(self.limits.held_bytes)
+        if self._pause is None:
+            self._pause = self._log.say(
+                "record-paused",
+                sample,
+                time_s,
+                f"{why(error)}; recording pauses at sample {sample} and goes on when it can be written again",
+                errno=error.errno,
+            )
+
+    def _go_on_after_pause(self, sample: int, time_s: float) -> None:
+        if self._pause is None:
+            return
+        lost = self._waiting.take_lost()
+        what = ", ".join(
+            f"{sums['rows']} rows of {table} of samples {sums['first_sample']} to {sums['last_sample']}"
+            for table, sums in lost.items()
+        )
+        self._log.say(
+            "record-resumed",
+            sample,
+            time_s,
+            f"recording goes on at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
+            paused_at=self._pause.sample,
+            lost=lost,
+            lost_events=self._log.take_given_up(),
+        )
+        self._pause = None
+
+
+@contextlib.contextmanager
+def _refusing(path: Path, what: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{str(path)!r} {what}: {why(error)}") from None

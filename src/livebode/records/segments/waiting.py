@@ -1,0 +1,82 @@
+"""What is recorded but not yet safe on the disk, and what of it had to be given up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.records.segments.frames import ROWS, to_frame
+
+
+@dataclass(frozen=True)
+class _Part:
+    table: str
+    frame: bytes
+    rows: int
+    first_sample: int
+    last_sample: int
+
+
+class Waiting:
+    """Rows since the journal was last synced. After a failure they are written again, or given up and counted.
+
+    Parameters
+    ----------
+    tables
+        Names, in the order of the journal's schemas.
+    """
+
+    def __init__(self, tables: tuple[str, ...]) -> None:
+        self._tables = tables
+        self._new: dict[str, list[pa.RecordBatch]] = {}
+        self._parts: list[_Part] = []
+        self._written = 0
+        self.lost: dict[str, dict[str, int]] = {}
+        """Rows, first and last sample of what was given up, for each table."""
+
+    def add(self, table: str, batch: pa.RecordBatch) -> None:
+        if batch.num_rows:
+            self._new.setdefault(table, []).append(batch)
+
+    def gather(self) -> None:
+        """Make one frame for each table of what was added."""
+        for table, batches in self._new.items():
+            batch = pa.concat_batches(batches)
+            sample = batch["sample"].to_numpy()
+            frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
+            self._parts.append(_Part(table, frame, batch.num_rows, int(np.min(sample)), int(np.max(sample))))
+        self._new.clear()
+
+    @property
+    def held_bytes(self) -> int:
+        return sum(len(part.frame) for part in self._parts)
+
+    def unwritten(self) -> list[bytes]:
+        """Frames that are not in the journal."""
+        return [part.frame for part in self._parts[self._written :]]
+
+    def written(self) -> None:
+        """They are in the journal now."""
+        self._written = len(self._parts)
+
+    def safe(self) -> None:
+        """The journal was synced."""
+        del self._parts[: self._written]
+        self._written = 0
+
+    def failed(self, bytes_max: int) -> None:
+        """Nothing since the last sync counts as written; give all of it up where it is more than this."""
+        self._written = 0
+        if self.held_bytes <= bytes_max:
+            return
+        for part in self._parts:
+            sum_ = self.lost.setdefault(part.table, {"rows": 0, "first_sample": part.first_sample})
+            sum_["rows"] += part.rows
+            sum_["last_sample"] = part.last_sample
+        self._parts.clear()
+
+    def take_lost(self) -> dict[str, dict[str, int]]:
+        lost, self.lost = self.lost, {}
+        return lost

@@ -1,0 +1,225 @@
+"""The record of a run in segments, with what goes on where it ended: the tracker and the session's counts."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records.sample_table import as_rows, samples_of
+from livebode.records.segments.disk import why
+from livebode.records.segments.limits import Limits
+from livebode.records.segments.lock import Lock
+from livebode.records.segments.store import Store
+from livebode.session.axis import RecordSection
+from livebode.session.continuing import begun_anew, in_pieces, offered_again
+
+_INTERVAL_S = 0.5
+_PIECE_S = 0.25  # with the interval three quarters of a second: what a kill costs at most
+_SEEN_AGAIN_BYTES = 256 << 20  # what a picture of a run that goes on is drawn from, beside what comes
+
+
+class Stateful(Protocol):
+    def snapshot(self) -> bytes: ...
+    def restore(self, snapshot: bytes) -> None: ...
+
+
+class SegmentedRun:
+    """Responses, events and, on request, samples of one run; one that stands there unfinished is gone on with.
+
+    Used as `RunDirectory` is, but that the Blocks go through `feed`, and that leaving it by an exception keeps all that
+    was committed.
+
+    Parameters
+    ----------
+    path
+        Directory of the run.
+    kept
+        How it is kept.
+    summary
+        run.json at the beginning: configuration and what was found.
+    channels, rate_hz
+        Of the Blocks.
+    parts
+        What goes on where the record ended, by name: restored on entering, stored with every commit.
+    force
+        Replace a run there instead of going on with it.
+    again
+        Whether the source begins with the same samples again each time.
+    ends
+        Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
+    tell
+        Called with what the record itself has to say, at once.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        kept: RecordSection,
+        *,
+        summary: Mapping[str, Any],
+        channels: Sequence[Channel],
+        rate_hz: float,
+        parts: Mapping[str, Stateful],
+        force: bool,
+        again: bool,
+        ends: bool,
+        tell: Callable[[Event], None],
+    ) -> None:
+        self.path = path
+        self._summary, self._rate_hz, self._parts = dict(summary), rate_hz, parts
+        self._force, self._again, self._ends, self._tell = force, again, ends, tell
+        self._samples = samples_of(channels) if kept.samples else None
+        limits = Limits(
+            interval_samples=max(1, round(_INTERVAL_S * rate_hz)),
+            segment_samples=max(1, round(kept.segment_s * rate_hz)),
+            interval_s=_INTERVAL_S,
+            budget_bytes=kept.budget_bytes,
+        )
+        tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
+            {"samples": self._samples} if self._samples else {}
+        )
+        self._store = Store(path, tables, limits)
+        self.partial = path / ".pictures.partial"
+
+    def __enter__(self) -> SegmentedRun:
+        if self._force:
+            _make_way(self.path)
+        with contextlib.ExitStack() as undo:
+            undo.enter_context(self._store)
+            if self._store.last is None:
+                self._store.begin(self._summary, 0, 0.0, self._states())
+                self._continued = False
+            else:
+                self._restore(self._store.last.states)
+                self._continued = True
+            self._undo = undo.pop_all()
+        self._hear()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._undo.close()
+        if kind in (KeyboardInterrupt, SystemExit) and self._store.last is not None:
+            last = self._store.last
+            message = f"stopped at sample {last.sample}; the same command goes on with the run in {str(self.path)!r}"
+            self._tell(Event("record-stopped", last.sample, last.time_s, message))
+
+    def before(self) -> Iterator[Responses]:
+        """The newest responses of the run that is gone on with."""
+        if self._continued:
+            run = Run.open(self.path)
+            newest = run.batches(_SEEN_AGAIN_BYTES)
+            yield next(newest, None) or run.responses()  # none are told from no run by their lines
+            yield from newest
+
+    def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """The Blocks that are still to be tracked; when one is asked for, all that came of the one before is recorded.
+
+        Raises
+        ------
+        InputError
+            At the end, if the disk does not take the last ones.
+        """
+        block: Block | None = None
+        for block in in_pieces(self._numbered(blocks), max(1, round(_PIECE_S * self._rate_hz))):
+            if self._samples:
+                self._store.write("samples", as_rows(block, self._samples))
+            yield block
+            if self._store.due(block.stop):
+                self._commit(block)
+        if block is not None:
+            self._commit(block)
+
+    def write(self, responses: Responses) -> None:
+        """Append responses."""
+        if len(responses):
+            self._store.write("responses", as_batch(responses))
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        """Append what was fitted and what follows."""
+        for parameters in parts:
+            if len(parameters):
+                self._store.write("parameters", parameter_rows(parameters))
+
+    def write_event(self, event: Event) -> None:
+        """Append an event."""
+        self._store.write_event(event)
+
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        """Draw the pictures, close what is open and write run.json."""
+        try:
+            shutil.rmtree(self.partial, ignore_errors=True)
+            os.mkdir(self.partial)
+            draw(self.partial)
+            for picture in self.partial.iterdir():
+                os.replace(picture, self.path / picture.name)
+        except OSError as error:
+            raise InputError(f"the pictures could not be written to {str(self.path)!r}: {why(error)}") from None
+        finally:
+            shutil.rmtree(self.partial, ignore_errors=True)
+        last = self._store.last
+        assert last is not None
+        # What was held back at the end was written since the last commit, and belongs to the states as they are now.
+        self._store.commit(last.sample, last.time_s, self._states())
+        self._store.finish(summary, finished=self._ends)
+
+    def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        last = self._store.last
+        if last is None or not self._continued:
+            return iter(blocks)
+        if self._again:
+            return offered_again(blocks, last.sample)
+        away_s = max(0.0, time.time() - last.unix_s)
+        return begun_anew(blocks, last.sample, last.time_s - last.sample / self._rate_hz, away_s)
+
+    def _commit(self, block: Block) -> None:
+        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states())
+        self._hear()
+
+    def _hear(self) -> None:
+        for event in self._store.drain_events():
+            self._tell(event)
+
+    def _states(self) -> dict[str, bytes]:
+        return {name: part.snapshot() for name, part in self._parts.items()}
+
+    def _restore(self, states: Mapping[str, bytes]) -> None:
+        before = Run.open(self.path).summary
+        now = json.loads(to_json(self._summary))
+        if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
+            raise InputError(
+                f"the unfinished run in {str(self.path)!r} was begun with another configuration; "
+                "take that one again, another --out, or --force to replace it"
+            )
+        for name, part in self._parts.items():
+            part.restore(states[name])
+
+
+def _identity(summary: Mapping[str, Any]) -> list[Any]:
+    # How the record is cut may change on the way; what is recorded may not.
+    configuration = dict(summary["configuration"])
+    kept = configuration.pop("record", None) or {}
+    found = {key: value for key, value in summary["found"].items() if key != "motion"}  # what the model has learnt
+    return [configuration, found, kept.get("samples")]
+
+
+def _make_way(path: Path) -> None:
+    """Remove the run that stands there; InputError where something else stands there."""
+    if not path.exists():
+        return
+    if not (path / "run.json").is_file() and (not path.is_dir() or any(path.iterdir())):
+        raise InputError(f"{str(path)!r} is not the directory of a run, so --force leaves it; take another --out")
+    lock = Lock(path)
+    try:
+        shutil.rmtree(path)
+    except OSError as error:
+        raise InputError(f"the run in {str(path)!r} cannot be removed: {why(error)}") from None
+    finally:
+        lock.release()

@@ -1,0 +1,62 @@
+"""What a run counts beside the tracker: responses, what each signal held, and the time that it took."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+
+from livebode.nouns import Responses
+from livebode.session.checks import ChannelCheck
+
+
+class Tally:
+    """Counts over a whole run, also over one that was gone on with.
+
+    Parameters
+    ----------
+    check
+        What looks at the signals.
+    started
+        `time.perf_counter()` at the beginning.
+
+    Attributes
+    ----------
+    stop
+        Number of the sample behind the last one that was followed.
+    handed_out
+        The `stop` at which what was held back had been handed out.
+    """
+
+    def __init__(self, check: ChannelCheck, started: float) -> None:
+        self.check = check
+        self.responses = self.invalid = self.valid_lines = self.stop = self.handed_out = 0
+        self.tracked_s = 0.0
+        self._started = started
+
+    @property
+    def run_s(self) -> float:
+        return time.perf_counter() - self._started
+
+    def take(self, responses: Responses, tracked_s: float) -> None:
+        """What came of a step, and the seconds that it took the tracker."""
+        self.responses += len(responses)
+        self.invalid += int(np.count_nonzero(~responses.valid.all(axis=1)))
+        self.valid_lines += int(np.count_nonzero(responses.valid))
+        self.tracked_s += tracked_s
+
+    _STATE = ("responses", "invalid", "valid_lines", "stop", "handed_out", "tracked_s")
+
+    def snapshot(self) -> bytes:
+        """All of it as bytes; see `restore`."""
+        numbers = {name: getattr(self, name) for name in self._STATE}
+        return json.dumps(numbers | {"run_s": self.run_s, "check": self.check.state()}).encode()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot."""
+        state = json.loads(snapshot)
+        for name in self._STATE:
+            setattr(self, name, state[name])
+        self._started -= state["run_s"]
+        self.check.load(state["check"])

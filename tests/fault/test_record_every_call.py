@@ -1,0 +1,117 @@
+"""Every call that the record makes on the file system fails once, or is the last one before the power goes."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from livebode.nouns import InputError
+from tests.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
+
+SAMPLES = 2000
+CALLS = ("open", "write", "fdatasync", "fsync", "ftruncate", "replace", "unlink", "mkdir")
+
+
+class PowerCut(BaseException):
+    """Nothing is done after it."""
+
+
+class Disk:
+    """Counts the calls that change files, and lets the `at`-th one go wrong in a given way."""
+
+    def __init__(self, at: int, wrong: Callable[[Disk], None]) -> None:
+        self.at, self.wrong, self.count, self.dead = at, wrong, 0, False
+
+    def around(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*args: Any, **kwargs: Any) -> Any:
+            if self.dead:
+                raise PowerCut
+            self.count += 1
+            if self.count == self.at:
+                if name == "write":  # half of it reaches the disk
+                    call(args[0], memoryview(args[1])[: len(args[1]) // 2])
+                self.wrong(self)
+            return call(*args, **kwargs)
+
+        return called
+
+
+def full(_: Disk) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def cut(disk: Disk) -> None:
+    disk.dead = True
+    raise PowerCut
+
+
+@contextmanager
+def disk_that(wrong: Callable[[Disk], None], at: int) -> Iterator[Disk]:
+    disk = Disk(at, wrong)
+    with pytest.MonkeyPatch.context() as patch:
+        for name in CALLS:
+            patch.setattr(os, name, disk.around(name, getattr(os, name)))
+        yield disk
+
+
+@pytest.fixture(autouse=True)
+def _commit_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("livebode.session.segmented._INTERVAL_S", 0.0)
+
+
+def calls_of_a_run(directory: Path) -> tuple[int, int, int]:
+    """Calls before the first block was asked for, before the last one came back, and in all."""
+    counts: list[int] = []
+    with disk_that(full, 0) as disk:
+        record_machine(machine(SAMPLES, lambda _: counts.append(disk.count)), directory)
+    check_whole(directory, SAMPLES)
+    assert not list((directory / "open").iterdir())
+    return counts[0], counts[-1], disk.count
+
+
+def test_a_call_that_fails_once_costs_nothing(tmp_path: Path) -> None:
+    paused = 0
+    begun, ended, calls = calls_of_a_run(tmp_path / "whole")
+    for at in range(1, calls + 1):
+        out, said = tmp_path / str(at), []
+        with disk_that(full, at):
+            if begun < at <= ended:
+                record_machine(machine(SAMPLES), out, tell=said.append)
+            else:  # at its very beginning or end the user may be told
+                with suppress(InputError):
+                    record_machine(machine(SAMPLES), out, tell=said.append)
+        kinds = [event.kind for event in said]
+        assert kinds in ([], ["record-paused", "record-resumed"], ["record-paused"]), at
+        paused += kinds == ["record-paused", "record-resumed"]
+        if unfinished(out):
+            record_machine(machine(SAMPLES), out)
+        check_whole(out, SAMPLES)
+    # The others were closing a segment, which waits without a pause.
+    assert paused > (ended - begun) / 3
+
+
+def test_power_may_go_at_any_call(tmp_path: Path) -> None:
+    for at in range(1, calls_of_a_run(tmp_path / "whole")[2] + 1):
+        out, done = tmp_path / str(at), 0
+
+        def progress(samples: int, _: int | None) -> None:
+            nonlocal done
+            done = samples
+
+        with disk_that(cut, at) as disk, pytest.raises(PowerCut):
+            record_machine(machine(SAMPLES), out, progress=progress)
+        assert disk.dead
+        if (out / "run.json").exists() and unfinished(out):
+            check_beginning(out, SAMPLES, done - RATE_HZ)
+            with disk_that(cut, 1 + at % 25), suppress(PowerCut):  # once more, while it goes on
+                record_machine(machine(SAMPLES), out)
+            check_beginning(out, SAMPLES, done - RATE_HZ)
+        if unfinished(out):
+            record_machine(machine(SAMPLES), out)
+        check_whole(out, SAMPLES)

@@ -1,0 +1,119 @@
+"""A full disk pauses the record and not the tracking; a budget removes what is oldest, and never events."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import resource
+import subprocess
+import sys
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.nouns import Block, Channel, Event
+from livebode.records import Run
+from livebode.records.sample_table import as_rows, samples_of
+from livebode.records.segments.limits import Limits
+from livebode.records.segments.store import Store
+from tests.starved import on_a_limited_file
+
+ROOT = Path(__file__).parents[2]
+RATE_HZ = 1000.0
+Y = samples_of([Channel("y", "m")])
+SUMMARY = {"found": {"bins": [1], "window": 10, "rate_hz": RATE_HZ, "quiet_bins": []}}
+
+
+def _send(say: Connection, run: Path) -> None:
+    say.send([event.kind for event in on_a_limited_file(run)])
+
+
+def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    said, say = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(say, tmp_path / "run"))
+    process.start()
+    process.join()
+    assert process.exitcode == 0
+    assert said.recv() == ["record-paused", "record-resumed"]
+
+
+def test_a_disk_that_is_full(tmp_path: Path) -> None:
+    mount = f"mount -t tmpfs -o size=2m none {tmp_path}"
+    allowed = subprocess.run(["unshare", "-Urm", "sh", "-c", mount], capture_output=True, text=True, check=False)
+    if allowed.returncode:
+        pytest.skip(f"this system lets a user mount no small file system: {allowed.stderr.strip()}")
+    command = f"{mount} && exec {sys.executable} -m tests.starved {tmp_path}"
+    done = subprocess.run(
+        ["unshare", "-Urm", "sh", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["record-paused", "record-resumed"]
+
+
+def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
+    # It is lost where memory holds no more; events are not.
+    limits = Limits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        try:
+            taken = [_second(store, k, {5: 9000, 27: soft}.get(k), hard) for k in range(40)]
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        paused, resumed = store.drain_events()
+        store.finish(SUMMARY, finished=True)
+    assert taken == [True] * 5 + [False] * 22 + [True] * 13
+    run = Run.open(tmp_path / "run")
+    number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
+    missing = np.setdiff1d(np.arange(4000), number)
+    lost = resumed.details["lost"]["samples"]
+    assert lost == {"rows": missing.size, "first_sample": missing[0], "last_sample": missing[-1]}
+    assert 0 < missing.size < 2200
+    assert paused.sample == 600
+    assert [e.sample for e in run.events() if e.kind == "mark"] == list(range(0, 4000, 100))
+
+
+def _second(store: Store, k: int, limit: int | None, hard: int) -> bool:
+    if limit is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    block = Block(np.arange(100.0)[np.newaxis], (Channel("y"),), RATE_HZ, start=100 * k)
+    store.write("samples", as_rows(block, Y))
+    store.write_event(Event("mark", block.start, block.start / RATE_HZ, ""))
+    return store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
+
+
+def test_a_budget_is_kept_and_events_stay(tmp_path: Path) -> None:
+    # Segments of 0.8 MB, as random numbers do not compress; 40 of samples and of responses each are 64 MB.
+    budget, rng = 8 << 20, np.random.default_rng(0)
+    limits = Limits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)
+    used, said = [], []
+    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        for start in range(0, 40 * 50_000, 10_000):
+            block = Block(rng.standard_normal((1, 10_000)), (Channel("y"),), RATE_HZ, start=start)
+            for table in ("samples", "responses"):
+                store.write(table, as_rows(block, Y))
+            store.write_event(Event("mark", start, start / RATE_HZ, ""))
+            store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
+            used.append(sum(path.stat().st_size for path in (tmp_path / "run").rglob("*") if path.is_file()))
+            said += store.drain_events()
+        store.finish(SUMMARY, finished=True)
+    run = Run.open(tmp_path / "run")
+    assert max(used) <= budget
+    assert max(used) > budget / 2
+    # Samples went first, all but those closed last, and of responses the newest stay.
+    newest = run.segments[-1].name.removeprefix("responses/")
+    assert [segment.name for segment in run.segments if segment.table == "samples"] == [f"samples/{newest}"]
+    number = np.concatenate([table["sample"].to_numpy() for table in run.tables("responses")])
+    assert np.array_equal(number, np.arange(number[0], 40 * 50_000))
+    assert number[0] > 0
+    marks = [event for event in run.events() if event.kind == "mark"]
+    assert len(marks) == 200
+    gone = [name for event in said for name in event.details.get("removed", [])]
+    of_samples = gone.index("responses/000001.parquet")
+    assert gone[:of_samples] == [f"samples/{k:06d}.parquet" for k in range(1, of_samples + 1)]
+    assert not any((tmp_path / "run" / name).exists() for name in gone)
