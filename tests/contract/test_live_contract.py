@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -38,6 +39,14 @@ def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Peer]:
 
 def opened(peer: Peer, **more: object) -> LiveSource:
     return open_source(SourceSettings(**(peer.settings | {"timeout_s": PATIENCE_S} | more)))
+
+
+@contextmanager
+def fed(peer, script, **more):
+    """A source that is open until the script has ended, for a peer that still sends to a closed one fails."""
+    with Feeding(script) as feeding, opened(peer, **more) as source:
+        yield source
+        feeding.join()
 
 
 def received(source: LiveSource, last: int) -> list[LiveBlock]:
@@ -76,7 +85,7 @@ def test_the_same_samples_come_back_bit_for_bit(peer):
         send_all(peer, given)
         peer.end()
 
-    with Feeding(script), opened(peer, **({"reorder_batches": 0} if "udp" in peer.settings["url"] else {})) as source:
+    with fed(peer, script, **({"reorder_batches": 0} if "udp" in peer.settings["url"] else {})) as source:
         blocks = received(source, given[-1].stop - 1)
         assert source.channels == CHANNELS
         assert source.rate_hz == RATE_HZ
@@ -105,7 +114,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
         send_all(peer, given[100:])
         peer.end()
 
-    with Feeding(script), opened(peer) as source:
+    with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
         events = [event for event in source.drain_events() if event.kind == "loss"]
         lost = source.health.lost
@@ -127,7 +136,7 @@ def test_a_broken_connection_comes_back_by_itself(peer):
         peer.interrupt()
         send_all(peer, given[30:])
 
-    with Feeding(script), opened(peer) as source:
+    with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
         kinds = [event.kind for event in source.drain_events()]
     is_truth(blocks)
@@ -147,7 +156,7 @@ def test_rubbish_is_counted_and_the_stream_goes_on(peer):
         send_all(peer, given[30:])
         peer.end()
 
-    with Feeding(script), opened(peer) as source:
+    with fed(peer, script) as source:
         is_truth(received(source, given[-1].stop - 1))
         events = source.drain_events()
     assert source.health.counts["malformed"] >= 1
@@ -165,7 +174,7 @@ def test_a_sender_that_begins_anew_is_a_restart(peer):
         send_all(peer, new)
         peer.end()
 
-    with Feeding(script), opened(peer) as source:
+    with fed(peer, script) as source:
         blocks = received(source, new[-1].stop - 1)
         kinds = [event.kind for event in source.drain_events()]
     assert kinds.count("restart") == 1
@@ -183,13 +192,12 @@ def test_stop_ends_the_blocks_and_a_misspelt_channel_is_named(peer):
         peer.wait_ready()
         send_all(peer, given)
 
-    with Feeding(script) as feeding, opened(peer) as source:
+    with fed(peer, script) as source:
         with pytest.raises(InputError, match="there is no channel 'W'; did you mean 'w'"):
             source.blocks(["W"])
         threading.Timer(0.2, source.stop).start()
         for block in source.blocks(["y"]):
             assert block.names == ("y",)
-        feeding.join()  # a peer that still sends to a closed source would fail
 
 
 def test_silence_is_said_once(peer):

@@ -69,6 +69,7 @@ class AdsPeer(Peer):
 
     def _start(self) -> None:
         self._server = Server(self._memory, "127.0.0.1", self._port, logging=False)
+        self._server.server.listen()  # its thread would do so some time later, and refuse who comes before
         self._server.start()
 
     def __exit__(self, *_: object) -> None:
