@@ -95,6 +95,13 @@ def test_responses_of_different_lines_do_not_join() -> None:
     assert len(Responses.join([one, one])) == 4
 
 
+def test_rows_are_taken_by_slice_number_and_truth() -> None:
+    batch = _batch(Lines.parse("20,40", 4000, 400))
+    for rows in (slice(1, 2), np.array([1]), np.array([False, True])):
+        assert np.array_equal(batch[rows].sample, batch.sample[1:])
+        assert np.array_equal(batch[rows].value, batch.value[1:], equal_nan=True)
+
+
 def _batch(lines: Lines) -> Responses:
     shape = (2, len(lines))
     return Responses(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +76,7 @@ class _Sums:
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
             return
-        used, part = used[rows], _rows(part, rows)
+        used, part = used[rows], part[rows]
         self.count += used.sum(axis=0)
         self.value += np.where(used, part.value, 0).sum(axis=0)
         self.overlap.add(part.first, np.where(used, part.sigma, 0.0))
@@ -148,8 +147,3 @@ def _refuse_averages(part: Responses) -> None:
             "the responses are averages over periods already, whose mean would count the same samples many times; "
             "take one of them with --at TIME, or track again without averaging"
         )
-
-
-def _rows(part: Responses, rows: NDArray[np.bool_]) -> Responses:
-    names = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
-    return replace(part, **{name: getattr(part, name)[rows] for name in names})

@@ -118,7 +118,8 @@ _PER_ROW = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "t
 class Responses(Sequence[Response]):
     """Responses in a row, one for each hop, kept as arrays: (rows, lines) for what a line has, (rows,) for the rest.
 
-    Indexing gives a Response; a slice gives Responses. The attributes are those of Response.
+    Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
+    those of Response.
     """
 
     lines: Lines
@@ -140,10 +141,10 @@ class Responses(Sequence[Response]):
     @overload
     def __getitem__(self, at: int) -> Response: ...
     @overload
-    def __getitem__(self, at: slice) -> Responses: ...
-    def __getitem__(self, at: int | slice) -> Response | Responses:
+    def __getitem__(self, at: slice | NDArray[Any]) -> Responses: ...
+    def __getitem__(self, at: int | slice | NDArray[Any]) -> Response | Responses:
         rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
-        if isinstance(at, slice):
+        if isinstance(at, slice | np.ndarray):
             return replace(self, **rows)
         for name in ("dof", "first", "sample", "time_s", "schedule"):
             rows[name] = rows[name].item()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ from livebode.session.fits import fit_run
 from livebode.session.said import said
 
 _PLACES = 12
-_PER_ROW = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +134,4 @@ def _by_place(responses: Responses) -> Responses:
     edges = np.linspace(at.min(), at.max(), _PLACES + 1)
     place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, _PLACES - 1)
     groups = [use[place == i] for i in range(_PLACES)]
-    return Responses.join([mean_response(_rows(responses, group)) for group in groups if group.size])
-
-
-def _rows(responses: Responses, rows: np.ndarray) -> Responses:
-    return replace(responses, **{name: getattr(responses, name)[rows] for name in _PER_ROW})
+    return Responses.join([mean_response(responses[group]) for group in groups if group.size])
