@@ -185,7 +185,9 @@ def test_the_command_goes_on_where_it_was_ended(
 ) -> None:
     # Ended from within, after two thirds of the recording.
     code = (
-        "import os, sys; import livebode.session.segmented as s; from livebode.cli import main\n"
+        "import os, signal, sys; import livebode.session.segmented as s; from livebode.cli import main\n"
+        # What starts the tests in the background may have told them to ignore it.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "feed = s.in_pieces\n"
         "def ended(blocks, samples):\n"
         "    for block in feed(blocks, samples):\n"

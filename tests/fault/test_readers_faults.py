@@ -277,6 +277,7 @@ def test_damaged_files_are_read_or_refused(module, tmp_path):
 MEASURE = """
 import sys
 import pyarrow, pyarrow.csv, pyarrow.parquet, numpy, h5py, zipfile
+import pandas  # which Arrow loads at the first conversion, where it is installed
 from livebode.sources import open_log
 
 def peak_kib():  # ru_maxrss would count what the parent held before it started this

@@ -95,7 +95,7 @@ def test_a_run_is_fitted_afterwards(machine: Path) -> None:
 def test_a_model_that_finds_nothing_says_why(machine: Path) -> None:
     out, _ = run(machine, "nothing", "")
     result = livebode("fit", out, "--model", "rigid")
-    assert result.code == 0
+    assert result.code == 3
     assert "no numbers (" in result.out
 
 

@@ -10,18 +10,19 @@ import typer
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
 from livebode.nouns import InputError
-from livebode.records import to_json
+from livebode.records import Run, to_json
 from livebode.session import Axis
 
 
 def fit_command(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
     model: Annotated[
-        str, typer.Option(help="rigid, two-mass, three-mass, two-mass-gain; auto: two-mass for a torque in N m.")
-    ] = "auto",
+        str | None,
+        typer.Option(help="rigid, two-mass, three-mass, two-mass-gain; auto: two-mass for a torque in N m."),
+    ] = None,
     output: Annotated[
-        str, typer.Option(help="What y is: velocity or position; auto: by its unit, else by trial.")
-    ] = "auto",
+        str | None, typer.Option(help="What y is: velocity or position; auto: by its unit, else by trial.")
+    ] = None,
     side: Annotated[str | None, typer.Option(help="motor or load, where y is measured; motor unless said.")] = None,
     radius: Annotated[
         float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves along.")
@@ -30,11 +31,15 @@ def fit_command(
     fix: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter.")] = None,
     free: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Fit one that is held: delay, B, BL.")] = None,
     band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Use lines from LOW to HIGH Hz.")] = None,
-    hold: Annotated[str, typer.Option(help="zero-order: the input stands between samples; or none.")] = "zero-order",
+    hold: Annotated[str | None, typer.Option(help="zero-order: the input stands between samples; or none.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Fit a model to the response of a run, and print its parameters with bounds."""
+    """Fit a model to the response of a run, and print its parameters with bounds.
+
+    What is not said is as in the run's own \\[fit]. Exit code 3 where no model fits.
+    """
     from livebode.session.fits import fit_run, plain_fit
+    from livebode.session.said import said
 
     given: dict[str, Any] = {
         "model": model,
@@ -42,19 +47,22 @@ def fit_command(
         "side": side,
         "radius_m": radius,
         "inertia_ratio": ratio,
-        "fixed": dict(_pair(text) for text in fix or []),
-        "free": free or [],
+        "fixed": dict(_pair(text) for text in fix) if fix else None,
+        "free": free or None,
         "band_hz": _band(band),
         "hold": hold,
     }
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
-    section = Axis.of(data | {"fit": {k: v for k, v in given.items() if v is not None}}, "the options").fit
+    own = said(Run.open(directory).summary).get("fit", {})
+    section = Axis.of(data | {"fit": own | {k: v for k, v in given.items() if v is not None}}, "the options").fit
     assert section is not None
     found, words = fit_run(directory, section)
     if as_json:
         print(to_json({"fitted_to": words} | plain_fit(found)))
     else:
         show_fit(found, words)
+    if found.status != "ok":
+        raise typer.Exit(3)
 
 
 def _pair(text: str) -> tuple[str, float]:

@@ -29,9 +29,9 @@ _WORDS = {
 def margins_command(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
     axis: Annotated[
-        Path | None, typer.Option(metavar="AXIS.toml", help="Takes [loop] and [fit] from there instead of the run.")
+        Path | None, typer.Option(metavar="AXIS.toml", help="Takes \\[loop] and \\[fit] from there instead of the run.")
     ] = None,
-    model: Annotated[str | None, typer.Option(help="rigid, two-mass, …; that of the run's [fit] unless said.")] = None,
+    model: Annotated[str | None, typer.Option(help="rigid, two-mass, …; as in the run's \\[fit] unless said.")] = None,
     radius: Annotated[float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves.")] = None,
     ms: Annotated[float, typer.Option(help="The largest peak sensitivity that is wished for.")] = 2.0,
     as_json: Json = False,
@@ -66,7 +66,9 @@ def show_loop(found: LoopReport) -> None:
     size, bound, at_hz = found.at_lines
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
     if len(found.places) > 1:
-        print(f"worst of {len(found.places)} places: {_in_short(found.tuning.before)}")
+        print(
+            f"worst of {len(found.places)} fits, at a dozen places and of the whole: {_in_short(found.tuning.before)}"
+        )
     _show_tuning(found.tuning)
 
 
@@ -78,7 +80,8 @@ def _show_margins(margins: Margins) -> None:
             print(f"  {_WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
             continue
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
-        print(f"  {_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}")
+        known = "" if bound[i] < abs(value) else ", not known"
+        print(f"  {_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
     print("  ± holds 95 % of what noise does to the fit; where EXTRAPOLATED, no line checks the model")
 
 

@@ -49,12 +49,37 @@ def show(outcome: Outcome) -> None:
         f"from {counts['samples']} samples{gaps}: "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
     )
+    if (moving := found.get("motion", {}).get("model")) is not None:
+        _show_moving(moving)
     if "fit" in outcome.summary:
         _show_statuses(outcome.summary["fit"])
     if outcome.fit is not None:
         show_fit(outcome.fit, f"newest fit, at {outcome.fit.parameters.time_s[0]:.6g} s")
+    if "loop" in outcome.summary:
+        _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
         _show_monitoring(outcome.summary["monitoring"])
+
+
+def _show_moving(model: dict[str, Any]) -> None:
+    """The model of the newest chunk of an axis in motion."""
+    at, stiffness, damping = model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"]
+    print(
+        f"\nin motion, newest chunk: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg, "
+        f"Keff {stiffness[0]:.4g} … {stiffness[-1]:.4g} N/m and bs {damping[0]:.4g} … {damping[-1]:.4g} N s/m "
+        f"from {at[0]:.4g} to {at[-1]:.4g} m"
+    )
+
+
+def _show_loop(found: dict[str, Any]) -> None:
+    """The margins in a line; `livebode margins` says more."""
+    if not (worst := found["worst_over_places"]):
+        print(f"no margins: {found['status']}; check the loop's description and the fit")
+        return
+    print(
+        f"margins, worst of {_many(found['places'], 'fit')} over the run: gain {worst['gain_margin']:.3g} dB, "
+        f"phase {worst['phase_margin']:.3g}°, delay {worst['delay_margin']:.3g} ms, Ms {worst['peak_sensitivity']:.3g}"
+    )
 
 
 def _show_monitoring(found: dict[str, Any]) -> None:

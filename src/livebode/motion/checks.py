@@ -14,8 +14,10 @@ def check(
     """InputError where a correction cannot be made of these, with the value and the remedy."""
     if settings.input is None or settings.schedule is None:
         raise InputError("the correction needs the input (torque) and the schedule (position); name their channels")
-    if settings.quantity != "plant" or settings.average or settings.estimator == "indirect":
-        raise InputError("the correction is of single windows of the plant by the joint or the direct estimator")
+    for name, wanted in (("quantity", "plant"), ("average", False), ("estimator", "joint")):
+        value = getattr(settings, name)
+        if value not in (wanted, "direct"):
+            raise InputError(f"{name}={value!r} cannot be corrected for motion; take {wanted!r}, or leave out [motion]")
     if not (np.isfinite(radius_m) and radius_m > 0):
         raise InputError(f"{radius_m=} is not a positive number of metres per radian")
     if chunk_samples < 2 * settings.lines.window:

@@ -15,6 +15,10 @@ from livebode.session.axis import FitSection
 from livebode.session.live_margins import live_margins
 
 _ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
+_REMEMBERED = 256  # ε of the newest fits, for what is usual
+_UNUSUAL = 3.0
+_EPSILON_MIN = 0.003  # of |G|: what no fit is reproached with
+_STILL = 0.01  # of the schedule's largest value: a machine that stays where it is
 _POSITIONS = ("rad", "m", "deg", "mm")
 
 
@@ -37,6 +41,7 @@ class Fits:
         self._fitter: Fitter | None = None
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
+        self._epsilons: list[float] = []
 
     @classmethod
     def of(cls, section: FitSection | None, loop: Loop) -> Fits | None:
@@ -55,7 +60,11 @@ class Fits:
             self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
         good = np.flatnonzero(found.ok)
         if good.size:
-            self._newest = found[good[-1:]]
+            epsilon = found.epsilon[good]
+            self._epsilons = [*self._epsilons, *epsilon.tolist()][-_REMEMBERED:]
+            usual = good[epsilon <= max(_UNUSUAL * np.median(self._epsilons), _EPSILON_MIN)]
+            if usual.size or self._newest is None:
+                self._newest = found[(usual if usual.size else good)[-1:]]
         return found
 
     def snapshot(self) -> bytes:
@@ -63,7 +72,7 @@ class Fits:
         if self._fitter is None:
             return b""
         newest = None if self._newest is None else {name: getattr(self._newest, name).tolist() for name in _ROWS}
-        state = {"unit": self._unit, "counts": self._counts, "newest": newest}
+        state = {"unit": self._unit, "counts": self._counts, "newest": newest, "epsilons": self._epsilons}
         return json.dumps(state).encode() + b"\n" + self._fitter.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
@@ -74,7 +83,7 @@ class Fits:
         state = json.loads(head)
         fitter = self._begin(state["unit"])
         fitter.restore(own)
-        self._counts = state["counts"]
+        self._counts, self._epsilons = state["counts"], state["epsilons"]
         if state["newest"] is not None:
             rows = {name: np.array(values) for name, values in state["newest"].items()}
             self._newest = Parameters(fitter.model.name, fitter.names, fitter.model.units, **rows)
@@ -85,7 +94,7 @@ class Fits:
         return self._fitter
 
     def newest(self) -> Fit | None:
-        """The newest fit that holds."""
+        """The newest fit that holds, and whose ε is no more than three times the usual one."""
         if self._fitter is None or self._newest is None:
             return None
         return fit_of(self._fitter, self._newest)
@@ -131,6 +140,11 @@ def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     if valid.size and run.summary.get("configuration", {}).get("tracking", {}).get("average"):
         chosen = responses[int(valid[-1])]
         words = f"the average up to {chosen.time_s:.6g} s"
+    at = responses.schedule[valid][np.isfinite(responses.schedule[valid])]
+    if at.size and np.ptp(at) > _STILL * np.max(np.abs(at)):
+        words += f" from {at.min():.4g} to {at.max():.4g} of the schedule, whose change is in the bounds"
+    if not responses.unit:
+        words += "; the run names no units: taken as N m, and rad/s or rad"
     sections = [section]
     if section.output == "auto" and not responses.unit:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]

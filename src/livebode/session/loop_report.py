@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.margins import Margins, OpenLoop, Tuning, margins, peak_sensitivity_at_lines, tuning, worst
-from livebode.nouns import InputError, Loop, Responses
+from livebode.nouns import InputError, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection, LoopSection
 from livebode.session.fits import fit_run
@@ -109,7 +109,8 @@ def loop_report(
         over = Fitter(fit.model, fixed=section.fixed, free=section.free, band_hz=fit.band_hz, hold=fit.hold).process(
             places
         )
-        fits = over if over.ok.sum() > len(places) // 2 else fits
+        # The fit may be of one moment, and no better than the least of them.
+        fits = Parameters.join([over, fits]) if over.ok.sum() > len(places) // 2 else fits
     controller_rate_hz = getattr(getattr(loop.feedback, "velocity", loop.feedback), "rate_hz", None)
     return LoopReport(
         fit=fit,
