@@ -66,25 +66,32 @@ def bode_figure(
         if rest:
             _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary))
             rest[0].set_ylabel("coherence γ²")
-        _scales(look, summary, magnitude, phase, *rest)
+        curve = _curve(summary, fitted) if fitted is not None and summary.count else None
+        _scales(look, summary, curve, magnitude, phase, *rest)
         if summary.count:
-            if fitted is not None:
-                _draw_fit(magnitude, phase, look, summary, fitted)
+            if curve is not None:
+                line: dict[str, Any] = {
+                    "color": look.ink,
+                    "linewidth": 1.0,
+                    "dashes": (4, 2),
+                    "zorder": 6,
+                    "gid": "fit",
+                }
+                magnitude.plot(curve[0], curve[1], **line)
+                phase.plot(curve[0], curve[2], **line)
             _legend(figure, look, summary, fitted is not None)
     return figure
 
 
-def _draw_fit(magnitude: Axes, phase: Axes, look: Style, summary: Summary, fitted: Model) -> None:
-    """The model as a thin line, its phase on the turn that the newest response is drawn on."""
+def _curve(summary: Summary, fitted: Model) -> tuple[Floats, Floats, Floats]:
+    """The model's Hz, dB and degrees, its phase on the turn that the newest response is drawn on."""
     lines_hz = summary.responses.lines.frequency_hz
     f = np.union1d(np.geomspace(lines_hz[0], lines_hz[-1], _FIT_POINTS), lines_hz)
     value = fitted.response(f)
     deg = np.degrees(np.unwrap(np.angle(value)))
     away = (summary.newest_phase_deg - deg[np.searchsorted(f, lines_hz)]) / 360
     turns = np.round(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 0.0
-    line: dict[str, Any] = {"color": look.ink, "linewidth": 1.0, "dashes": (4, 2), "zorder": 6, "gid": "fit"}
-    magnitude.plot(f, decibels(np.abs(value)), **line)
-    phase.plot(f, deg + 360 * turns, **line)
+    return f, decibels(np.abs(value)), deg + 360 * turns
 
 
 def _panels(figure: Figure, coherent: bool) -> list[Axes]:
@@ -159,15 +166,18 @@ def _alone(values: Floats) -> NDArray[np.bool_]:
     return known & ~beside
 
 
-def _scales(look: Style, summary: Summary, *panels: Axes) -> None:
+def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
     magnitude, phase, *rest = panels
     for axes in panels:
         plain(axes)
         axes.yaxis.set_label_coords(-0.066, 0.5)
         frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
     panels[-1].set_xlabel("frequency in Hz")
-    _limits(magnitude, summary.magnitude_db, _newest_db(summary), room=3.0)
-    low_deg, high_deg = _limits(phase, summary.phase_deg, _newest_deg(summary), room=10.0)
+    _, db, deg = curve or (np.zeros(0), np.zeros(0), np.zeros(0))
+    _limits(magnitude, summary.magnitude_db, _newest_db(summary), db, room=3.0)
+    low_deg, high_deg = _limits(
+        phase, np.concatenate([summary.phase_deg.ravel(), deg]), _newest_deg(summary), deg, room=10.0
+    )
     phase.set_yticks(ticks.phase_ticks(low_deg, high_deg))
     if rest:
         rest[0].set_ylim(-0.04, 1.06)
@@ -193,8 +203,10 @@ def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
     axes.tick_params(axis="x", labelbottom=labels)
 
 
-def _limits(axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], room: float) -> tuple[float, float]:
-    """Limits that hold span and newest, and bounds as far as they do not squeeze the rest to a stripe."""
+def _limits(
+    axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], curve: Floats, room: float
+) -> tuple[float, float]:
+    """Limits that hold span and newest, and bounds and fit as far as they do not squeeze the rest to a stripe."""
     drawn = np.concatenate([run.ravel(), newest[0]])
     drawn = drawn[np.isfinite(drawn)]
     if not drawn.size:
@@ -202,7 +214,8 @@ def _limits(axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], room
         return low, high
     low, high = float(drawn.min()), float(drawn.max())
     reach = max(0.35 * (high - low), room)
-    least, most = (np.nanmin(newest[1], initial=low), np.nanmax(newest[2], initial=high))
+    least = np.nanmin(np.concatenate([newest[1], curve]), initial=low)
+    most = np.nanmax(np.concatenate([newest[2], curve]), initial=high)
     low, high = max(float(least), low - reach), min(float(most), high + reach)
     margin = max(0.04 * (high - low), room / 3)
     axes.set_ylim(low - margin, high + margin)
