@@ -6,13 +6,15 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy import signal
+from scipy import linalg, signal
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode.excitation import multisine
 from livebode.fitting import Fit, fit
+from livebode.fitting.transfer import Transfer
 from livebode.nouns import Block, InputError, Lines, Loop, Response
 from livebode.validation import validate
+from livebode.validation.chain import respond
 from livebode.validation.correlation import correlation, own_correlation
 from livebode.validation.simulate import simulate
 
@@ -128,6 +130,35 @@ def test_the_simulation_is_the_machine_whatever_its_start_and_load() -> None:
     assert np.max(np.abs(found.residual)) < 1e-6 * np.std(y)
 
 
+@pytest.mark.parametrize("hold", ["zero-order", "none"])
+@pytest.mark.parametrize("friction", [0.0, 1e-7, 0.02])
+def test_a_long_record_of_torque_to_position_is_the_state_space_truth(hold: str, friction: float) -> None:
+    """60,000 samples through two integrators, or one and a pole that nearly is one: no digits drift away."""
+    inertia, load, stiffness, damping, rate_hz = 0.0028, 0.0024, 180.0, 0.047, 4000.0
+    transfer = Transfer.of(
+        [load, damping, stiffness],
+        np.polyadd(
+            [inertia * load, (inertia + load) * damping, (inertia + load) * stiffness, 0, 0],
+            friction * np.array([load, damping, stiffness, 0]),
+        ).tolist(),
+    )
+    matrix = np.zeros((6, 6))
+    matrix[0, 2] = matrix[1, 3] = 1.0
+    matrix[2, :4] = -(stiffness / inertia), stiffness / inertia, -(damping + friction) / inertia, damping / inertia
+    matrix[3, :4] = stiffness / load, -stiffness / load, damping / load, -damping / load
+    matrix[2, 4], matrix[4, 5] = 1 / inertia, rate_hz  # the input, and how it rises over a tick
+    step = linalg.expm(matrix / rate_hz)
+    u = np.random.default_rng(5).standard_normal(60_000) + 0.1
+    rise = np.append(np.diff(u), 0.0) * (hold == "none")
+    state, y = np.zeros(4), np.empty(len(u))
+    for n in range(len(u)):
+        y[n] = state[0]
+        state = step[:4, :4] @ state + step[:4, 4] * u[n] + step[:4, 5] * rise[n]
+    assert np.max(np.abs(respond(transfer, u, rate_hz, 0.0, hold) - y)) < 1e-9 * np.max(np.abs(y))
+    late = respond(transfer, u, rate_hz, 3.0, hold)
+    assert np.max(np.abs(late[3:] - y[:-3])) < 1e-9 * np.max(np.abs(y))
+
+
 @pytest.mark.parametrize("delay", [-1.5, 0.0, 0.3, 2.0])
 def test_a_delay_of_the_model_is_simulated(delay: float) -> None:
     """Once it has settled, the simulation has the spectrum that the model's response says, whatever the delay."""
@@ -139,7 +170,9 @@ def test_a_delay_of_the_model_is_simulated(delay: float) -> None:
     steady = np.fft.rfft(u[:800])
     steady[bins] *= model.response(LINES.frequency_hz)
     y = np.tile(np.fft.irfft(steady, 800), 10)
-    assert np.max(np.abs(simulate(model, u, y).residual)) < 1e-4 * np.std(y)
+    found = simulate(model, u, y)
+    assert np.max(np.abs(found.residual)) < 1e-4 * np.std(y)
+    assert len(u) - len(found.output) == (2 if delay < -1 else int(np.ceil(delay)))
 
 
 def test_autocorrelation_knows_white_from_coloured() -> None:

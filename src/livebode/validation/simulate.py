@@ -6,18 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from livebode.fitting import Fit
-from livebode.fitting.hold import to_discrete
 from livebode.fitting.physical import DELAY
 from livebode.fitting.transfer import Transfer
 from livebode.nouns import InputError
+from livebode.validation.chain import respond
 
 Floats = NDArray[np.float64]
 
 _STEP = 1e-3  # of a parameter's sigma
 _RINGS_OUT = 1e-12
+_AT_REST = 1e-5  # of a pole times the recording's length: slower ones are integrators to it
 
 
 class Simulated(NamedTuple):
@@ -25,21 +25,24 @@ class Simulated(NamedTuple):
 
     Attributes
     ----------
+    known
+        The samples whose input is in the recording; a delay takes some off its start, a negative one off its end.
     output, residual
-        Of the model, with start, offset and drift as fitted, and measured less that, (samples,).
+        Of the model, with start, offset and drift as fitted, and measured less that, (known samples,).
     slopes
-        Of the output by each parameter in its sigmas, without start, offset and drift, (samples, parameters).
+        Of the output by each parameter in its sigmas, without start, offset and drift, (known samples, parameters).
     basis
-        Orthonormal, of start, offset and drift, (samples, motions).
+        Orthonormal, of start, offset and drift, (known samples, motions).
     """
 
+    known: slice
     output: Floats
     residual: Floats
     slopes: Floats
     basis: Floats
 
     def without(self, x: Floats) -> Floats:
-        """x without start, offset and drift; shape (samples,) or (samples, signals)."""
+        """x without start, offset and drift; shape (known samples,) or (known samples, signals)."""
         return np.asarray(x - self.basis @ (self.basis.T @ x))
 
 
@@ -60,52 +63,51 @@ def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
     if fit.status != "ok":
         raise InputError(f"there is no fit to simulate: {fit.sentence}")
     values, sigma = fit.parameters.value[0], fit.parameters.sigma[0]
-    own = _unforced(fit, values, len(u))
-    if len(u) < 10 * own.shape[1]:
-        raise InputError(f"{len(u)} samples are too few to judge a model by; give at least {10 * own.shape[1]}")
-    forced = _forced(fit, values, u)
-    slopes = np.zeros((len(u), len(values)))
+    ticks = _parts(fit, values)[1] * fit.rate_hz
+    known = slice(max(0, _whole(ticks)), len(u) - max(0, _whole(-ticks)))
+    own = _unforced(fit, values, known.stop - known.start)
+    if len(own) < 10 * own.shape[1]:
+        raise InputError(f"{len(own)} samples are too few to judge a model by; give at least {10 * own.shape[1]}")
+    # A constant input makes only motions that are fitted anyway, and its mean makes the largest numbers.
+    u = u - np.mean(u)
+    forced = _forced(fit, values, u)[known]
+    slopes = np.zeros((len(forced), len(values)))
     for i in np.flatnonzero(sigma > 0):
         step = _STEP * sigma * np.eye(len(values))[i]
-        slopes[:, i] = (_forced(fit, values + step, u) - _forced(fit, values - step, u)) / (2 * _STEP)
-    found = Simulated(forced, y - forced, slopes, np.linalg.qr(own)[0])
+        change = _forced(fit, values + step, u) - _forced(fit, values - step, u)
+        slopes[:, i] = change[known] / (2 * _STEP)
+    found = Simulated(known, forced, y[known] - forced, slopes, np.linalg.qr(own)[0])
     residual = found.without(found.residual)
-    return found._replace(output=y - residual, residual=residual, slopes=found.without(slopes))
+    return found._replace(output=y[known] - residual, residual=residual, slopes=found.without(slopes))
 
 
 def _forced(fit: Fit, values: Floats, u: Floats) -> Floats:
     """Response to u from rest."""
     transfer, delay_s = _parts(fit, values)
-    early = max(0, int(np.ceil(-delay_s * fit.rate_hz - 1e-9)))  # an input that was logged later than it acted
-    if early:
-        u, delay_s = np.append(u[early:], np.full(early, u[-1])), delay_s + early / fit.rate_hz
-    if fit.hold == "none":
-        below = np.concatenate([transfer.denominator, np.zeros(transfer.integrators)])
-        b, a, _ = signal.cont2discrete((transfer.numerator, below), 1 / fit.rate_hz, method="foh")
-        b, late = b.ravel(), round(delay_s * fit.rate_hz)
-        u = np.append(np.full(late, u[0]), u)[: len(u)]
-    else:
-        b, a = to_discrete(transfer, fit.rate_hz, max(delay_s, 0.0))
-    # The first sample is no step from nought, but one more thing that is not known of the state before.
-    return np.asarray(signal.lfilter(np.append(np.zeros(len(a) - len(b)), b), a, u - u[0]))
+    early = max(0, _whole(-delay_s * fit.rate_hz))  # an input that was logged later than it acted
+    found = respond(transfer, u, fit.rate_hz, delay_s * fit.rate_hz + early, fit.hold)
+    return np.append(found[early:], np.full(early, found[-1]))
 
 
 def _unforced(fit: Fit, values: Floats, samples: int) -> Floats:
     """The motions of the model that no input makes, and a constant load's, shape (samples, motions)."""
-    transfer, delay_s = _parts(fit, values)
+    transfer, _ = _parts(fit, values)
     place = np.linspace(-1.0, 1.0, samples)
-    columns = [place**k for k in range(transfer.integrators + 1)]
+    poles = transfer.poles()
+    resting = np.abs(poles) * samples / fit.rate_hz < _AT_REST
+    columns = [place**k for k in range(transfer.integrators + np.count_nonzero(resting) + 1)]
     ticks = np.arange(samples) / fit.rate_hz
-    for pole in transfer.poles():
+    for pole in poles[~resting]:
         ringing = np.exp(pole * ticks)
         if pole.imag > _RINGS_OUT * abs(pole):
             columns += [ringing.real, ringing.imag]
         elif abs(pole.imag) <= _RINGS_OUT * abs(pole):
             columns.append(ringing.real)
-    late = int(np.ceil(abs(delay_s) * fit.rate_hz - 1e-9))
-    columns += [np.where(np.arange(samples) == i, 1.0, 0.0) for i in range(late)]
-    columns += [np.where(np.arange(samples) == samples - 1 - i, 1.0, 0.0) for i in range(late)]
     return np.stack(columns, axis=1)
+
+
+def _whole(ticks: float) -> int:
+    return int(np.ceil(ticks - 1e-9))
 
 
 def _parts(fit: Fit, values: Floats) -> tuple[Transfer, float]:

@@ -163,6 +163,7 @@ def validate(
     if count < 10 * lags or not all(np.isfinite(x).all() for x in signals.values()):
         raise InputError(f"{count} samples with {lags} lags: give at least {10 * lags} finite ones in a row")
     found = simulate(fit, signals["input"], signals["output"])
+    signals = {role: x[found.known] for role, x in signals.items()}
     matrix = _correlated(fit)
     given = [("u", signals["input"], 1), ("ŷ", found.output, 1)]
     if excitation:
@@ -175,7 +176,7 @@ def validate(
     by = ("w",) if excitation and whiteness < _ALPHA else tuple(c.name for c in correlations)
     return Validation(
         model=fit.model.name,
-        samples=count,
+        samples=len(signals["output"]),
         fit_percent=100
         * (1 - float(np.linalg.norm(found.residual) / np.linalg.norm(found.without(signals["output"])))),
         residual_sigma=float(np.sqrt(np.mean(found.residual**2))),
