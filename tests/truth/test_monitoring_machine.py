@@ -131,3 +131,36 @@ def test_false_alarms_are_rarer_than_asked_for() -> None:
             detector = MachineDetector(learned, float(np.log(windows_between * 10)))
     assert windows > 3000
     assert alarms <= windows / windows_between
+
+
+def test_another_machine_is_told_as_one() -> None:
+    """79 % more inertia and mass: no single change is named for it, and an amount that is told covers the truth."""
+    truth, healthy = {"inertia": 0.005, "load": 12.0}, Mechanics()
+    percent = {
+        "inertia": 100 * (truth["inertia"] / healthy.inertia_kg_m2 - 1),
+        "load": 100 * (truth["load"] / healthy.load_kg - 1),
+    }
+    other = Mechanics(inertia_kg_m2=truth["inertia"], load_kg=truth["load"])
+    monitor = watcher()
+    events = monitor.process(recorded((0.3,) * 5, seed=71, mechanics=other)) + monitor.finish()
+    first, *rest = [e for e in events if e.kind == "change"]
+    assert (first.details["what"], first.details["amount_percent"]) == ("machine", None)
+    assert "may be another machine" in first.message
+    assert first.time_s < 5
+    assert {e.details["what"] for e in rest} <= set(percent)
+    for details in [e.details for e in rest] + [s for s in monitor.standing() if s["what"] != "machine"]:
+        assert abs(details["amount_percent"] - percent[details["what"]]) < details["bound_percent"]
+
+
+def test_two_changes_at_once_are_told_together() -> None:
+    """The first name takes the second's part, and is corrected once that has a name too."""
+    faults = TensionLoss(start_s=6.0, loss=0.04), LoadChange(start_s=6.0, load_kg=0.335)
+    truth, monitor = {"stiffness": -4.0, "load": 5.0}, watcher()
+    events = monitor.process(recorded((0.3, 0.33, 0.3, 0.3), *faults, seed=71)) + monitor.finish()
+    kinds = told(events)
+    assert sorted(k for k in kinds if k[0] == "change") == [("change", "load"), ("change", "stiffness")]
+    assert [k for k in kinds if k[0] == "change-corrected"] == [("change-corrected", kinds[0][1])]
+    for details in [e.details for e in events[1:]] + monitor.standing():
+        assert abs(details["amount_percent"] - truth[details["what"]]) < max(2 * details["bound_percent"], 0.1)
+    for details in monitor.standing():
+        assert f"{abs(details['amount_percent']):.1f}" in monitor.together()

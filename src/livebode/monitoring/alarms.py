@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,8 @@ class Alarm:
         The sum that it is held by, between 0 and the threshold: at 0 it has gone.
     announced
         Whether its Event is out.
+    told, told_bound
+        Amount and bound of its newest Event.
     """
 
     change: Change
@@ -45,11 +47,26 @@ class Alarm:
     announced: bool = False
     score: float = 0.0
     information: float = 0.0
+    told: float = 0.0
+    told_bound: float = 0.0
+
+    @property
+    def told_wrong(self) -> bool:
+        """Whether the amount is by now farther from what was told than both bounds allow."""
+        return self.announced and abs(self.now - self.told) > self.bound + self.told_bound
+
+    def tell(self) -> Alarm:
+        """Itself, with its amount as it is now going out."""
+        if not self.announced:
+            self.change = replace(self.change, amount=self.now)
+        self.announced, self.told, self.told_bound = True, self.now, self.bound
+        return self
 
     def row(self) -> list[float]:
         """As numbers, for a snapshot."""
         rest = [self.since_sample, self.since_s, *self.way_m, self.now, self.bound, self.height, self.announced]
-        return [*_numbers(self.change), *_numbers(self.rival), *rest, self.score, self.information]
+        sums = [self.score, self.information, self.told, self.told_bound]
+        return [*_numbers(self.change), *_numbers(self.rival), *rest, *sums]
 
     @classmethod
     def of(cls, row: NDArray[Any]) -> Alarm:

@@ -12,10 +12,10 @@ from livebode.monitoring.alarms import Recent
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
-from livebode.monitoring.naming import Change, Segment, begin_of, candidates, lead
+from livebode.monitoring.naming import Change, Segment, begin_of, candidates, far, lead
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.sentences import changed, cleared, unknown
+from livebode.monitoring.sentences import changed, cleared, corrected, far_away, unknown
 from livebode.monitoring.standing import Standing
 from livebode.nouns import Event
 
@@ -30,6 +30,9 @@ _PASSED = 2.0  # standard deviations of a place, behind which its middle is know
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _SMALL = 0.5  # of the smallest change that an alarm is for: less is none
 _STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED}
+
+Moment = tuple[float, float, float]
+"""Position, newest sample and time of a window."""
 
 
 class MachineDetector:
@@ -61,6 +64,7 @@ class MachineDetector:
         self._recent = Recent(_LOOK_WINDOWS)
         self._pending, self._taken = -1, 0
         self._unknown: set[str] = set()
+        self._far = False
         self.judged = 0
         """Windows judged so far."""
 
@@ -76,14 +80,23 @@ class MachineDetector:
                 where, speed = float(seen.position_m[i]), float(seen.speed_m_per_s[i])
                 events.append(unknown(status, self._machine, where, speed, int(seen.sample[i]), float(seen.time_s[i])))
         self.standing.settle()
-        return events + [changed(a, int(seen.sample[-1]), float(seen.time_s[-1])) for a in self.standing.announced()]
+        return events + self._said(int(seen.sample[-1]), float(seen.time_s[-1]))
 
     def finish(self) -> list[Event]:
         """A change that was found but not yet named, named by what is likeliest."""
         if self._pending >= 0:
             self._name(final=True)
         _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
-        return [changed(alarm, int(sample), time_s) for alarm in self.standing.announced(known=False)]
+        return self._said(int(sample), time_s, known=False)
+
+    def _said(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
+        """What is new, and what it makes of the amounts that are out."""
+        if self._far:
+            self._far = False
+            return [far_away(self.standing.alarms[-1], sample, time_s)]
+        new = self.standing.announced(known)
+        wrong = self.standing.corrected() if new and known else []
+        return [changed(a, sample, time_s) for a in new] + [corrected(a, told, sample, time_s) for a, told in wrong]
 
     def _window(self, seen: Evidence, i: int) -> list[Event]:
         position_m, score, information = float(seen.position_m[i]), seen.score[i], seen.information[i]
@@ -131,24 +144,36 @@ class MachineDetector:
         known = self._machine.free if standing else self._machine.held
         found = candidates(segment, known, self._machine.way_m, local=not standing)
         best = found[0]
+        if (several := [] if standing else far(segment, best, known)) and self._gone_around(segment):
+            self._reset()
+            self._stand(several, None, segment, moments)
+            self._far = True
+            return
         rivals = [c for c in found[1:] if lead(segment, best, c, self._machine.free) < _DECISIVE]
         large = abs(best.amount) >= (1.0 if final else _SMALL) * known.smallest[best.direction]
         if not final and (rivals or not large or not self._seen_around(segment, best)):
             return
         self._reset()
         if large:
-            began = begin_of(segment, best)
-            way = segment.position_m[began:]
-            seen = self._recent.segment(first + began, Offset())
-            since = int(moments[began][1]), moments[began][2]
-            rival = rivals[0] if rivals else None
-            self.standing.add(best, rival, since, (float(way.min()), float(way.max())), seen)
+            self._stand([best], rivals[0] if rivals else None, segment, moments)
+
+    def _stand(self, changes: list[Change], rival: Change | None, segment: Segment, moments: list[Moment]) -> None:
+        """From now on these changes stand, since the likeliest of them began."""
+        began = begin_of(segment, max(changes, key=lambda change: change.evidence))
+        way = segment.position_m[began:]
+        seen = self._recent.segment(began - len(moments), Offset())
+        since = int(moments[began][1]), moments[began][2]
+        for change in changes:
+            self.standing.add(change, rival, since, (float(way.min()), float(way.max())), seen)
+
+    def _gone_around(self, segment: Segment) -> bool:
+        return bool(np.ptp(segment.position_m) >= _LOOK * self._machine.way_m)
 
     def _seen_around(self, segment: Segment, best: Change) -> bool:
-        x = segment.position_m
-        if np.ptp(x) < _LOOK * self._machine.way_m:
+        if not self._gone_around(segment):
             return False
-        return best.place is None or abs(float(x[-1]) - best.place.centre_m) > _PASSED * best.place.width_m
+        behind = abs(float(segment.position_m[-1]) - best.place.centre_m) if best.place else np.inf
+        return best.place is None or behind > _PASSED * best.place.width_m
 
     def _reset(self) -> None:
         self._first.reset()
@@ -158,13 +183,14 @@ class MachineDetector:
 
     def state(self) -> dict[str, NDArray[Any]]:
         parts = {f"{name}.{key}": array for name, part in self._parts().items() for key, array in part.state().items()}
-        numbers = np.array([self._pending, self._taken, self.judged])
+        numbers = np.array([self._pending, self._taken, self.judged, self._far])
         return parts | {"numbers": numbers, "unknown": np.array(sorted(self._unknown), dtype="U16")}
 
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         for name, part in self._parts().items():
             part.load({k.removeprefix(f"{name}."): v for k, v in state.items() if k.startswith(f"{name}.")})
-        self._pending, self._taken, self.judged = (int(n) for n in state["numbers"])
+        self._pending, self._taken, self.judged, far = (int(n) for n in state["numbers"])
+        self._far = bool(far)
         self._unknown = {str(name) for name in state["unknown"]}
 
     def _parts(self) -> dict[str, Any]:

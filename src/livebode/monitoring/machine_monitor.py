@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.machine_detector import CHARTS, MachineDetector
 from livebode.monitoring.model_evidence import ModelEvidence
-from livebode.monitoring.sentences import about
+from livebode.monitoring.sentences import about, about_far, joint
 from livebode.monitoring.stretches import Stretch, Stretches
 from livebode.nouns import Block, Event, Lines
 
@@ -49,7 +50,18 @@ class MachineMonitor:
 
     def standing(self) -> list[dict[str, Any]]:
         """Changes that stand, as plain data."""
-        return [about(alarm) for alarm in self.detector.standing.alarms if alarm.announced]
+        alarms = self.detector.standing.alarms
+        far = [about_far(alarms[-1])] if self.detector.standing.far else []
+        return far + [about(alarm) for alarm in self._told()]
+
+    def together(self) -> str:
+        """Their amounts now, estimated together, in words; empty where none is known."""
+        if self.detector.standing.far:
+            return ": the machine is so far from the baseline that no amount can be told"
+        return joint(self._told())
+
+    def _told(self) -> list[Alarm]:
+        return [alarm for alarm in self.detector.standing.alarms if alarm.announced]
 
     def _judged(self, stretches: list[Stretch], look: Look | None) -> list[Event]:
         events: list[Event] = []

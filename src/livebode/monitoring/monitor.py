@@ -86,7 +86,7 @@ class Monitor:
 
     def _counted(self, events: list[Event]) -> list[Event]:
         for event in events:
-            if event.kind in self._counts:
+            if event.kind in self._counts and event.details["what"] != "machine":  # whose amounts are counted
                 self._counts[event.kind] += 1
         return events
 
@@ -100,11 +100,12 @@ class Monitor:
             "false_alarms": self.false_alarms,
             "judged_by": "model" if self._machine else "tables",
             "judged_s": judged * self._step_s,
-            "changes": self._counts["change"],
+            "changes": self._counts["change"] + any(isinstance(s, dict) and s["what"] == "machine" for s in standing),
             "cleared": self._counts["change-cleared"],
             "standing": standing,
         }
-        return summary | {"message": _message(summary)}
+        together = self._machine.together() if self._machine else ""
+        return summary | {"message": _message(summary, together)}
 
     def snapshot(self) -> bytes:
         """Everything that the next Event depends on, exact; see `restore`."""
@@ -130,11 +131,12 @@ class Monitor:
         return f"{self._settings.identity} {self.false_alarms} {judges}"
 
 
-def _message(summary: dict[str, Any]) -> str:
+def _message(summary: dict[str, Any], together: str) -> str:
     judged = f"{summary['judged_s']:.1f} s of the run judged"
     if not summary["judged_s"]:
         return "Nothing of the run could be judged: the baseline knows nothing of what the machine did."
     if not summary["changes"]:
         return f"No change against the baseline ({judged})."
     alarms = f"{summary['changes']} change{'s' * (summary['changes'] > 1)} against the baseline"
-    return f"{alarms}, {len(summary['standing']) or 'none'} of them standing at the end ({judged})."
+    standing = f"{len(summary['standing']) or 'none'} of them standing at the end ({judged})"
+    return f"{alarms}, {standing}{together}."

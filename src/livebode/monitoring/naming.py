@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.offset import Place
+from livebode.monitoring.offset import FAR, Place
 from livebode.monitoring.sensitivity import DIRECTIONS
 
 Floats = NDArray[np.float64]
@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 _WIDTHS = np.array([0.015, 0.026, 0.045])
 _GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")
+_FIRM = [DIRECTIONS.index(name) for name in ("stiffness", "load", "inertia")]  # damping doubles easily
+_EXPLAINED = 0.9  # of all evidence: a single change, ten percent of stiffness or double damping, leads to 0.93 … 0.99
 _CONFIDENCE = 1.96
 _SHAPE = 0.3  # of a place's depth, which depends on the shape that it is taken to have
 
@@ -113,6 +115,21 @@ def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
         float(evidence[c, w] - np.log(max(np.ptp(x) / widths[0], 1.0) * len(widths))),
         Place(float(centres[c]), float(widths[w])),
     )
+
+
+def far(segment: Segment, best: Change, known: Accuracy) -> list[Change]:
+    """All directions at once, where the machine is far from the baseline and no single change says why; else none.
+
+    A large change of one direction is not linear, and by a line looks like any other; but no line explains it.
+    """
+    score, information = segment.score.sum(axis=0), segment.information.sum(axis=0)
+    amount = np.linalg.lstsq(information, score, rcond=None)[0]
+    if np.abs(amount[_FIRM]).max() < FAR or best.evidence > _EXPLAINED * float(score @ amount) / 2:
+        return []
+    own = np.diagonal(information)
+    return [
+        Change(j, float(amount[j]), bound(known, j, float(own[j])), float(own[j] * amount[j] ** 2 / 2)) for j in _FIRM
+    ]
 
 
 def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float:

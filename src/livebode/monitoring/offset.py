@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+FAR = 0.2
+"""Of a logarithm: from here on it may be another machine, of which more differs than has a name."""
+
 
 @dataclass(frozen=True)
 class Place:

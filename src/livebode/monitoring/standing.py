@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.naming import Change, Segment, bound
-from livebode.monitoring.offset import Offset, Place
+from livebode.monitoring.offset import FAR, Offset, Place
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +45,11 @@ class Standing:
         """Numbers of the directions that stand changed all along the way."""
         return sorted({a.change.direction for a in self.alarms if a.change.place is None})
 
+    @property
+    def far(self) -> bool:
+        """Whether the model has not come along with a machine that differs in more than one direction."""
+        return sum(not a.announced for a in self.alarms) > 1
+
     def hides(self, position_m: float) -> bool:
         """Whether what stands keeps a window there from being judged for anything else."""
         places = [a.change.place for a in self.alarms if a.change.place is not None]
@@ -57,6 +62,8 @@ class Standing:
         alarm = Alarm(change, rival, *since, way_m, change.amount, change.bound, self._threshold)
         alarm.information = 2 * change.evidence / change.amount**2
         alarm.score = change.amount * alarm.information
+        if abs(change.amount) > FAR:  # not told from a model that came along: as linear as it is from the baseline
+            alarm.bound = float(np.hypot(alarm.bound, _neglected(np.array([change.amount]))))
         self.alarms.append(alarm)
         self._score, self._information = seen.score.sum(axis=0), seen.information.sum(axis=0)
         self._moving = True
@@ -67,12 +74,17 @@ class Standing:
         One that comes to nothing once the model has come along is dropped.
         """
         new = [a for a in self.alarms if not a.announced]
-        new = [a for a in new if not known or a.change.place is not None or not self._moving]
-        for alarm in new:
-            alarm.announced = True
-        nothing = [a for a in new if abs(a.now) <= a.bound]
+        if self.far and (not known or any(abs(a.now) == _MOST for a in new)):
+            return []
+        new = [a.tell() for a in new if not known or a.change.place is not None or not self._moving]
+        nothing = [a for a in new if abs(a.now) <= max(a.bound, self._middle(a))]
         self.alarms = [a for a in self.alarms if not any(a is n for n in nothing)]
-        return [a for a in new if abs(a.now) > a.bound]
+        return [a for a in new if not any(a is n for n in nothing)]
+
+    def corrected(self) -> list[tuple[Alarm, float]]:
+        """Alarms that are out with an amount that does not hold now that the others have their names, and that."""
+        wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.told_wrong]
+        return [(alarm.tell(), told) for alarm, told in wrong]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
         """Take a window; the alarms that it ends."""
@@ -89,7 +101,7 @@ class Standing:
     def _gone(self, alarm: Alarm, score: Floats, information: Floats, position_m: float, hidden: bool) -> bool:
         change, j = alarm.change, alarm.change.direction
         share = 1.0 if change.place is None else _share(change.place, position_m)
-        if (change.place is None and hidden) or share <= _UNSEEN:
+        if not alarm.announced or (change.place is None and hidden) or share <= _UNSEEN:
             return False
         amount = self._amount(alarm)
         # Against a machine without this change, with the others as they stand.
@@ -97,11 +109,17 @@ class Standing:
         s = share * score[j] + i * amount
         if change.place is not None:
             alarm.score, alarm.information = _MEMORY * alarm.score + s, _MEMORY * alarm.information + i
-        size = min(abs(change.amount), float(self._machine.held.smallest[j]))
-        middle = max(_HELD_FROM * size, float(self._machine.held.allowed[j]))
-        ratio = size * (np.sign(change.amount) * s - middle * i) / self._machine.held.inflation[j]
+        ratio = self._size(alarm) * (np.sign(change.amount) * s - self._middle(alarm) * i)
+        ratio /= self._machine.held.inflation[j]
         alarm.height = float(np.clip(alarm.height + ratio, 0.0, self._threshold))
         return alarm.height == 0.0
+
+    def _size(self, alarm: Alarm) -> float:
+        return min(abs(alarm.change.amount), float(self._machine.held.smallest[alarm.change.direction]))
+
+    def _middle(self, alarm: Alarm) -> float:
+        """Between an alarm that stands and one that has gone."""
+        return max(_HELD_FROM * self._size(alarm), float(self._machine.held.allowed[alarm.change.direction]))
 
     def _amount(self, alarm: Alarm) -> float:
         """What the offset holds of this alarm."""
@@ -133,15 +151,22 @@ class Standing:
         if known and np.all(np.diagonal(inside) > 0):
             covariance = np.linalg.inv(inside)
             found = covariance @ self._score[known]
+            step = self._all_free() - self.offset.logarithms
             for i, j in enumerate(known):
                 accuracy = self._machine.held if len(known) == 1 else self._machine.free
                 for alarm in (a for a in self.alarms if a.change.direction == j and a.change.place is None):
                     alarm.now = float(np.clip(found[i], -_MOST, _MOST))
                     alarm.bound = bound(accuracy, j, 1 / covariance[i, i])
+                    if abs(alarm.now) > FAR:
+                        alarm.bound = float(np.linalg.norm([alarm.bound, step[j], _neglected(step)]))
         for alarm in self.alarms:
             if alarm.change.place is None:
                 logarithms[alarm.change.direction] = alarm.now
         return logarithms
+
+    def _all_free(self) -> Floats:
+        """What every direction would be if none were held at the baseline, by the model as it follows now."""
+        return np.asarray(np.linalg.lstsq(self._information, self._score, rcond=None)[0])
 
     def state(self) -> dict[str, NDArray[Any]]:
         places = [[p.centre_m, p.width_m, p.amount] for p in self.offset.places]
@@ -159,6 +184,11 @@ class Standing:
         self.offset = Offset(np.array(state["logarithms"]), tuple(Place(*map(float, row)) for row in state["places"]))
         self._score, self._information = np.array(state["score"]), np.array(state["information"])
         self._moving = bool(state["moving"])
+
+
+def _neglected(step: Floats) -> float:
+    """What a linear model leaves out of a change by so much, of second order in its largest part."""
+    return float(np.abs(step).clip(0.0, _MOST).max() ** 2 / 2)
 
 
 def _share(place: Place, position_m: float) -> float:

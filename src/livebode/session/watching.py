@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
 _CANNOT_TELL = "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
-_ALARMS = {"change", "change-cleared", "baseline-unknown"}
+_ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _KEPT = 100  # sentences in run.json; events.jsonl has all
 
 Write = Callable[[Event], None]
