@@ -6,17 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, stats
+from scipy import linalg, signal, stats
 
 Floats = NDArray[np.float64]
 
 LIMIT = 2.17
 """Of a normal number: 97 % lie within so many sigma."""
-SMALL = 0.15
-"""A correlation below this is of no account, however sure."""
+SMALL = 0.1
+"""Of the output that follows the driving signal: a model that misses less is wrong by a small error, however sure."""
 
 _WINDOW_SHARE = 10  # of the samples: how far the residual's own correlation is taken in
 _RANK = 1e-3  # of the largest variance of a combination of lags; below it is rounding
+_SHOWS = 2.0  # times what chance makes: an error that the chi² finds nearly always
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,11 @@ class Correlation:
         Lags that can tell a wrong model, (lags,).
     p
         Probability that a true model's correlations at the judged lags, taken together, are as large.
+    missed
+        |ε|/|y|, of both the part only that follows the signal over the judged lags: what the model gets wrong of what
+        the signal makes, whatever else is in the output.
+    resolution
+        The `missed` that would show: twice what chance and the fit's own error make.
     """
 
     name: str
@@ -49,6 +55,8 @@ class Correlation:
     white_limit: float
     judged: NDArray[np.bool_]
     p: float
+    missed: float
+    resolution: float
 
     @property
     def share(self) -> float:
@@ -67,7 +75,14 @@ class Correlation:
 
 
 def correlation(
-    name: str, residual: Floats, x: Floats, lags: int, slopes: Floats, covariance: Floats, first_judged: int
+    name: str,
+    residual: Floats,
+    output: Floats,
+    x: Floats,
+    lags: int,
+    slopes: Floats,
+    covariance: Floats,
+    first_judged: int,
 ) -> Correlation:
     """Correlation of `residual` with `x` at lags −lags … lags.
 
@@ -77,8 +92,8 @@ def correlation(
 
     Parameters
     ----------
-    residual, x
-        Without start, offset and drift.
+    residual, output, x
+        Without start, offset and drift; the output as measured.
     slopes, covariance
         Of the simulated output by each parameter in its sigmas, (samples, parameters), and those parameters'
         correlation matrix.
@@ -93,6 +108,10 @@ def correlation(
     of_chance = _chance(residual, x, lags) / count
     spread = of_chance + moved @ covariance @ moved.T
     judged = at >= first_judged
+    own = linalg.toeplitz(_across(x, x, 2 * lags)[2 * lags :])[np.ix_(judged, judged)]
+    among = spread[np.ix_(judged, judged)]
+    missed, by_chance = _following(own, value[judged] * scale, among * scale**2)
+    follows, _ = _following(own, _across(output, x, lags)[judged], among)
     return Correlation(
         name=name,
         lags=at,
@@ -100,7 +119,9 @@ def correlation(
         limit=LIMIT * np.sqrt(np.diag(spread)),
         white_limit=LIMIT / np.sqrt(count),
         judged=judged,
-        p=_together(value[judged], spread[np.ix_(judged, judged)]),
+        p=_together(value[judged], among),
+        missed=missed / follows,
+        resolution=_SHOWS * by_chance / follows,
     )
 
 
@@ -127,6 +148,15 @@ def _chance(residual: Floats, x: Floats, lags: int) -> Floats:
     by_distance = np.correlate(other, own, mode="valid")  # at distances −2·lags … 2·lags
     index = np.arange(2 * lags + 1)
     return np.asarray(by_distance[2 * lags + index[:, np.newaxis] - index])
+
+
+def _following(own: Floats, with_x: Floats, spread: Floats) -> tuple[float, float]:
+    """Norm of the part that follows x, by least squares, and the norm that a spread of the sums `with_x` makes."""
+    size, turned = np.linalg.eigh(own)
+    kept = size > _RANK * size[-1]
+    turned, size = turned[:, kept], size[kept]
+    by_chance = np.einsum("ik,ij,jk->k", turned, spread, turned) / size
+    return float(np.sqrt(np.sum((turned.T @ with_x) ** 2 / size))), float(np.sqrt(np.sum(by_chance)))
 
 
 def _together(value: Floats, spread: Floats) -> float:

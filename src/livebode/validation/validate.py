@@ -14,7 +14,7 @@ from livebode.validation.correlation import SMALL, Correlation, correlation, own
 from livebode.validation.simulate import Simulated, simulate
 
 Floats = NDArray[np.float64]
-Verdict = Literal["passes", "small error", "fails"]
+Verdict = Literal["passes", "small error", "fails", "cannot be judged"]
 
 _ALPHA = 0.03  # the other side of 97 %
 
@@ -55,25 +55,56 @@ class Validation:
 
     @property
     def verdict(self) -> Verdict:
-        """ "passes": no correlation that chance would not make; "small error": one, but below 0.15; else "fails"."""
-        counted = self._counted
-        if all(c.p >= _ALPHA / len(counted) for c in counted):
-            return "passes"
-        return "small error" if all(c.largest < SMALL for c in counted) else "fails"
+        """What the correlations, their size and the fit come to.
+
+        "passes": no correlation that chance would not make; "small error": one, but the model misses less than a tenth
+        of what follows the driving signal; "fails": it misses more, and more than chance or the rest of the residual
+        make; "cannot be judged": neither, or the residual is as large as the output, or an error as large as what
+        follows the driving signal would not have shown.
+        """
+        counted, by = self._counted, self.driven_by
+        found = any(c.p < _ALPHA / len(counted) for c in counted)
+        large = found and by.missed >= SMALL
+        if large and by.missed >= by.resolution:
+            return "fails"
+        if large or self.fit_percent <= 0 or by.resolution >= 1:
+            return "cannot be judged"
+        return "small error" if found else "passes"
 
     @property
     def sentence(self) -> str:
         """The verdict for people."""
-        shares = ", ".join(f"{c.name} {100 * c.share:.0f} %" for c in self._counted)
+        by = self.driven_by
         rest = {
-            "passes": "what is left has nothing to do with the signals",
-            "small error": f"the model misses something, but less than {SMALL}",
-            "fails": "what is left follows the signals: the model lacks something or is of another machine",
+            "passes": "nothing of what is left follows the signals, and missing "
+            f"{_percent(by.resolution)} of what follows {by.name} would have shown",
+            "small error": f"the model misses {_percent(by.missed)} of what follows {by.name}, less than a tenth",
+            "fails": f"the model misses {_percent(by.missed)} of what follows {by.name}: it lacks something or is of "
+            "another machine",
+            "cannot be judged": self._why_not,
         }[self.verdict]
-        found = f"{self.model} {self.verdict}: {rest} (lags inside: {shares}; fit {self.fit_percent:.1f} %)"
-        if self.doubtful and self.verdict != "passes":
+        found = f"{self.model} {self.verdict}: {rest} (fit {self.fit_percent:.1f} %)"
+        if self.doubtful and self.verdict in ("small error", "fails"):
             found += "; in a loop the colour of the noise alone may do that: name the excitation to be sure"
         return found
+
+    @property
+    def driven_by(self) -> Correlation:
+        """The correlation with w where it is known, else with u."""
+        return next((c for c in self.correlations if c.name == "w"), self.correlations[0])
+
+    @property
+    def _why_not(self) -> str:
+        if self.fit_percent <= 0:
+            return (
+                "the residual is no smaller than the output, so friction, drift, motion or noise rules this recording "
+                "and not what the model describes; hold the machine still or excite it more"
+            )
+        by = self.driven_by
+        return (
+            f"in this noise, or with parameters this uncertain, only missing {_percent(by.resolution)} of what follows "
+            f"{by.name} would show, and {_percent(by.missed)} is missed; excite more, record longer or fit a longer run"
+        )
 
     @property
     def doubtful(self) -> bool:
@@ -95,6 +126,9 @@ class Validation:
             "residual_sigma": self.residual_sigma,
             "whiteness_p": self.whiteness,
             "doubtful": self.doubtful,
+            "driven_by": self.driven_by.name,
+            "missed": self.driven_by.missed,
+            "resolution": self.driven_by.resolution,
             "judged_by": list(self.judged_by),
             "correlations": [
                 {
@@ -157,19 +191,22 @@ def validate(
     if abs(block.rate_hz / fit.rate_hz - 1) > 1e-6:
         raise InputError(f"the model is of {fit.rate_hz:g} Hz and the recording has {block.rate_hz:g} Hz; record alike")
     loop = loop or Loop()
-    roles = {"input": input, "output": output} | ({"excitation": excitation} if excitation else {})
-    signals = _aligned({role: block[name] for role, name in roles.items()}, loop)
+    names = {"input": input, "output": output} | ({"excitation": excitation} if excitation else {})
+    signals = _aligned({role: block[name] for role, name in names.items()}, loop)
     count = len(signals["input"])
     if count < 10 * lags or not all(np.isfinite(x).all() for x in signals.values()):
         raise InputError(f"{count} samples with {lags} lags: give at least {10 * lags} finite ones in a row")
+    still = [names[role] for role, x in signals.items() if np.ptp(x) == 0]
+    if still:
+        raise InputError(f"{', '.join(map(repr, still))} does not move, which tells nothing of a model; record it live")
     found = simulate(fit, signals["input"], signals["output"])
     signals = {role: x[found.known] for role, x in signals.items()}
-    matrix = _correlated(fit)
+    matrix, measured = _correlated(fit), found.without(signals["output"])
     given = [("u", signals["input"], 1), ("ŷ", found.output, 1)]
     if excitation:
         given.append(("w", signals["excitation"], -lags))
     correlations = tuple(
-        correlation(name, found.residual, found.without(x), lags, found.slopes, matrix, first)
+        correlation(name, found.residual, measured, found.without(x), lags, found.slopes, matrix, first)
         for name, x, first in given
     )
     _, whiteness = own_correlation(found.residual, lags)
@@ -177,8 +214,7 @@ def validate(
     return Validation(
         model=fit.model.name,
         samples=len(signals["output"]),
-        fit_percent=100
-        * (1 - float(np.linalg.norm(found.residual) / np.linalg.norm(found.without(signals["output"])))),
+        fit_percent=100 * (1 - float(np.linalg.norm(found.residual) / np.linalg.norm(measured))),
         residual_sigma=float(np.sqrt(np.mean(found.residual**2))),
         whiteness=whiteness,
         correlations=correlations,
@@ -186,6 +222,10 @@ def validate(
         simulated=found,
         measured=signals["output"],
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
 def _aligned(signals: dict[str, Floats], loop: Loop) -> dict[str, Floats]:
