@@ -10,6 +10,8 @@ from livebode.monitoring.machine import Machine
 from livebode.monitoring.table import Table
 from livebode.nouns import InputError, Lines
 
+ROLES = ("output", "input", "excitation", "schedule")
+
 _ON = {True: "on", False: "off"}
 
 
@@ -82,12 +84,7 @@ class Baseline:
 
 def signals_of(settings: Settings) -> dict[str, str | None]:
     """Channel names by role."""
-    return {
-        "output": settings.output,
-        "input": settings.input,
-        "excitation": settings.excitation,
-        "schedule": settings.schedule,
-    }
+    return {role: getattr(settings, role) for role in ROLES}
 
 
 def _named(lines: Lines) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.baseline import Baseline
+from livebode.monitoring.baseline import ROLES, Baseline
+from livebode.monitoring.baseline_part import Part
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.table import Table
 from livebode.motion import Curve, MovingModel
@@ -60,10 +61,7 @@ def load(path: Path) -> Baseline:
             f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}"
             "; learn it again"
         )
-    try:
-        return _baseline(data)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{str(path)!r} is damaged ({type(error).__name__}: {error}); learn it again") from None
+    return _baseline(Part(str(path), "", data))
 
 
 def _plain(baseline: Baseline) -> dict[str, Any]:
@@ -84,18 +82,30 @@ def _plain(baseline: Baseline) -> dict[str, Any]:
     }
 
 
-def _baseline(data: dict[str, Any]) -> Baseline:
-    lines = data["lines"]
+def _baseline(data: Part) -> Baseline:
+    part = data.part("lines")
+    bins, quiet = (tuple(int(b) for b in part.array(name, 1, least=0)) for name in ("bins", "quiet"))
+    window, rate_hz = part.whole("window"), part.number("rate_hz", 0)
+    try:
+        lines = Lines(bins, window, rate_hz, quiet)
+    except InputError as error:
+        raise InputError(
+            f"the baseline {data.file!r} is damaged: its lines cannot be ({error}); learn it again"
+        ) from None
+    tables = tuple(_table(table) for table in data.parts("tables"))
+    if not tables:
+        raise data.wrong("tables", "empty")
+    signals = data.part("signals")
     return Baseline(
-        Lines(tuple(lines["bins"]), lines["window"], lines["rate_hz"], tuple(lines["quiet"])),
-        data["signals"],
-        data["estimator"],
-        data["quantity"],
-        tuple(_table(table) for table in data["tables"]),
-        _machine(data["machine"]) if data["machine"] else None,
-        data["corrected"],
-        tuple(data["runs"]),
-        data["remark"],
+        lines,
+        {role: signals.value(role) and signals.text(role) for role in ROLES},
+        data.text("estimator"),
+        data.text("quantity"),
+        tables,
+        None if data.value("machine") is None else _machine(data.part("machine"), lines),
+        data.truth("corrected"),
+        data.texts("runs"),
+        data.text("remark"),
     )
 
 
@@ -119,17 +129,25 @@ def _machine_plain(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _machine(data: dict[str, Any]) -> Machine:
-    curves = [Curve(data["low_m"], data["high_m"], _array(data[name])) for name in ("log_stiffness", "log_damping")]
+def _machine(data: Part, lines: Lines) -> Machine:
+    low, high = data.number("low_m"), data.number("high_m")
+    if high < low:
+        raise data.wrong("high_m", "below low_m")
+    curves = [Curve(low, high, data.array(name, 1)) for name in ("log_stiffness", "log_damping")]
+    inertia, load, radius = (data.number(name, 0) for name in ("inertia_kg_m2", "load_kg", "radius_m"))
+    noise, quiet = data.array("noise_power", 1, least=0), data.array("quiet_power", 1, least=0)
+    for name, values, of in (("noise_power", noise, lines.bins), ("quiet_power", quiet, lines.quiet)):
+        if len(values) != len(of):
+            raise data.wrong(name, f"not {len(of)} numbers")
     return Machine(
-        MovingModel(data["inertia_kg_m2"], data["load_kg"], data["radius_m"], *curves),
-        _array(data["noise_power"]),
-        _array(data["quiet_power"]),
-        _accuracy(data["held"]),
-        _accuracy(data["free"]),
-        data["slowest_m_per_s"],
-        data["fastest_m_per_s"],
-        np.array(data["windows"], dtype=np.int64),
+        MovingModel(inertia, load, radius, *curves),
+        noise,
+        quiet,
+        _accuracy(data.part("held")),
+        _accuracy(data.part("free")),
+        data.number("slowest_m_per_s"),
+        data.number("fastest_m_per_s"),
+        data.array("windows", 1, least=0).astype(np.int64),
     )
 
 
@@ -150,21 +168,23 @@ def _table_plain(table: Table) -> dict[str, Any]:
     }
 
 
-def _table(data: dict[str, Any]) -> Table:
-    real, imaginary = _array(data["mean_re"]), _array(data["mean_im"])
+def _table(data: Part) -> Table:
+    real, imaginary = data.array("mean_re", 3, known=False), data.array("mean_im", 3, known=False)
+    if real.shape != imaginary.shape:
+        raise data.wrong("mean_im", "not of the shape of mean_re")
     mean = np.empty(real.shape, dtype=np.complex128)
     mean.real, mean.imag = real, imaginary
     return Table(
-        data["what"],
-        tuple(data["names"]),
-        data["low"],
-        data["step"],
-        data["still"],
+        data.text("what"),
+        data.texts("names"),
+        data.number("low"),
+        data.number("step"),
+        data.number("still"),
         mean,
-        _array(data["covariance"]),
-        _array(data["variance"]),
-        np.array(data["count"], dtype=np.int64),
-        _accuracy(data["accuracy"]),
+        data.array("covariance", 5, known=False),
+        data.array("variance", 3, known=False),
+        data.array("count", 2, least=0).astype(np.int64),
+        _accuracy(data.part("accuracy")),
     )
 
 
@@ -172,8 +192,8 @@ def _accuracy_plain(known: Accuracy) -> dict[str, Any]:
     return {name: _list(getattr(known, name)) for name in Accuracy.__dataclass_fields__}
 
 
-def _accuracy(data: dict[str, Any]) -> Accuracy:
-    return Accuracy(*(_array(data[name]) for name in Accuracy.__dataclass_fields__))
+def _accuracy(data: Part) -> Accuracy:
+    return Accuracy(*(data.array(name, 1, least=0, known=False) for name in Accuracy.__dataclass_fields__))
 
 
 def _list(array: NDArray[Any]) -> Any:
@@ -181,7 +201,3 @@ def _list(array: NDArray[Any]) -> Any:
     plain = array.astype(object)
     plain[~np.isfinite(array)] = None
     return plain.tolist()
-
-
-def _array(values: Any) -> NDArray[np.float64]:
-    return np.array(values, dtype=np.float64)
