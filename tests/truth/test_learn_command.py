@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from livebode.excitation import multisine
-from livebode.monitoring import Baseline
+from livebode.monitoring import Baseline, Machine, Rows, learn_table
+from livebode.monitoring.accuracy import Accuracy
+from livebode.motion import Curve, MovingModel
 from livebode.nouns import Block, InputError, Lines
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from tests.command import Result, livebode, write_parquet
@@ -94,6 +96,22 @@ def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
     changes = {c["name"]: c["amount"] for c in told["parameters"]["details"]["changes"]}
     assert changes == {"Keff": pytest.approx(-5, abs=0.5)}
     assert told["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
+    assert "Learned from" in learned.out
+    assert "in 1 cell of the schedule. No model" in learned.out
+    assert "Lines and fitted parameters are watched" in learned.out
+    _not_fitted(toml, base, tmp_path)
+
+
+def _not_fitted(toml: Path, base: Path, tmp_path: Path) -> None:
+    """Without [fit] the parameters' table is not judged, which is said once."""
+    toml.write_text(toml.read_text("utf-8").split("[fit]")[0], encoding="utf-8")
+    blind = livebode("run", toml, "--baseline", base, "--out", tmp_path / "three")
+    assert blind.code == 0, blind.err
+    assert blind.out.count("parameters are not judged: the run has no [fit]") == 1
+    alone = livebode("run", toml, "--false-alarms", "once a year", "--average", "--out", tmp_path / "four")
+    assert "'once a year' has no effect without one" in alone.out
+    averaged = livebode("learn", tmp_path / "four", "--out", tmp_path / "x.json")
+    assert (averaged.code, "was made with --average" in averaged.err) == (2, True)
 
 
 def _refusals(tmp_path: Path, log: Path) -> None:
@@ -105,6 +123,10 @@ def _refusals(tmp_path: Path, log: Path) -> None:
     assert (words.code, "cannot be read; write for example" in words.err) == (2, True)
     twice = livebode("learn", tmp_path / "one", "--out", base)
     assert (twice.code, "--force" in twice.err) == (2, True)
+    same = livebode("learn", tmp_path / "one", f"{tmp_path / 'one'}/.", "--out", tmp_path / "x.json")
+    assert (same.code, "name each recording once" in same.err) == (2, True)
+    also = livebode("learn", tmp_path / "one", tmp_path / "three", "--out", tmp_path / "x.json")
+    assert (also.code, "name each recording once" in also.err) == (2, True)
     none = livebode("learn", tmp_path, "--out", tmp_path / "x.json")
     assert (none.code, "not the directory of a run" in none.err) == (2, True)
 
@@ -147,3 +169,52 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
             Baseline.load(path)
     with pytest.raises(InputError, match="there is no baseline"):
         Baseline.load(tmp_path / "missing.json")
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "words"),
+    [
+        ("machine.inertia_kg_m2", -1, "machine.inertia_kg_m2 = -1 is not above 0"),
+        ("machine.load_kg", None, "machine.load_kg is missing"),
+        ("machine.held.smallest", "x", "machine.held.smallest = 'x' is not an array of numbers"),
+        ("lines.rate_hz", "fast", "lines.rate_hz = 'fast' is not a number"),
+        ("estimator", None, "estimator is missing"),
+        ("tables", [], "tables = [] is empty"),
+        ("signals", 3, "signals = 3 is not a table"),
+    ],
+)
+def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: str) -> None:
+    """One sentence with the file, the key, the value and the remedy."""
+    path = tmp_path / "x.json"
+    _small().save(path)
+    Baseline.load(path)
+    data = json.loads(path.read_text("utf-8"))
+    *above, name = at.split(".")
+    part = data
+    for key in above:
+        part = part[key]
+    part.pop(name)
+    if value is not None:
+        part[name] = value
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(InputError) as found:
+        Baseline.load(path)
+    assert str(found.value) == f"the baseline {str(path)!r} is damaged: {words}; learn it again"
+
+
+def _small() -> Baseline:
+    lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
+    generator = np.random.default_rng(1)
+    noise = generator.standard_normal((2, 40, len(lines)))
+    rows = Rows(
+        1 + 0.01 * (noise[0] + 1j * noise[1]), np.full(noise[0].shape, 2e-4), np.zeros(40), np.zeros(40),
+        0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
+    )  # fmt: skip
+    table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], [rows])
+    curve, known = Curve(0.2, 1.6, np.zeros(12)), Accuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
+    machine = Machine(
+        MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
+        0.1, 0.4, np.full(28, 9),
+    )  # fmt: skip
+    signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
+    return Baseline(lines, signals, "joint", "plant", (table,), machine)

@@ -45,6 +45,7 @@ def _found(baseline: Baseline) -> dict[str, Any]:
         "runs": list(baseline.runs),
         "windows": int(table.count.sum()),
         "cells": cells,
+        "parameters": [name for other in baseline.tables[1:] for name in other.names],
         "lines_from_percent": [round(100 * float(x), 2) for x in table.accuracy.smallest[0::2]],
         "model": None,
         "remark": baseline.remark,
@@ -61,15 +62,24 @@ def _found(baseline: Baseline) -> dict[str, Any]:
 
 
 def _sentences(found: dict[str, Any]) -> str:
-    text = f"Learned from {found['windows']} windows in {found['cells']} cells of the schedule."
+    cells = f"{found['cells']} cell{'s' * (found['cells'] != 1)} of the schedule"
+    text = f"Learned from {found['windows']} windows in {cells}."
     if (model := found["model"]) is None:
-        most = max(found["lines_from_percent"])
+        least, most = min(found["lines_from_percent"]), max(found["lines_from_percent"])
+        sizes = f"{least:g} %" if least == most else f"{least:g} to {most:g} %, line by line"
+        watched = "Lines and fitted parameters" if found["parameters"] else "Lines alone"
         return (
-            f"{text} No model of the moving machine: {found['remark']}. Lines are watched alone, for changes from "
-            + (f"{min(found['lines_from_percent']):g} to {most:g} % on, line by line.")
+            f"{text} No model of the moving machine: {found['remark']}. {watched} are watched, "
+            f"lines for changes of at least {sizes}."
         )
     changes = ", ".join(f"{name} {percent:g} %" for name, percent in model["changes_from_percent"].items())
+    way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
-        f"{text}\nThe model of the machine knows the way from {model['from']:.3g} to {model['to']:.3g} at "
-        f"{model['slowest']:.3g} to {model['fastest']:.3g} a second, and is good for changes from: {changes}."
+        f"{text}\nThe model of the machine knows the way {way} at speeds {speeds} a second, and is good for changes "
+        f"from: {changes}."
     )
+
+
+def _between(low: float, high: float) -> str:
+    one, other = f"{low:.3g}", f"{high:.3g}"
+    return f"of {one}" if one == other else f"from {one} to {other}"

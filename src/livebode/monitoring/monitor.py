@@ -60,6 +60,11 @@ class Monitor:
         self._apart = {name: Apart(lines.window, settings.step) for name in self._tables}
         self._counts = {"change": 0, "change-cleared": 0}
 
+    @property
+    def tables(self) -> list[str]:
+        """What the tables that judge speak of; none where the model does."""
+        return list(self._tables)
+
     def process(self, block: Block, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
         """Events of these samples and of what became of them."""
         return self.process_samples(block) + self.process_responses(responses, parameters)

@@ -34,6 +34,7 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         raise InputError("there is no run to learn from; name at least one run directory")
     runs = [Run.open(path) for path in paths]
     axes = [_axis(run) for run in runs]
+    _check_once(runs, axes)
     for run, axis in zip(runs, axes):
         _check_same(runs[0], axes[0], run, axis)
     say("learning the lines over the schedule")
@@ -61,7 +62,26 @@ def _axis(run: Run) -> Axis:
     configuration = said(run.summary)
     if "source" not in configuration:
         raise InputError(f"{str(run.path)!r} is not the run of a machine; learn from what `livebode run` leaves")
-    return Axis.of(configuration, str(run.path / "run.json"))
+    axis = Axis.of(configuration, str(run.path / "run.json"))
+    if axis.tracking.average:
+        raise InputError(
+            f"{str(run.path)!r} was made with --average, so that each response holds those before it; learn from a "
+            "run of the same recording without it"
+        )
+    return axis
+
+
+def _check_once(runs: list[Run], axes: list[Axis]) -> None:
+    """What is there twice would be taken for twice as much."""
+    seen: dict[Path, Run] = {}
+    for run, axis in zip(runs, axes):
+        for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
+            if thing is not None and thing in seen:
+                raise InputError(
+                    f"{str(run.path)!r} holds the same as {str(seen[thing].path)!r}, which was given before it; "
+                    "name each recording once"
+                )
+        seen |= {thing: run for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()) if thing}
 
 
 def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:

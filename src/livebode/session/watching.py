@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.estimation import Settings
 from livebode.nouns import Block, Event, InputError, Parameters, Responses
-from livebode.session.axis import Axis
+from livebode.session.axis import Axis, MonitoringSection
 
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
 _CANNOT_TELL = "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
+_NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _KEPT = 100  # sentences in run.json; events.jsonl has all
 
@@ -23,8 +24,8 @@ Write = Callable[[Event], None]
 class Watching:
     """Hands a run's samples and responses to a Monitor, if there is one, and keeps what it says."""
 
-    def __init__(self, monitor: Monitor | None, baseline: str | None) -> None:
-        self._monitor, self._baseline = monitor, baseline
+    def __init__(self, monitor: Monitor | None, baseline: str | None, remark: str = "") -> None:
+        self._monitor, self._baseline, self._remark = monitor, baseline, remark
         self._alarms: list[str] = []
 
     def over(self, blocks: Iterator[Block], write: Write) -> Iterator[Block]:
@@ -42,9 +43,11 @@ class Watching:
     def finish(self, write: Write) -> dict[str, Any]:
         """What run.json says of it all."""
         if self._monitor is None:
-            return {"baseline": None, "message": _CANNOT_TELL}
+            return {"baseline": None, "message": _CANNOT_TELL + self._remark}
         self._publish(self._monitor.finish(), write)
-        return {"baseline": self._baseline} | self._monitor.summary() | {"alarms": self._alarms}
+        found = self._monitor.summary()
+        message = {"message": found["message"] + self._remark}
+        return {"baseline": self._baseline} | found | message | {"alarms": self._alarms}
 
     def snapshot(self) -> bytes:
         """What it said, and what the next event depends on; see `restore`."""
@@ -70,10 +73,12 @@ def make_watching(axis: Axis, settings: Settings) -> Watching:
     """For these settings; InputError where the baseline cannot be read or does not fit."""
     section = axis.monitoring
     if section.baseline is None:
-        return Watching(None, None)
+        asked = section.false_alarms != MonitoringSection().false_alarms
+        return Watching(None, None, f" false_alarms = {section.false_alarms!r} has no effect without one." * asked)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
     monitor = Monitor(
         Baseline.load(section.baseline), settings, section.false_alarms, corrected=axis.motion is not None
     )
-    return Watching(monitor, str(section.baseline))
+    blind = axis.fit is None and "parameters" in monitor.tables
+    return Watching(monitor, str(section.baseline), _NOT_FITTED * blind)
