@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Excitation, Json, Output
 from livebode.records import Run, to_json
 
 if TYPE_CHECKING:
@@ -18,17 +18,20 @@ def validate_command(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
     on: Annotated[Path, typer.Option("--on", metavar="LOG", help="A recording that the run was not made of.")],
     model: Annotated[
-        list[str] | None, typer.Option(help="rigid, two-mass, …, each judged; that of the run's [fit] unless said.")
+        list[str] | None, typer.Option(help="rigid, two-mass, …, each judged; that of the run's \\[fit] unless said.")
     ] = None,
     radius: Annotated[float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves.")] = None,
     lags: Annotated[int, typer.Option(min=1, help="Of the correlations, in samples to both sides.")] = 40,
     samples: Annotated[int | None, typer.Option(min=1, help="Take the last ones only; all unless said.")] = None,
+    output: Output = None,
+    input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
+    excitation: Excitation = None,
     as_json: Json = False,
 ) -> None:
     """Drive the fitted model by another recording and say whether what is left still follows the signals.
 
     Leaves validation.png in the run's directory. The model's parameters are constants: the mean over the run. A
-    machine that moves along a changing plant is judged by that mean.
+    machine that moves along a changing plant is judged by that mean. Channels are the run's, unless named here.
     """
     from livebode.report import save_validation_picture
     from livebode.session.axis import FitSection
@@ -38,14 +41,15 @@ def validate_command(
     base = said(Run.open(directory).summary).get("fit", {}) | ({} if radius is None else {"radius_m": radius})
     named = [{"model": name} for name in model or []] or [{}]
     sections = [FitSection.model_validate(base | one) for one in named]
-    found, refused = validate_run(directory, on, sections, lags=lags, samples=samples)
+    channels = {"output": output, "input": input, "excitation": excitation}
+    found, notes = validate_run(directory, on, sections, lags=lags, samples=samples, channels=channels)
     picture = save_validation_picture(found, directory, title=f"{directory.name} on {on.name}")
     if as_json:
-        print(to_json({"models": [v.plain() for v in found], "refused": refused}))
+        print(to_json({"models": [v.plain() for v in found], "notes": notes}))
         return
     for validation in found:
         show_validation(validation)
-    for sentence in refused:
+    for sentence in notes:
         print(sentence)
     print(f"\n{picture}")
 

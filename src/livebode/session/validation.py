@@ -11,17 +11,25 @@ from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
 from livebode.session.fits import fit_run
 from livebode.session.said import said
-from livebode.sources import open_log
+from livebode.sources import Log, open_log
 from livebode.validation import Validation, validate
 
 
 def validate_run(
-    directory: Path, log: Path, sections: list[FitSection], *, lags: int = 40, samples: int | None = None
+    directory: Path,
+    log: Path,
+    sections: list[FitSection],
+    *,
+    lags: int = 40,
+    samples: int | None = None,
+    channels: dict[str, str | None] | None = None,
 ) -> tuple[list[Validation], list[str]]:
-    """One verdict for each section's model, all on the same samples of `log`; and why others could not be judged.
+    """One verdict for each section's model, all on the same samples of `log`; and what else is to be said.
 
-    Channels, rate and loop are those of the run's configuration. Of a recording with gaps or samples that are not
-    finite the longest clean stretch is taken; of that the last `samples`, where the start has rung out.
+    Rate and loop are those of the run's configuration, and so are the channels but where `channels` names others for
+    output, input or excitation. Without the run's excitation in `log` the judgement goes on. Of a recording with gaps
+    or samples that are not finite the longest clean stretch is taken; of that the last `samples`, where the start has
+    rung out. The second list says so, and which models were not fitted, and whether the recording is the run's own.
 
     Raises
     ------
@@ -32,11 +40,20 @@ def validate_run(
     if "signals" not in own_words:
         raise InputError(f"{str(directory)!r} does not say which channels it was made of; make it with `livebode run`")
     axis = Axis.of({key: own_words[key] for key in ("source", "signals", "loop") if key in own_words}, str(directory))
-    signals = axis.signals
+    named = {role: name for role, name in (channels or {}).items() if name}
+    signals = axis.signals.model_copy(update=named)
     if signals.input is None:
         raise InputError("the run names no plant input u, which a model is driven by; run again with --input CHANNEL")
-    names = [signals.input, signals.output, *([signals.excitation] if signals.excitation else [])]
-    block = clean_stretch(log, axis, names)
+    notes = _freshness(own_words["source"].get("log"), log)
+    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    there = {c.name for c in opened.channels} | set(opened.aliases)
+    if signals.excitation and "excitation" not in named and signals.excitation not in there:
+        notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
+        signals = signals.model_copy(update={"excitation": None})
+    names = [name for name in (signals.input, signals.output, signals.excitation) if name]
+    block, recorded = clean_stretch(opened, names)
+    if len(block) < recorded:
+        notes.append(f"gaps or samples that are not finite: the longest clean stretch, {len(block)} of {recorded}")
     if samples is not None:
         if samples > len(block):
             raise InputError(f"{samples=} is more than the {len(block)} clean ones in a row; take fewer")
@@ -48,15 +65,22 @@ def validate_run(
     refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
     if not judged:
         raise InputError("; ".join(refused))
-    return judged, refused
+    return judged, notes + refused
 
 
-def clean_stretch(log: Path, axis: Axis, names: list[str]) -> Block:
-    """The longest stretch of a recording without a gap and with finite samples only."""
-    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+def _freshness(own: str | None, log: Path) -> list[str]:
+    if own is None or Path(own).resolve() != log.resolve():
+        return []
+    return [f"{log.name} is the recording that the run was made of: this is no test on fresh data"]
+
+
+def clean_stretch(opened: Log, names: list[str]) -> tuple[Block, int]:
+    """The longest stretch of a recording without a gap and with finite samples only, and how many samples there are."""
     best: list[Block] = []
     now: list[Block] = []
+    recorded = 0
     for block in opened.blocks(names):
+        recorded += len(block)
         broken = ~np.isfinite(block.data).all(axis=0)
         edges = np.flatnonzero(np.diff(np.concatenate([[1], broken, [1]])))
         for first, last in zip(edges[::2], edges[1::2]):
@@ -68,5 +92,6 @@ def clean_stretch(log: Path, axis: Axis, names: list[str]) -> Block:
             if last < len(block):
                 now = []
     if not best:
-        raise InputError(f"{str(log)!r} holds no finite sample of {', '.join(names)}; choose another recording")
-    return Block(np.concatenate([b.data for b in best], axis=1), best[0].channels, best[0].rate_hz, best[0].start)
+        raise InputError(f"{str(opened.path)!r} holds no finite sample of {', '.join(names)}; choose another recording")
+    data = np.concatenate([b.data for b in best], axis=1)
+    return Block(data, best[0].channels, best[0].rate_hz, best[0].start), recorded
