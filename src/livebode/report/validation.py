@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.report.pictures import save
-from livebode.report.style import Style, drawing, heading, new_figure, plain, style
+from livebode.report.style import Style, drawing, heading, new_figure, plain, shortened, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from livebode.validation import Correlation, Validation
 
 _SHOWN = 600  # samples of the output
-_SMALL = 0.15  # livebode.validation.SMALL, which takes SciPy's statistics to import
+_CLIPPED = 4.0  # times the limit: larger correlations stop at the edge, with a mark
 
 
 def save_validation_picture(
@@ -32,8 +32,8 @@ def save_validation_picture(
 def validation_figure(found: Sequence[Validation], *, title: str = "", dark: bool = False) -> Figure:
     """A row for each model: the last samples of the output, and the correlations over the lags.
 
-    The band holds 97 % of what chance makes at a lag, the thin lines are 2.17/√L and 0.15. Lags that cannot tell a
-    wrong model are thin.
+    The band holds 97 % of what chance makes at a lag, the dashed lines are 2.17/√L. Lags that cannot tell a wrong
+    model are thin; a triangle at the edge stands for a correlation that goes on beyond it.
     """
     look = style(dark)
     columns = 1 + max(len(v.correlations) for v in found)
@@ -42,9 +42,9 @@ def validation_figure(found: Sequence[Validation], *, title: str = "", dark: boo
         height = figure.get_size_inches()[1]
         grid = figure.add_gridspec(
             len(found), columns, width_ratios=[1.5, *[1.0] * (columns - 1)], left=0.7 / figure.get_size_inches()[0],
-            right=0.985, top=1 - 1.2 / height, bottom=0.55 / height, hspace=0.45, wspace=0.28,
+            right=0.985, top=1 - 1.2 / height, bottom=0.55 / height, hspace=0.45, wspace=0.36,
         )  # fmt: skip
-        facts = f"{found[0].samples} samples · band: 97 % of chance at each lag · dashed: 2.17/√L · dotted: {_SMALL}"
+        facts = f"{found[0].samples} samples · band: 97 % of chance at each lag · dashed: 2.17/√L"
         heading(figure, look, title or "Validation", facts, 0.7 / figure.get_size_inches()[0])
         for row, one in enumerate(found):
             last = row == len(found) - 1
@@ -56,15 +56,15 @@ def validation_figure(found: Sequence[Validation], *, title: str = "", dark: boo
 
 def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
     shown = slice(max(0, found.samples - _SHOWN), found.samples)
-    at = np.arange(found.samples)[shown]
-    axes.plot(at, found.measured[shown], color=look.newest, linewidth=0.9, label="measured")
-    axes.plot(at, found.simulated.output[shown], color=look.run, linewidth=1.3, label="ŷ, simulated")
+    at_s = np.arange(found.samples)[shown] / found.rate_hz
+    axes.plot(at_s, found.measured[shown], color=look.newest, linewidth=2.6, alpha=0.55, label="measured")
+    axes.plot(at_s, found.simulated.output[shown], color=look.run, linewidth=0.9, label="ŷ, simulated")
     axes.set_title(
         f"{found.model}: {found.verdict}, fit {found.fit_percent:.1f} %", loc="left", size=10, color=look.ink
     )
-    axes.set_ylabel("output")
+    axes.set_ylabel(shortened(found.output, 30))
     if last:
-        axes.set_xlabel("sample")
+        axes.set_xlabel("time in s")
     axes.legend(loc="upper right", ncols=2, borderpad=0.2)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.22 * (high - low))
@@ -73,16 +73,21 @@ def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
 
 def _correlation(axes: Axes, look: Style, c: Correlation, counts: bool, last: bool) -> None:
     axes.fill_between(c.lags, -c.limit, c.limit, color=look.run, alpha=0.2, linewidth=0)
-    for level, dashes in ((c.white_limit, (4, 2)), (_SMALL, (1, 2))):
-        for sign in (-1, 1):
-            axes.axhline(sign * level, color=look.muted, linewidth=0.9, dashes=dashes)
+    for sign in (-1, 1):
+        axes.axhline(sign * c.white_limit, color=look.muted, linewidth=0.9, dashes=(4, 2))
     axes.vlines(
         c.lags, 0, c.value, color=np.where(c.judged, look.run, look.muted), linewidth=np.where(c.judged, 1.6, 0.6)
     )
-    outside = c.judged & (np.abs(c.value) > c.limit)
+    limit = float(np.max(c.limit))
+    reach = 1.15 * min(max(limit, float(np.max(np.abs(c.value)))), _CLIPPED * max(limit, c.white_limit))
+    beyond = np.abs(c.value) > reach
+    outside = c.judged & (np.abs(c.value) > c.limit) & ~beyond
     axes.plot(c.lags[outside], c.value[outside], "o", markersize=3, color=look.newest)
-    reach = 1.15 * max(_SMALL, float(np.max(np.abs(c.value))), float(np.max(c.limit)))
+    for sign, mark in ((1, "^"), (-1, "v")):
+        at = c.lags[beyond & (np.sign(c.value) == sign)]
+        axes.plot(at, np.full(len(at), 0.96 * sign * reach), mark, markersize=4, color=look.newest)
     axes.set_ylim(-reach, reach)
+    axes.set_ylabel("correlation")
     share = f"{100 * c.share:.0f} % inside" if counts else "does not count"
     axes.set_title(f"ε with {c.name}: {share}", loc="left", size=10, color=look.ink)
     if last:

@@ -39,8 +39,8 @@ class Validation:
         With u, ŷ and, where the excitation is known, w.
     judged_by
         Names of the correlations that count for the verdict.
-    simulated, measured
-        For the picture.
+    simulated, measured, rate_hz, output
+        For the picture; `output` is the channel's name with its unit.
     """
 
     model: str
@@ -52,6 +52,8 @@ class Validation:
     judged_by: tuple[str, ...]
     simulated: Simulated
     measured: Floats
+    rate_hz: float
+    output: str
 
     @property
     def verdict(self) -> Verdict:
@@ -221,6 +223,8 @@ def validate(
         judged_by=by,
         simulated=found,
         measured=signals["output"],
+        rate_hz=block.rate_hz,
+        output=f"{output} in {unit}" if (unit := next(c.unit for c in block.channels if c.name == output)) else output,
     )
 
 
