@@ -122,8 +122,9 @@ def test_what_cannot_be_is_refused() -> None:
 
     with pytest.raises(InputError, match="position"):
         MotionCorrection(settings(schedule=None), radius_m=0.019)
-    with pytest.raises(InputError, match="single windows"):
-        MotionCorrection(settings(average=True), radius_m=0.019)
+    for name, value in (("average", True), ("quantity", "sensitivity")):
+        with pytest.raises(InputError, match=f"{name}={value!r} cannot be corrected for motion; take"):
+            MotionCorrection(settings(**{name: value}), radius_m=0.019)
     with pytest.raises(InputError, match="describe the feedback"):
         MotionCorrection(settings(), radius_m=0.019, driven_by="excitation")
     with pytest.raises(InputError, match="radius_m"):
