@@ -58,7 +58,7 @@ crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
-	apt-get install -y -qq --no-install-recommends clang mosquitto
+	apt-get install -y -qq --no-install-recommends chromium clang gcc-arm-none-eabi mosquitto qemu-system-arm
 
 lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/python -m pip install --quiet uv
