@@ -18,7 +18,7 @@ import pytest
 from livebode.nouns import Channel, InputError
 from livebode.sources.live import Batch, FrameDecoder, Sequencer, SourceSettings, encode_layout, encode_samples
 from livebode.sources.live.address import parse_address
-from livebode.sources.live.frame import FRAME_BYTES_MAX, HEADER, FrameSplitter
+from livebode.sources.live.framing import FRAME_BYTES_MAX, HEADER, FrameSplitter
 from livebode.sources.live.lines import LineSplitter
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_line
 from livebode.sources.live.said import Said
@@ -226,7 +226,7 @@ def test_lines_are_cut_anywhere_alike():
         (encode_samples(batch())[:-1], "declares"),
         (encode_samples(batch())[:-4] + b"\0\0\0\0", "CRC"),
         (with_crc(b"LBOD\x02" + encode_samples(batch())[5:]), "version 2"),
-        (with_crc(b"LBOD\x01\x03" + encode_samples(batch())[6:]), "kind 3"),
+        (with_crc(b"LBOD\x01\x05" + encode_samples(batch())[6:]), "kind 5"),
         (with_crc(b"LBOD\x01\x01\x80" + encode_samples(batch())[7:]), "flags 128"),
         (with_crc(encode_samples(batch())[:54] + b"\x07\x00" + encode_samples(batch())[56:]), "7 samples"),
         (with_crc(encode_layout(CHANNELS, 1.0)[:-4] + b"x\n" + b"    "), "not the one that its header names"),
