@@ -54,7 +54,8 @@ int main(void) {
     for (int i = 0; i < 2; i++) {
         for (int k = 0; k < 12; k++) { (&sums[0][0][0])[k] = (float)(k + 100 * i) + 0.1f; }
         x = 0.3f + (float)i;
-        lb_frame_put_spectrum(frame, (uint16_t)i, i ? LB_FRAME_NOT_WHOLE | LB_FRAME_SPIKE : 0, &x, 1, &sums[0][0][0], 2, 3);
+        const uint32_t state = i ? LB_FRAME_NOT_WHOLE | LB_FRAME_SPIKE : 0;
+        lb_frame_put_spectrum(frame, (uint16_t)i, state, &x, 1, &sums[0][0][0], 2, 3);
     }
     fwrite(frame, 1, lb_frame_spectra(frame, 1, 5, 419, 1500000000000000000LL, 4000.0, layout, 2, 3, 1, 2), stdout);
     return 0;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class SpectraLayout:
     lines
         The excited lines as bins, ascending.
     quiet
-        Bins without excitation that are sent too, ascending: for the noise, and the neighbours that a Hann window takes.
+        Bins without excitation that are sent too, ascending: for the noise, and the neighbours of a Hann window.
     subtracted
         A constant for each signal that the drive takes off before the DFT, in the signal's unit. It is nothing at the
         lines, but saves digits of float32.
@@ -88,7 +89,7 @@ class SpectraLayout:
         if not self.lines:
             raise GridError("spectra without a line; give at least one")
         for bins in (self.lines, self.quiet):
-            if any(b <= a for a, b in zip(bins, bins[1:])):
+            if any(b <= a for a, b in pairwise(bins)):
                 raise GridError("bins of spectra are not ascending; put them in order, each once")
         if twice := set(self.lines) & set(self.quiet):
             raise GridError(f"bin {min(twice)} is named as a line and as quiet; name it once")

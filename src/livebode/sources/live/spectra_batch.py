@@ -64,6 +64,11 @@ class SpectraBatch:
                 f"{VALUES_MAX} numbers"
             )
         check_numbers(self.first_sample, self.rate_hz, self.stamp_s)
+        if self.first_sample % self.layout.hop:
+            raise InputError(
+                f"a spectrum ends at sample {self.first_sample + self.layout.hop - 1}; with hop {self.layout.hop} they "
+                "end one before its multiples"
+            )
 
     @property
     def channels(self) -> tuple[Channel, ...]:

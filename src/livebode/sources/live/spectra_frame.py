@@ -144,10 +144,6 @@ def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLay
     rows = np.frombuffer(payload, dtype)
     if np.any(rows["state"] > _STATES):
         raise InputError(f"a spectrum has the state {int(rows['state'].max())}; 0 to {_STATES} are known")
-    if (header.sample + 1) % layout.hop:
-        raise InputError(
-            f"a spectrum ends at sample {header.sample}; with hop {layout.hop} they end one before its multiples"
-        )
     with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
         sums = rows["sums"].astype(np.float64)
         values = rows["values"].T.astype(np.float64, order="C")
