@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import snapshots
+from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
@@ -24,7 +25,8 @@ class SpectraTracker:
 
     From a kernel in the same precision it gives the Responses that a Tracker gives from the samples; a Response speaks
     for its window's centre and is (N − 1)/2 samples late. What the drive marks as not whole or with a spike is left
-    out. Lost spectra leave no window invalid, for the drive goes on.
+    out, and so are sums that are not finite or 1e8 times larger than all in the period before. Lost spectra leave no
+    window invalid, for the drive goes on.
 
     With a hop of m windows, the spectra behind `sigma`, the mean and the coherence are those m periods apart:
     `forgetting` then counts spectra, and what the machine changes within that time is taken for noise. Where it moves,
@@ -56,8 +58,13 @@ class SpectraTracker:
         differenced = np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
         self._watch = SpectraWatch(layout.window)
+        self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
         self._nothing: Responses | None = None
-        self._parts: dict[str, LineStage | SpectraWatch] = {"lines": self._lines, "watch": self._watch}
+        self._parts: dict[str, LineStage | SpectraWatch | PlausibleRange] = {
+            "lines": self._lines,
+            "watch": self._watch,
+            "range": self._range,
+        }
 
     @property
     def counts(self) -> dict[str, int]:
@@ -95,11 +102,15 @@ class SpectraTracker:
         hop, window = self._layout.hop, self._layout.window
         sums = block.sums[self._signals][:, :, self._columns]
         finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
-        whole = (block.state & NOT_WHOLE == 0) & finite
-        clean = whole & (block.state & SPIKE == 0)
-        self._watch.take(block, whole, clean)
-        spectrum = np.where(finite[:, np.newaxis], sums, 0.0) * self._after
-        rows = Rows(spectrum, block.sample, whole, clean, _NONE, _NONE, _NONE)
+        with np.errstate(over="ignore", invalid="ignore"):  # what comes of implausible numbers is left out
+            spectrum = np.where(finite[:, np.newaxis], sums, 0.0) * self._after
+            size = np.nan_to_num(np.abs(spectrum).max(axis=2))
+        implausible = np.zeros(len(block), dtype=np.bool_)
+        implausible[self._range.process(size)] = True
+        not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
+        self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
+        whole = ~(not_whole | implausible)
+        rows = Rows(spectrum, block.sample, whole, whole & ~spike, _NONE, _NONE, _NONE)
         place = (block.place + hop * np.arange(len(block))) % window
         time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
         schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)

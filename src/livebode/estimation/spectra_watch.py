@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from livebode.nouns import Event, InputError, Spectra
 
-_MARKED = {
-    "not-whole": "the drive marks a window that is not whole (a start, a gap, a sample that is not finite)",
+_KINDS = {
+    "not-whole": "a window is not whole (the drive says so, or its sums are not finite)",
+    "implausible": "a spectrum is more than 1e8 times larger than all in the period before",
     "spike": "the drive marks a window with a spike",
 }
 
@@ -19,8 +20,9 @@ class SpectraWatch:
     def __init__(self, window: int) -> None:
         self._window = window
         self._next = -1
-        self._marked = {"not-whole": True, "spike": False}  # a stream that begins with the drive is not whole at first
-        self.counts = {"samples": 0, "gaps": 0, "missing": 0, "spectra": 0} | dict.fromkeys(_MARKED, 0)
+        # A stream that begins with the drive is not whole at first.
+        self._marked = dict.fromkeys(_KINDS, False) | {"not-whole": True}
+        self.counts = {"samples": 0, "gaps": 0, "missing": 0, "spectra": 0} | dict.fromkeys(_KINDS, 0)
         self._events: list[Event] = []
 
     def state(self) -> dict[str, NDArray[np.generic]]:
@@ -39,8 +41,8 @@ class SpectraWatch:
         events, self._events = self._events, []
         return events
 
-    def take(self, block: Spectra, whole: NDArray[np.bool_], clean: NDArray[np.bool_]) -> None:
-        """Count these; InputError where they do not follow the ones before."""
+    def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
+        """Count these, of each kind those that are `marked`; InputError where they do not follow the ones before."""
         first = self._next < 0
         missing = 0 if first else block.start - self._next
         if missing < 0:
@@ -53,18 +55,20 @@ class SpectraWatch:
             self.counts["missing"] += missing
             many = f"spectra of {missing} samples are" if missing else "an unknown number of spectra is"
             self._say("gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing)
-        self._count(block, whole, block.layout.hop + missing)
+        self._count(block, marked["not-whole"], block.layout.hop + missing)
         self._next = block.stop
-        for kind, marked in (("not-whole", ~whole), ("spike", whole & ~clean)):
-            begins = np.flatnonzero(np.diff(np.r_[self._marked[kind], marked].astype(np.int8)) > 0)
-            for at in begins:
-                self._say(kind, block, int(block.sample[at]), f"{_MARKED[kind]}; its response is not valid")
-            self.counts[kind] += int(np.count_nonzero(marked))
-            self._marked[kind] = bool(marked[-1])
+        begins: list[tuple[int, str]] = []
+        for kind, those in marked.items():
+            first = np.diff(np.r_[self._marked[kind], those].astype(np.int8)) > 0
+            begins += [(int(at), kind) for at in np.flatnonzero(first)]
+            self.counts[kind] += int(np.count_nonzero(those))
+            self._marked[kind] = bool(those[-1])
+        for at, kind in sorted(begins):
+            self._say(kind, block, int(block.sample[at]), f"{_KINDS[kind]}; its response is not valid")
 
-    def _count(self, block: Spectra, whole: NDArray[np.bool_], new: int) -> None:
+    def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples that these windows hold and those before did not; `new` since the window before."""
-        if self._next < 0 and whole[0]:
+        if self._next < 0 and not not_whole[0]:
             new = self._window
         self.counts["samples"] += min(new, self._window) + (len(block) - 1) * min(block.layout.hop, self._window)
         self.counts["spectra"] += len(block)

@@ -187,4 +187,5 @@ class Spectra(Block):
 def rms(sums: NDArray[np.complex128], layout: SpectraLayout) -> NDArray[np.float64]:
     """Root mean square of what the signals are at the lines, shape (signals, spectra), from sums of that layout."""
     at = sums[..., : len(layout.lines)]
-    return np.asarray(np.sqrt(2 * (at.real**2 + at.imag**2).sum(axis=-1)) / layout.window)
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are none
+        return np.asarray(np.sqrt(2 * (at.real**2 + at.imag**2).sum(axis=-1)) / layout.window)

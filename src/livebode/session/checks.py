@@ -155,8 +155,8 @@ def check_some_valid(responses: int, valid: int, counts: dict[str, int], window:
     """InputError where no response of the whole run is valid."""
     if responses and not valid and "spectra" in counts:
         raise InputError(
-            f"none of {responses} responses is valid: the drive marks {counts['not-whole']} of {counts['spectra']} "
-            f"windows as not whole and {counts['spike']} with a spike; see to its samples, or send a shorter window"
+            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
+            f"whole and {counts['spike']} hold a spike; see to the drive's samples, or let it take a shorter window"
         )
     if responses and not valid:
         raise InputError(
