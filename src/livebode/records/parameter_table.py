@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.arrow import from_numpy, text
 from livebode.nouns import Parameters
 from livebode.records.table import Table
 
@@ -63,14 +64,16 @@ class ParameterTable:
 def parameter_rows(parameters: Parameters) -> pa.RecordBatch:
     """The parameters in long form."""
     rows, n = parameters.value.shape
+    column = np.tile(np.arange(n), rows)
+    statuses, status = np.unique(parameters.status, return_inverse=True)
     columns = [
-        *(np.repeat(x, n) for x in (parameters.sample, parameters.time_s, parameters.schedule)),
-        np.repeat(np.array(parameters.model, dtype=object), rows * n),
-        np.tile(np.array(parameters.names, dtype=object), rows),
-        parameters.value.ravel(),
-        parameters.sigma.ravel(),
-        np.tile(np.array(parameters.units, dtype=object), rows),
-        np.repeat(parameters.status.astype(object), n),
-        np.repeat(parameters.epsilon, n),
+        *(from_numpy(np.repeat(x, n)) for x in (parameters.sample, parameters.time_s, parameters.schedule)),
+        text([parameters.model], np.zeros_like(column)),
+        text(parameters.names, column),
+        from_numpy(parameters.value.ravel()),
+        from_numpy(parameters.sigma.ravel()),
+        text(parameters.units, column),
+        text(statuses.tolist(), np.repeat(status, n)),
+        from_numpy(np.repeat(parameters.epsilon, n)),
     ]
-    return pa.record_batch([pa.array(c, type=f.type) for c, f in zip(columns, SCHEMA)], schema=SCHEMA)
+    return pa.record_batch(columns, schema=SCHEMA)

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.arrow import from_numpy
 from livebode.nouns import Responses
 from livebode.records.table import Table
 
@@ -77,4 +78,4 @@ def as_batch(responses: Responses) -> pa.RecordBatch:
         responses.coherence.ravel(),
         responses.valid.ravel(),
     ]
-    return pa.record_batch([pa.array(np.ascontiguousarray(c)) for c in columns], schema=SCHEMA)
+    return pa.record_batch([from_numpy(c) for c in columns], schema=SCHEMA)
