@@ -33,19 +33,10 @@ def runs(hop: int, louder: float = 1.0) -> list[Responses]:
     total = (4 + PERIODS) * LINES.window
     noise = np.full(total, SIGMA)
     noise[settled + PERIODS * LINES.window // 2 :] *= louder
-    u, y = _run(w, noise)
+    u, y = Drive().under(w, noise[:, np.newaxis] * np.random.default_rng(31).standard_normal((total, RUNS)))
     blocks = (Block(np.array([np.tile(w, PERIODS), u[i, settled:], y[i, settled:]]), ("w", "u", "y"), RATE_HZ)
               for i in range(RUNS))  # fmt: skip
     return [Tracker(settings).process(block) for block in blocks]
-
-
-def _run(w: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    rng, drive = np.random.default_rng(31), Drive()
-    state = np.tile(drive.settled(w), (RUNS, 1))
-    u, y = np.empty((2, RUNS, noise.size))
-    for n, amplitude in enumerate(noise):
-        state, u[:, n], y[:, n] = drive.tick(state, w[n % w.size], amplitude * rng.standard_normal(RUNS), n)
-    return u, y
 
 
 def error(means: list[Response]) -> np.ndarray:
