@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.nouns import InputError
+from livebode.nouns import InputError, Responses
 from livebode.records import Run
 
 _IN_PYTHON = {
@@ -44,7 +44,7 @@ def export_command(
         print(f"{path}: {written.rows} parameter values")
         return
     if at is not None:
-        parts = iter([export.only(export.at(record.batches(), at))])
+        parts = iter([Responses.of(export.at(record.batches(), at))])
     elif mean:
         from livebode.fitting import mean_response
 

@@ -165,6 +165,12 @@ class Responses(Sequence[Response]):
             return np.asarray(20 * np.log10(np.abs(self.value)))
 
     @classmethod
+    def of(cls, response: Response) -> Responses:
+        """One Response as a batch of one."""
+        rows: dict[str, Any] = {name: np.array([getattr(response, name)]) for name in _PER_ROW}
+        return cls(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
+
+    @classmethod
     def join(cls, parts: Sequence[Responses]) -> Responses:
         """Parts of one run, in order, as one; GridError where their lines differ."""
         if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
