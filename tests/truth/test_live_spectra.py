@@ -236,6 +236,9 @@ def test_a_baseline_learned_from_samples_tells_a_change_in_spectra(tmp_path: Pat
     assert [e["details"]["what"] for e in events(out) if e["kind"] == "change"] == ["lines"]
     same, out = run_live(tmp_path, "same", frames(record(), what), config)
     assert same["monitoring"]["changes"] == 0
+    # And spectra are as good to learn from.
+    learned = livebode("learn", out, "--out", tmp_path / "spectra.json")
+    assert learned.code == 0, learned.err
 
 
 def test_the_model_of_the_machine_is_left_out_and_said_to_be(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.nouns import Channel, SpectraLayout
@@ -44,6 +44,7 @@ def passed(batches: list[SpectraBatch | Batch], said: Said, reorder: int) -> lis
 hops = st.sampled_from([1, 20, 60, 180])
 
 
+@settings(deadline=None)
 @given(
     hop=hops,
     lengths=st.lists(st.integers(1, 5), min_size=3, max_size=40),
@@ -70,6 +71,7 @@ def test_what_is_lost_is_exactly_the_gaps_and_phases_stay(hop, lengths, first, b
         assert (block.sample[-1], len(block.sample)) == (block.stop - 1, len(block))
 
 
+@settings(deadline=None)
 @given(hops, st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=31), st.integers(0, 8))
 def test_whatever_comes_spectra_are_right_and_ascend(hop, pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: what comes out is at its place, once."""
