@@ -28,8 +28,9 @@ def low_crest_phases(
 
     The L_2p norm of the period is brought down over the phases with p rising to 512, after Guillaume, Schoukens,
     Pintelon, Kollár (IEEE Trans. Instrum. Meas. 40(6), 1991). A descent ends in the valley that it began in, so there
-    are many: the first start is Schroeder's phases, half are those shaken, half are random; the lowest crest factor is
-    taken, after a quarter of them went on to the highest p. The same seed gives the same phases. docs/excitation.md has what is reached, and beside what.
+    are many: the first start is Schroeder's phases, half are those shaken, half are random. A quarter of them go on to
+    the highest p, and the lowest crest factor is taken. The same seed gives the same phases. docs/excitation.md has
+    what is reached, and beside what.
 
     Parameters
     ----------
