@@ -12,7 +12,7 @@ from livebode.design.wish import Wish
 from livebode.excitation import check_band, chirp_lines, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 from livebode.nouns import GridError, Lines
-from livebode.nouns.lines import WINDOW_MAX
+from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
 _BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2 dB there, and its first zero is well above
@@ -47,6 +47,8 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     check_band(low, high, rate_hz)
     if wish.kind == "prbs":
         return _prbs(wish, low, high, rate_hz)
+    if wish.window is not None:
+        check_window(wish.window, rate_hz)
     apart = 1 if wish.kind in ("chirp", "stepped") else _QUIET_BETWEEN
     window = wish.window or _window(wish.resolution_hz or 0.0, apart, rate_hz)
     why = f"{apart} × {rate_hz:g} Hz / {wish.resolution_hz:g} Hz" if wish.window is None else "as given"
@@ -58,10 +60,11 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     first, last = ceil(low * window / rate_hz / apart - 1e-9), floor(high * window / rate_hz / apart + 1e-9)
     bins = [k * apart for k in range(max(first, 1), last + 1)]
     if not bins:
+        step_hz = apart * rate_hz / window
+        near = [k * step_hz for k in (last, first) if 0 < 2 * k * apart < window]
         raise GridError(
-            f"no line of the {apart * rate_hz / window:g} Hz grid lies in {low:g} … {high:g} Hz; the nearest are "
-            f"{max(last, 1) * apart * rate_hz / window:g} and {(last + 1) * apart * rate_hz / window:g} Hz; widen the "
-            f"band, or ask for a resolution of {max(high - low, rate_hz / WINDOW_MAX * 4):g} Hz"
+            f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz; the nearest are "
+            f"{' and '.join(f'{f:g}' for f in near)} Hz; widen the band, or ask for a finer resolution"
         )
     words = (
         "every second bin of the band; those between show the noise" if apart == _QUIET_BETWEEN else "the band's bins"

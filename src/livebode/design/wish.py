@@ -79,6 +79,8 @@ class Wish:
             if (word := getattr(self, name)) not in known:
                 raise InputError(f"{name}={word!r} is not known; choose {', '.join(map(repr, known))}")
         self._check_numbers()
+        if self.band_hz is not None and np.shape(self.band_hz) != (2,):
+            raise InputError(f"band_hz={self.band_hz} is no band; give two frequencies in Hz, such as [20, 140]")
         if self.order is not None:
             check_order(self.order)
         if self.lines is None and self.band_hz is None:

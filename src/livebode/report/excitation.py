@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design import Design, Waveform, worst
+from livebode.design import Design, Waveform
 from livebode.report.pictures import save
 from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style
 
@@ -102,10 +102,11 @@ def _spread(axes: Axes, look: Style, waveform: Waveform) -> None:
 
 
 def _torque(period: Axes, spread: Axes, look: Style, design: Design) -> None:
-    torque = worst(design.peaks)["torque"]
+    torque = [peak for peak in design.peaks if peak.quantity == "torque"]
+    lowest, highest = min(peak.low for peak in torque), max(peak.high for peak in torque)
     _, limit = design.limits.of("torque")
     for axes in (period, spread):
-        for value, label in ((torque.low, "predicted torque, motion included"), (torque.high, None)):
+        for value, label in ((lowest, "predicted torque, motion included"), (highest, None)):
             axes.axhline(value, color=look.newest, linewidth=1.2, dashes=(5, 3), label=label)
         if np.isfinite(limit):
             for value, label in ((-limit, "limit"), (limit, None)):
@@ -124,7 +125,7 @@ def _lines(sizes: Axes, phases: Axes, look: Style, waveform: Waveform) -> None:
         sizes.plot(quiet, np.zeros(quiet.size), "o", markersize=5, markerfacecolor="none", markeredgecolor=look.newest,
                    clip_on=False, zorder=5, label="odd bins left quiet")  # fmt: skip
         sizes.legend(loc="upper right")
-    sizes.set_ylim(0, 1.15 * float(np.max(np.abs(spectrum))))
+    sizes.set_ylim(0, (1.5 if sizes.get_legend() else 1.15) * float(np.max(np.abs(spectrum))))
     sizes.set_ylabel("amplitude in N m")
     sizes.tick_params(labelbottom=False)
     turned = np.degrees(np.angle(spectrum * 1j))  # of sines, as in eq. (6)
