@@ -19,6 +19,7 @@ from livebode.session.experiment import Experiment
 from livebode.simulation import SimulatedAxis
 from tests.command import livebode, write_parquet
 
+ROOT = Path(__file__).parents[2]
 BELT = """
 [belt.sensor]
 noise_rad_per_s = 0.05
@@ -186,8 +187,7 @@ def test_the_seed_in_a_file_makes_the_same_file_again(tmp_path):
 
 
 def test_the_table_says_what_was_chosen_and_why(tmp_path):
-    path = described(tmp_path, "band_hz = [20, 140]\nresolution_hz = 20\n")
-    shown = livebode("design", path, "--out", tmp_path / "d", "--to", "csv")
+    shown = livebode("design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv")
     assert shown.code == 0, shown.err
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):
         assert word in shown.out

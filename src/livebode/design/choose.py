@@ -22,7 +22,7 @@ from livebode.nouns import InputError
 # Of the room that the limits leave: what the prediction may err by.
 _RESERVE = 0.1
 _WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
-# From rest the position drifts further than in the periodic state; brought in so slowly, by 4 % (studies/design.py).
+# From rest the position drifts further than in the periodic state; brought in so slowly, by 3 % (studies/design.py).
 _RAMP_S = 0.5
 _STROKES_MIN = 2  # there and back
 _WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
