@@ -176,6 +176,14 @@ class Experiment(BaseModel):
                     "held_ticks": drive.position_ticks}  # fmt: skip
         return {"velocity": velocity, "position": position}
 
+    def motion_table(self, window_s: float) -> dict[str, Any]:
+        """[motion] of the axis.toml, where a belt axis moves: a chunk is a stroke, and two windows at least."""
+        axis = self.axis()
+        if axis is None or (cycle := axis.motion.cycle(axis.drive.rate_hz)[0].size) == 1:
+            return {}
+        stroke_s = cycle / 2 / axis.drive.rate_hz
+        return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
+
     def signal_names(self) -> dict[str, str]:
         """[signals] of the axis.toml; those of the simulated axis where nothing is said."""
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
