@@ -26,8 +26,8 @@ IF index = 0 THEN
     IF level > 0 THEN
         rising := enable;
     ELSE
-        allowed := limit / {peak};
-        refused := enable AND NOT (ABS(scale) * {peak} <= limit);
+        allowed := w_max / {peak};
+        refused := enable AND NOT (ABS(scale) * {peak} <= w_max);
         rising := enable AND NOT refused AND (loaded = {chunks});
         IF rising THEN
             applied := scale;
@@ -48,14 +48,14 @@ ELSIF level > 0 THEN
 ELSE
     w := 0.0;
 END_IF
-IF NOT (ABS(w) <= limit) THEN
+IF NOT (ABS(w) <= w_max) THEN
     limited := TRUE;
-    IF NOT (limit > 0.0) THEN
+    IF NOT (w_max > 0.0) THEN
         w := 0.0;
     ELSIF w > 0.0 THEN
-        w := limit;
+        w := w_max;
     ELSE
-        w := -limit;
+        w := -w_max;
     END_IF
 END_IF
 
@@ -96,8 +96,8 @@ def multisine(
     rate_hz
         Calls per second.
     limit
-        What |w| never exceeds, unit of `period`; an input of the block, and this is what it is unless the program says
-        otherwise. A scale that would break it is refused at the start; a limit lowered later clamps, and says so.
+        What |w| never exceeds, unit of `period`: the block's input w_max where the program does not give another. A
+        scale that would break it is refused at the start; a w_max lowered later clamps, and `limited` says so.
     name
         Of the function block.
     ramp_periods
@@ -164,7 +164,7 @@ def _checked(period: ArrayLike) -> NDArray[np.float64]:
 
 def _heading(samples: NDArray[np.float64], rate_hz: float, note: str) -> str:
     peak = float(np.max(np.abs(samples)))
-    crest = peak / float(np.sqrt(np.mean(samples**2)))
+    crest = 1 / float(np.sqrt(np.mean((samples / peak) ** 2)))
     return comment(
         f"{len(samples)} samples at {rate_hz:g} Hz are a period of {len(samples) / rate_hz:.6g} s; "
         f"peak {peak:.6g}, crest factor {crest:.4g}\n{note}"
@@ -179,7 +179,7 @@ def _declarations(window: int, limit: float) -> str:
                 ("enable", "BOOL", "begin at the next border of a period; end at the next border after it falls"),
                 ("stop", "BOOL", "silent at once, without a ramp"),
                 ("scale", "LREAL := 1.0", "taken over where a ramp in begins"),
-                ("limit", f"LREAL := {real(limit)}", "what the size of w never exceeds"),
+                ("w_max", f"LREAL := {real(limit)}", "what the size of w never exceeds"),
             ],
         )
         + section(

@@ -124,8 +124,8 @@ def sliding_dft(
 
     Operation by operation what `livebode.kernel.SlidingDFT` computes in float64 (docs/kernel.md), so with the same bits
     where the PLC rounds every product and sum to 64 bits. Called once a cycle with a sample of each channel; the
-    outputs `re` and `im` are [channel, bin]. It first fills its table, an entry a cycle, and takes samples after N cycles;
-    `count` says how many, and `valid` from the Nth on.
+    outputs `re` and `im` are [channel, bin]. It first fills its table, an entry a cycle, and takes samples after N
+    cycles; `count` says how many, and `valid` from the Nth on.
 
     Parameters
     ----------
