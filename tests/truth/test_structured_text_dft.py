@@ -72,13 +72,3 @@ def test_a_bad_sample_is_forgotten_within_two_windows(bad: float) -> None:
         np.testing.assert_array_equal(found, expected[:, n])
         if n >= 3 * window + 3:
             np.testing.assert_allclose(found, np.fft.fft(x[:, n - window + 1 : n + 1])[:, bins], atol=1e-12)
-
-
-def test_ratios_of_channels_do_not_depend_on_the_phase() -> None:
-    lines = Lines((1, 5, 18), 37, rate_hz=4000.0)
-    fixed, turned = (
-        Machine(sliding_dft(lines, ["w", "y"], phase=phase)).instance("FB_SlidingDft") for phase in ("fixed", "window")
-    )
-    for sample in np.random.default_rng(3).standard_normal((37 * 3, 2)):
-        a, b = (pushed(dft, ["w", "y"], sample) for dft in (fixed, turned))
-    np.testing.assert_allclose(a[1] / a[0], b[1] / b[0], rtol=1e-13)
