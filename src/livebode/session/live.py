@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from livebode.session.audience import Audience
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.fits import Fits
 from livebode.session.plan import live_follower
@@ -26,6 +27,7 @@ def run_live(
     progress: Progress,
     draw: Draw,
     tell: Tell = lambda _: None,
+    audience: Audience | None = None,
 ) -> Outcome:
     """Track a machine while it works and leave a run directory in segments; parameters as in `run`.
 
@@ -57,6 +59,7 @@ def run_live(
             kept=axis.record or RecordSection(),
             again=False,
             tell=tell,
+            audience=audience,
         )
 
 
