@@ -27,7 +27,7 @@ from livebode.structured_text import (
 from livebode.structured_text.names import NAME_LENGTH_MAX
 from tests.structured_text import Machine, parse
 
-EXAMPLES = int(os.environ.get("LIVEBODE_PLC_EXAMPLES", "3"))
+EXAMPLES = int(os.environ.get("LIVEBODE_PLC_EXAMPLES", "2"))
 """A text of the sliding DFT takes blark two seconds; `make fuzz` takes more of them."""
 few = settings(
     max_examples=EXAMPLES,
