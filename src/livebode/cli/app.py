@@ -23,6 +23,7 @@ from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
 from livebode.cli.margins_command import margins_command
+from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
@@ -46,6 +47,7 @@ app.command("export")(export_command)
 app.command("margins")(margins_command)
 app.command("validate")(validate_command)
 app.command("learn")(learn_command)
+app.command("plc")(plc_command)
 
 
 @app.callback(invoke_without_command=True)
