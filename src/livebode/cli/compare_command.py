@@ -16,9 +16,7 @@ from livebode.records import to_json
 def compare_command(
     before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Directory that a run left.")],
     after: Annotated[Path, typer.Argument(metavar="AFTER", help="Directory of a later run of the same signals.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Also write FILE.html and FILE.pdf.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write FILE.html and FILE.pdf.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:

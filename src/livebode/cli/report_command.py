@@ -17,9 +17,7 @@ def report_command(
         Path | None,
         typer.Option("--on", metavar="LOG", help="A recording that the run was not made of, to judge its model by."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Without an ending; RUN/report unless said.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Without an ending; RUN/report unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report elsewhere than in RUN.")] = False,
 ) -> None:
     """Write what a run measured, how, and what it comes to: report.html and report.pdf.
@@ -31,10 +29,10 @@ def report_command(
 
     judged = None
     if on is not None:
+        from livebode.records import Run
         from livebode.session.axis import FitSection
         from livebode.session.said import said
         from livebode.session.validation import validate_run
-        from livebode.records import Run
 
         section = FitSection.model_validate(said(Run.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.nouns import InputError, Responses
 
@@ -29,6 +30,17 @@ def mean_response(responses: Responses) -> Responses:
 
 class RunningMean:
     """`mean_response` of a run that comes in parts, of which none is kept."""
+
+    _first: NDArray[np.int64]
+    _count: NDArray[np.int64]
+    _coherent: NDArray[np.int64]
+    _value: NDArray[np.complex128]
+    _rest: NDArray[np.float64]
+    _single: NDArray[np.float64]
+    _coherence: NDArray[np.float64]
+    _dof: float
+    _time_s: float
+    _schedule: float
 
     def __init__(self) -> None:
         self._last: Responses | None = None

@@ -9,6 +9,8 @@ from typing import Any, Literal
 Tone = Literal["good", "look", "bad", "open"]
 """It holds; look at it; it does not hold; nobody can tell."""
 
+TONES: Mapping[str, str] = {"good": "holds", "look": "look at it", "bad": "does not hold", "open": "not known"}
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -80,6 +82,10 @@ class Document:
         In the order of reading.
     foot
         Stands at the end, and at the foot of each page of a PDF.
+    asked
+        Heading of the verdict.
+    tones
+        What a finding's tone is called there, so that it is known without colours.
     """
 
     kind: str
@@ -87,4 +93,6 @@ class Document:
     facts: tuple[tuple[str, str], ...]
     verdict: tuple[Finding, ...]
     sections: tuple[Section, ...]
-    foot: str = field(default="")
+    foot: str = ""
+    asked: str = "What holds, and what does not"
+    tones: Mapping[str, str] = field(default_factory=lambda: TONES)

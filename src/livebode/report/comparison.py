@@ -24,6 +24,7 @@ PlaceChange = tuple[float, float, bool, Complex, NDArray[np.bool_]]
 """From, to, whether going back, ratio and which lines differ, (lines,) each."""
 
 _FLOOR_DB = -1000.0
+_HEIGHT_IN = 7.8
 
 
 def comparison_figure(
@@ -45,19 +46,22 @@ def comparison_figure(
     look = style(dark)
     f = before.lines.frequency_hz
     with drawing(look):
-        figure = new_figure(9.0, 9.2)
-        top = 1 - 1.1 / 9.2
+        figure = new_figure(9.0, _HEIGHT_IN)
+        top = 1 - 1.1 / _HEIGHT_IN
         grid = figure.add_gridspec(
-            4, 1, height_ratios=[3, 2, 1.6, 1.6], left=0.085, right=0.98, top=top, bottom=0.052, hspace=0.11
+            4, 1, height_ratios=[3, 2, 1.6, 1.6], left=0.085, right=0.98, top=top, bottom=0.48 / _HEIGHT_IN, hspace=0.11
         )
         first = figure.add_subplot(grid[0])
         panels = [first, *(figure.add_subplot(grid[i], sharex=first) for i in (1, 2, 3))]
         facts = f"{before.quantity} · {words.counted(len(f), 'line')} · {int(differs.sum())} differ"
         heading(figure, look, "Before and after", facts, 0.085)
         turn = unwrapped(np.degrees(np.angle(before.value)), np.zeros(len(f), dtype=bool))
-        for one, colour, side, name in ((before, look.run, -1, "before"), (after, look.newest, 1, "after")):
-            value = np.where(one.valid, one.value, np.nan)
-            _response(panels[:2], f * 1.004**side, value, one.bound(MEAN_C), turn, colour, name)
+        drawn = [
+            _response(panels[:2], f * 1.004**side, one, turn, colour, name)
+            for one, colour, side, name in ((before, look.run, -1, "before"), (after, look.newest, 1, "after"))
+        ]
+        for axes, values, room in zip(panels, zip(*drawn), (3.0, 10.0)):
+            _squeeze(axes, np.concatenate(values), room)
         _ratio(panels[2:], look, f, ratio, bound, differs)
         unit = f" re 1 {before.unit}" if before.unit else ""
         labels = (f"magnitude in dB{unit}", "phase in degrees", "ratio in dB", "ratio in degrees")
@@ -80,16 +84,17 @@ def _bars(value: Complex, radius: Floats) -> tuple[Floats, Floats, Floats]:
     return low, decibels(size + radius), half
 
 
-def _response(panels: list[Axes], f: Floats, value: Complex, radius: Floats, turn: Floats, colour: str, name: str) -> None:
-    low, high, half = _bars(value, radius)
-    deg = np.degrees(np.angle(value))
+def _response(
+    panels: list[Axes], f: Floats, one: Response, turn: Floats, colour: str, name: str
+) -> tuple[Floats, Floats]:
+    """Draw magnitude and phase, and return them."""
+    value = np.where(one.valid, one.value, np.nan)
+    low, high, half = _bars(value, one.bound(MEAN_C))
+    db, deg = decibels(value), np.degrees(np.angle(value))
     deg = deg - 360 * np.rint((deg - turn) / 360)
-    for axes, middle, under, over in (
-        (panels[0], decibels(value), low, high), (panels[1], deg, deg - half, deg + half),
-    ):  # fmt: skip
-        _known(axes, f, middle, under, over, colour, name)
-    _squeeze(panels[0], decibels(value), 3.0)
-    _squeeze(panels[1], deg, 10.0)
+    _known(panels[0], f, db, low, high, colour, name)
+    _known(panels[1], f, deg, deg - half, deg + half, colour, name)
+    return db, deg
 
 
 def _known(axes: Axes, f: Floats, middle: Floats, low: Floats, high: Floats, colour: str, gid: str) -> None:
@@ -122,15 +127,9 @@ def _ratio(
 def _squeeze(axes: Axes, drawn: Floats, room: float) -> None:
     """Limits that hold the values, and bounds as far as they leave these room."""
     known = drawn[np.isfinite(drawn)]
-    if not known.size:
-        return
-    reach = max(0.35 * float(np.ptp(known)), room)
-    low, high = float(known.min()) - reach, float(known.max()) + reach
-    if getattr(axes, "_livebode_limits", None):
-        before: tuple[float, float] = axes._livebode_limits  # type: ignore[attr-defined]
-        low, high = min(low, before[0]), max(high, before[1])
-    axes._livebode_limits = low, high  # type: ignore[attr-defined]
-    axes.set_ylim(low, high)
+    if known.size:
+        reach = max(0.35 * float(np.ptp(known)), room)
+        axes.set_ylim(float(known.min()) - reach, float(known.max()) + reach)
 
 
 def places_figure(frequency_hz: Floats, places: list[PlaceChange], *, dark: bool = False) -> Figure:

@@ -42,4 +42,3 @@ def drawn(picture: Picture) -> Figure:
     from livebode.report.comparison import places_figure
 
     return places_figure(**picture.data)
-

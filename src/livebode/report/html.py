@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from html import escape
 
-from livebode.nouns.document import Document, Finding, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.nouns.document import Document, Listing, Paragraph, Part, Picture, Section, Table
 from livebode.report.figures import drawn
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import inline_svg
-
-TONES = {"good": "holds", "look": "look at it", "bad": "does not hold", "open": "not known"}
-"""What a finding's tone is called, for who sees no colours."""
 
 
 def to_html(document: Document) -> str:
@@ -28,7 +25,7 @@ def to_html(document: Document) -> str:
         f"<title>{title}</title>\n<style>\n{STYLE_SHEET}</style>\n</head>\n<body>\n"
         f'<header>\n<p class="kind">{_text(document.kind)}</p>\n<h1>{_text(document.title)}</h1>\n'
         f'<dl class="facts">{facts}</dl>\n</header>\n'
-        f'<h2>What holds, and what does not</h2>\n<ul class="verdict">\n{_verdict(document.verdict)}\n</ul>\n'
+        f'<h2>{_text(document.asked)}</h2>\n<ul class="verdict">\n{_verdict(document)}\n</ul>\n'
         f"<nav>{links}</nav>\n<main>\n{body}\n</main>\n<footer>{_text(document.foot)}</footer>\n</body>\n</html>\n"
     )
 
@@ -42,9 +39,10 @@ def _text(text: str) -> str:
     return escape(readable(text))
 
 
-def _verdict(findings: tuple[Finding, ...]) -> str:
+def _verdict(document: Document) -> str:
     return "\n".join(
-        f'<li><span class="tone {f.tone}">{TONES[f.tone]}</span><span>{_text(f.text)}</span></li>' for f in findings
+        f'<li><span class="tone {f.tone}">{_text(document.tones[f.tone])}</span><span>{_text(f.text)}</span></li>'
+        for f in document.verdict
     )
 
 

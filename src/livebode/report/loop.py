@@ -60,14 +60,16 @@ def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: f
         figure = new_figure(width_in, 6.4 * (0.5 + width_in / 24))
         height = figure.get_size_inches()[1]
         grid = figure.add_gridspec(
-            2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985, top=1 - 1.15 / height,
-            bottom=0.55 / height, hspace=0.09, wspace=0.17,
+            2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985,
+            top=1 - 1.15 / height, bottom=0.55 / height, hspace=0.09, wspace=0.17,
         )  # fmt: skip
         heading(figure, look, title or "Loop", _facts(found), 0.78 / width_in)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         nyquist = figure.add_subplot(grid[:, 1])
         _bode(magnitude, phase, look, found, f, (value, low, high))
+        for axes in (magnitude, phase):
+            axes.yaxis.set_label_coords(-0.98 / width_in, 0.5)
         _nyquist(nyquist, look, found, f, value)
         _legend(figure, look, 0.78 / width_in)
     return figure
@@ -101,7 +103,6 @@ def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, cur
         axes.plot(f, middle, color=look.run, linewidth=1.0, dashes=(4, 2), zorder=3)
         axes.plot(f[inside], middle[inside], color=look.run, linewidth=1.6, zorder=3)
         plain(axes)
-        axes.yaxis.set_label_coords(-0.082 * 12 / axes.figure.get_size_inches()[0], 0.5)
     at, measured, bound = _measured(found)
     size = np.abs(measured)
     error = np.clip(bound / size, 0, 0.999)

@@ -43,7 +43,8 @@ table.pairs td:first-child { width: 14rem; color: var(--c5b6775); }
 pre { padding: .9rem 1rem; background: var(--shade); border-radius: 4px; white-space: pre-wrap; overflow-wrap: anywhere;
   font: .84rem/1.45 ui-monospace, "DejaVu Sans Mono", monospace; }
 footer { margin-top: 3rem; color: var(--c5b6775); font-size: .85rem; overflow-wrap: anywhere; }
-@page { size: A4; margin: 16mm 16mm 18mm; @bottom-right { content: counter(page) " / " counter(pages); font-size: 8pt; } }
+@page { size: A4; margin: 16mm 16mm 18mm;
+  @bottom-right { content: counter(page) " / " counter(pages); font-size: 8pt; } }
 @media print {
   body { padding: 0; max-width: none; font-size: 9.5pt; line-height: 1.4; }
   nav { display: none; }

@@ -61,7 +61,13 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     at, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - half, value + half)])
     axes.fill_between(at, low[:, 0], high[:, 0], color=look.run, alpha=0.22, linewidth=0, gid="bound")
     axes.plot(at, middle[:, 0], color=look.run, linewidth=1.2, gid="value")
-    axes.set_title(shortened((f"{name} in {unit}" if unit else name).replace("_", " "), 60), loc="left", size=10, color=look.ink, pad=4)
+    axes.set_title(
+        shortened((f"{name} in {unit}" if unit else name).replace("_", " "), 60),
+        loc="left",
+        size=10,
+        color=look.ink,
+        pad=4,
+    )
     axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
     axes.locator_params(axis="y", nbins=5)
     axes.margins(x=0.01)

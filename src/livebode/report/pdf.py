@@ -13,13 +13,22 @@ from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
-from reportlab.platypus import BaseDocTemplate, CondPageBreak, Flowable, Frame, KeepTogether, PageTemplate, Spacer, XPreformatted
+from reportlab.platypus import (
+    BaseDocTemplate,
+    CondPageBreak,
+    Flowable,
+    Frame,
+    KeepTogether,
+    PageTemplate,
+    Spacer,
+    XPreformatted,
+)
 from reportlab.platypus import Paragraph as Words
 from reportlab.platypus import Table as Grid
 
 from livebode.nouns.document import Document, Listing, Paragraph, Part, Picture, Section, Table
 from livebode.report.figures import WIDTH_IN, drawn
-from livebode.report.html import TONES, readable
+from livebode.report.html import readable
 from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, draw_on, register_fonts
 from livebode.report.style import LIGHT
 
@@ -43,7 +52,7 @@ def save_pdf(document: Document, path: Path) -> None:
     template = _Pages(document, path)
     flow: list[Flowable] = [
         _words(document.kind, _KIND), _words(document.title, _TITLE), _facts(document), Spacer(0, 4 * mm),
-        _words("What holds, and what does not", _HEADING), _verdict(document),
+        _words(document.asked, _HEADING), _verdict(document),
     ]  # fmt: skip
     for section in document.sections:
         flow += _section(section)
@@ -160,7 +169,7 @@ def _verdict(document: Document) -> Grid:
     rows = []
     for finding in document.verdict:
         tone = _style("tone", 8, fontName=BOLD, textColor=HexColor(_TONE[finding.tone]))
-        rows.append([_words(TONES[finding.tone], tone), _words(finding.text, _BODY)])
+        rows.append([_words(document.tones[finding.tone], tone), _words(finding.text, _BODY)])
     return Grid(rows, colWidths=[0.16 * _WIDTH, 0.84 * _WIDTH], style=_LINES, hAlign="LEFT")
 
 

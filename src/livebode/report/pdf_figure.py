@@ -1,7 +1,7 @@
 """A Matplotlib figure drawn with a PDF page's own strokes and letters.
 
 ReportLab takes neither SVG nor pages of another PDF; svglib, which reads SVG, knows no clip paths and would be one more
-dependency, and pixels at 200 dpi are five times as large and coarse under a magnifier. Matplotlib asks of a backend only
+dependency; pixels at 200 dpi are coarse under a magnifier and hold no text to search. Matplotlib asks of a backend only
 to draw a path, an image and a text, so the shortest way keeps all lines sharp and all text searchable: draw on
 ReportLab's canvas.
 """
@@ -50,7 +50,8 @@ def draw_on(canvas: Canvas, figure: Figure) -> None:
     vector = _OnCanvas(canvas, 72 * width_in, 72 * height_in)
     try:
         with drawing(LIGHT), quiet_about_letters():
-            figure.draw(MixedModeRenderer(figure, width_in, height_in, _RASTER_DPI, vector))
+            mixed: Any = MixedModeRenderer(figure, width_in, height_in, _RASTER_DPI, vector)  # type: ignore[no-untyped-call]
+            figure.draw(mixed)
     finally:
         figure.dpi = before
 
@@ -71,7 +72,7 @@ class _OnCanvas(RendererBase):
     def flipy(self) -> bool:
         return False
 
-    def draw_path(self, gc: Any, path: Curve, transform: Any, rgbFace: Any = None) -> None:  # noqa: N803
+    def draw_path(self, gc: Any, path: Curve, transform: Any, rgbFace: Any = None) -> None:
         canvas = self._canvas
         fill = rgbFace is not None and _alpha(gc, rgbFace) > 0
         stroke = gc.get_linewidth() > 0 and (len(gc.get_rgb()) < 4 or gc.get_rgb()[3] > 0)
@@ -104,7 +105,7 @@ class _OnCanvas(RendererBase):
         self._canvas.restoreState()
 
     def draw_text(
-        self, gc: Any, x: float, y: float, s: str, prop: Any, angle: float, ismath: Any = False, mtext: Any = None
+        self, gc: Any, x: float, y: float, s: str, prop: Any, angle: float, *_args: Any, **_options: Any
     ) -> None:
         canvas = self._canvas
         canvas.saveState()

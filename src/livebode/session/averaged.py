@@ -69,7 +69,14 @@ def averaged(run: Run) -> Averaged:
         one = counted.newest
         words = f"the average up to {one.time_s:.6g} s"
     found = Averaged(
-        one, words, overview.responses(), counted.rows, counted.valid, counted.incomplete, counted.spans_s, counted.spans
+        one,
+        words,
+        overview.responses(),
+        counted.rows,
+        counted.valid,
+        counted.incomplete,
+        counted.spans_s,
+        counted.spans,
     )
     if not found.moved:
         return found

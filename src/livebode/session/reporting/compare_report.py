@@ -24,6 +24,7 @@ _TEST = (
     "5 % for all {m} together (Bonferroni). Two runs of the same machine are told apart at any line no more often than "
     "that. σ is of the scatter between windows, degrees of freedom by Welch and Satterthwaite."
 )
+_TONES = {"good": "same", "look": "look at it", "bad": "differs", "open": "not known"}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
 
 
@@ -48,17 +49,22 @@ class Comparison:
         findings = [Finding("look", text) for text in self.found.warnings]
         if overall.differs.any():
             worst = int(np.nanargmin(overall.p))
+            verb = "differs" if overall.differs.sum() == 1 else "differ"
             db, around, deg, turned = polar(complex(overall.ratio[worst]), float(overall.bound[worst]))
-            words = f"{many(int(overall.differs.sum()), 'line')} of {overall.m} differ: {_hz(f[overall.differs])}. "
+            words = f"{many(int(overall.differs.sum()), 'line')} of {overall.m} {verb}: {_hz(f[overall.differs])}. "
             words += f"Surest at {f[worst]:g} Hz: {_signed(db)} ± {around} dB, {_signed(deg)} ± {turned}°."
             findings.append(Finding("bad", words))
         else:
-            findings.append(Finding("good", f"No line differs more than chance makes it ({overall.m} tested together)."))
+            findings.append(
+                Finding("good", f"No line differs more than chance makes it ({overall.m} tested together).")
+            )
         if places:
             there = [p for p in places if p.difference.differs.any()]
             count = sum(int(p.difference.differs.sum()) for p in there)
-            words = f"Place by place {many(count, 'line')} of {places[0].difference.m} differ, at {len(there)} of "
-            words += f"{many(len(places), 'place')} (each way counts for itself)."
+            words = (
+                f"Place by place {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
+            )
+            words += f"of {many(len(places), 'place')} (each way counts for itself)."
             findings.append(Finding("bad" if there else "good", words))
         for what, table in (("parameter", self.changes.parameters), ("margin", self.changes.margins)):
             moved = [c for c in table if c.significant]
@@ -117,12 +123,17 @@ class Comparison:
         )  # fmt: skip
         sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
         there = tuple(section for section in sections if section is not None)
-        return Document("Before and after", title, rows, self.sentences, there, f"{title} · livebode")
+        return Document(
+            "Before and after", title, rows, self.sentences, there, f"{title} · livebode",
+            "What changed, and what did not", _TONES,
+        )  # fmt: skip
 
     def _response(self) -> Section:
         d = self.found.overall
         how = "means over the common places, each place counted alike" if self.found.places else "means of the runs"
-        caption = f"Before and after: {how}, with 95 % bounds. Below: after over before, with the bound that holds with "
+        caption = (
+            f"Before and after: {how}, with 95 % bounds. Below: after over before, with the bound that holds with "
+        )
         caption += f"95 % at all {d.m} lines together; full marks differ."
         picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
                                          "differs": d.differs}, caption)  # fmt: skip
@@ -146,7 +157,9 @@ class Comparison:
         places = self.found.places
         if not places:
             return None
-        caption = "Change of the magnitude at each place and line, going forth and going back; dots mark those that differ."
+        caption = (
+            "Change of the magnitude at each place and line, going forth and going back; dots mark those that differ."
+        )
         data = {
             "frequency_hz": self.found.overall.before.lines.frequency_hz,
             "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
@@ -176,7 +189,7 @@ class Comparison:
         ):
             parts += [Paragraph(words)] if words else []
             if table:
-                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "change %", "changed")
+                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "sure")
                 parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), _NOTE))
         return Section("Parameters and margins", tuple(parts))
 
@@ -196,7 +209,7 @@ _NOTE = "± of before and after holds 95 % each, ± of the change for the whole 
 
 def _settings(before: Run, after: Run) -> Section:
     """What differs in the configurations."""
-    one, other = ({line for line in _flat(said(run.summary))} for run in (before, after))
+    one, other = (set(_flat(said(run.summary))) for run in (before, after))
     rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
     if not rows:
         return Section("Settings", (Paragraph("Both runs were made with the same settings."),))

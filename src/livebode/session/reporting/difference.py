@@ -12,6 +12,8 @@ from livebode.fitting import RunningMean
 from livebode.nouns import InputError, Lines, Response, Responses, widened
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
+from livebode.session.axis import TrackingSection
+from livebode.session.said import said
 
 Floats = NDArray[np.float64]
 
@@ -137,7 +139,7 @@ def compare(before: Run, after: Run) -> Compared:
         for (i, back), (a, b) in zip(shared, pairs)
     )
     together = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
-    return Compared((before, after), both, Difference.of(*together), places, tuple(warnings))
+    return Compared((before, after), both, Difference.of(together[0], together[1]), places, tuple(warnings))
 
 
 def _refuse(before: Run, after: Run) -> None:
@@ -158,7 +160,7 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
     if not first.size:
         raise InputError(
             f"the runs have no line in common: {f[0]:g} … {f[-1]:g} Hz on a grid of {before.resolution_hz:g} Hz, and "
-            f"{g[0]:g} … {g[-1]:g} Hz on one of {after.resolution_hz:g} Hz; track one of them again at the other's lines"
+            f"{g[0]:g} … {g[-1]:g} Hz on one of {after.resolution_hz:g} Hz; track one again at the other's lines"
         )
     bins = tuple(before.bins[i] for i in first)
     return Lines(bins, before.window, before.rate_hz), (first, nearest[first])
@@ -166,21 +168,24 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
 
 def _about(before: Run, after: Run, common: int) -> list[str]:
     """What in the settings makes two responses differ though the machine does not."""
-    said = []
+    words = []
     if common < max(len(before.lines), len(after.lines)):
-        said.append(f"The runs share {common} of {len(before.lines)} and {len(after.lines)} lines; these are compared.")
-    one, other = (run.summary.get("configuration", {}).get("tracking", {}) for run in (before, after))
-    for key, what in (("estimator", "estimators"), ("hann", "windows"), ("differenced", "differencing")):
-        if one.get(key) != other.get(key):
-            said.append(f"Different {what} ({one.get(key)} and {other.get(key)}) may make a difference of their own.")
-    if before.lines.rate_hz != after.lines.rate_hz:
-        said.append(
-            f"The rates differ ({before.lines.rate_hz:g} and {after.lines.rate_hz:g} Hz), and with them the hold's delay "
-            "that is in every response."
+        words.append(
+            f"The runs share {common} of {len(before.lines)} and {len(after.lines)} lines; these are compared."
         )
-    if ("motion" in (before.found or {})) != ("motion" in (after.found or {})):
-        said.append("Only one of the runs is freed from the axis's motion.")
-    return said
+    one, other = (said(run.summary).get("tracking", {}) for run in (before, after))
+    for key, what in (("estimator", "estimators"), ("hann", "windows"), ("differenced", "differencing")):
+        usual = getattr(TrackingSection(), key)
+        if (a := one.get(key, usual)) != (b := other.get(key, usual)):
+            words.append(f"Different {what} ({a} and {b}) may make a difference of their own.")
+    if before.lines.rate_hz != after.lines.rate_hz:
+        words.append(
+            f"The rates differ ({before.lines.rate_hz:g} and {after.lines.rate_hz:g} Hz), and with them the delay of "
+            "the hold that is in every response."
+        )
+    if ("motion" in before.found) != ("motion" in after.found):
+        words.append("Only one of the runs is freed from the axis's motion.")
+    return words
 
 
 def _averages(run: Run) -> bool:
@@ -198,8 +203,8 @@ def _overlap(both: tuple[Averaged, Averaged], span: tuple[float, float]) -> list
     fast = [float(np.median(s)) if s.size else 0.0 for s in speeds]
     if max(fast) > (1 + _SPEEDS_APART) * min(fast):
         said.append(
-            f"The runs went at different speeds (typically {fast[0]:.3g} and {fast[1]:.3g} a second), and a response in "
-            "motion depends on it: what differs may be the speed."
+            f"The runs went at different speeds (typically {fast[0]:.3g} and {fast[1]:.3g} a second), and a response "
+            "in motion depends on it: what differs may be the speed."
         )
     return said
 
@@ -208,7 +213,7 @@ def _speeds(of: Responses) -> Floats:
     with np.errstate(all="ignore"):
         speed = np.abs(np.diff(of.schedule) / np.diff(of.time_s))
     speed = speed[np.isfinite(speed)]
-    return speed[speed > 0.1 * np.max(speed, initial=0.0)]
+    return np.asarray(speed[speed > 0.1 * np.max(speed, initial=0.0)])
 
 
 def _by_place(run: Run, span: tuple[float, float]) -> dict[tuple[int, bool], Responses]:

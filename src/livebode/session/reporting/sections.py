@@ -43,9 +43,7 @@ def response(of: Material) -> Section:
         f"Bars: {of.of.words}, with 95 % bounds. Light: what 5–95 % of the single responses span"
         f"{_thinned(of)}.{' Dashed: the ' + of.fit.model.name + ' model fitted to it.' if of.fit else ''}"
     )
-    picture = Picture(
-        "bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption
-    )
+    picture = Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
     frequency = one.lines.frequency_hz
     rows = [
         (f"{f:g}", *polar, f"{c:.4f}" if isfinite(c) else "—", share(n, of.of.count))
@@ -92,7 +90,9 @@ def parameters(of: Material) -> Section | str:
     headings = ("", "of the mean", "±", f"newest, at {seconds(at)}" if newest else "newest", "±", "unit")
     if of.fit is not None:
         low, high = of.fit.band_hz
-        words = f"The {of.fit.model.name} model, fitted to {of.fit_words}, at {many(of.fit.lines, 'line')} from {low:g} "
+        words = (
+            f"The {of.fit.model.name} model, fitted to {of.fit_words}, at {many(of.fit.lines, 'line')} from {low:g} "
+        )
         words += f"to {high:g} Hz. It lacks ε = {100 * of.fit.epsilon:.2g} % of |G|"
         words += f"; reduced χ² {of.fit.chi2:.3g} by sigma alone." if isfinite(of.fit.chi2) else "."
         parts.append(Paragraph(words))
@@ -121,7 +121,9 @@ def margins(of: Material) -> Section | str:
     note = f"± holds 95 % of noise. At the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
     note += f"(at {at_hz:g} Hz). Tuning {of.loop.tuning.verdict}: {of.loop.tuning.sentence}"
     table = Table(("", "", "±", "unit", "at Hz", "read"), tuple(rows), (1, 2, 4), note)
-    caption = "Open loop L by the fit with its 95 % band, and the measured lines; right: near −1, with the circle of Ms."
+    caption = (
+        "Open loop L by the fit with its 95 % band, and the measured lines; right: near −1, with the circle of Ms."
+    )
     parts: list[Part] = [table, Picture("loop", {"found": of.loop}, caption)]
     if MARGINS in of.tracks and _moving(of.tracks[MARGINS]):
         parts.append(_over_time(of, of.tracks[MARGINS], "Margins"))
@@ -230,4 +232,3 @@ def _plain(value: Any) -> str:
     if value is None:
         return ""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-

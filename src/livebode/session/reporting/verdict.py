@@ -44,7 +44,8 @@ def _alarms(of: Material) -> list[Finding]:
     return [Finding("bad" if standing else "look", message), *(Finding("bad", text) for text in latest)]
 
 
-def _alarms_so_far(of: Material) -> str:
+def alarms_so_far(of: Material) -> str:
+    """What is known of changes where run.json does not say it."""
     if of.run.finished:
         return "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
     came, went = of.happenings.count("change"), of.happenings.count("change-cleared")
@@ -59,9 +60,11 @@ def _record(of: Material) -> list[Finding]:
         found.append(
             Finding("look", "The run is not finished: it is still being recorded, or was stopped; this is what it has.")
         )
-    for event in of.happenings.early + list(of.happenings.late):
-        if event.kind == "doubtful":
-            found.append(Finding("bad", f"The signals do not hold what they should: {event.message}."))
+    found += [
+        Finding("bad", f"The signals do not hold what they should: {event.message}.")
+        for event in (*of.happenings.early, *of.happenings.late)
+        if event.kind == "doubtful"
+    ]
     lost = of.happenings.count("record-paused")
     if lost:
         found.append(Finding("look", f"The record paused {lost} times because the disk took nothing."))
