@@ -37,7 +37,7 @@ _WIDTH = A4[0] - 2 * _MARGIN
 _HEIGHT_MAX = A4[1] - 90 * mm  # of a picture with its caption below a heading
 _TONE = {"good": "#00734d", "look": "#8a5a00", "bad": "#b3261e", "open": "#5b6775"}
 _LETTERS = 105  # of a listing's line
-_CELL = 1200  # letters
+_CELL_LINES = 40  # of a table: a cell does not go on over pages
 
 
 def save_pdf(document: Document, path: Path) -> None:
@@ -156,21 +156,27 @@ def _words(text: str, style: ParagraphStyle) -> Words:
     return Words(escape(readable(text), quote=False), style)
 
 
+def _cell(text: str, style: ParagraphStyle, width: float) -> Words:
+    letters = int(_CELL_LINES * width / (0.65 * style.fontSize))
+    return _words(text if len(text) <= letters else f"{text[:letters]} …", style)
+
+
 def _facts(document: Document) -> Grid:
     half = -(-len(document.facts) // 2)
-    cells = [[_words(name, _NAME), _words(value, _CELLS)] for name, value in document.facts]
+    widths = [0.14 * _WIDTH, 0.36 * _WIDTH]
+    cells = [[_cell(name, _NAME, widths[0]), _cell(value, _CELLS, widths[1])] for name, value in document.facts]
     blank = [_words("", _NAME), _words("", _CELLS)]
     left, right = cells[:half], cells[half:] + [blank] * (2 * half - len(cells))
     rows = [a + b for a, b in zip(left, right)]
-    return Grid(rows, colWidths=[0.14 * _WIDTH, 0.36 * _WIDTH] * 2, style=_LINES, hAlign="LEFT")
+    return Grid(rows, colWidths=widths * 2, style=_LINES, hAlign="LEFT")
 
 
 def _verdict(document: Document) -> Grid:
-    rows = []
+    rows, widths = [], [0.16 * _WIDTH, 0.84 * _WIDTH]
     for finding in document.verdict:
         tone = _style("tone", 8, fontName=BOLD, textColor=HexColor(_TONE[finding.tone]))
-        rows.append([_words(document.tones[finding.tone], tone), _words(finding.text, _BODY)])
-    return Grid(rows, colWidths=[0.16 * _WIDTH, 0.84 * _WIDTH], style=_LINES, hAlign="LEFT")
+        rows.append([_words(document.tones[finding.tone], tone), _cell(finding.text, _BODY, widths[1])])
+    return Grid(rows, colWidths=widths, style=_LINES, hAlign="LEFT")
 
 
 _LINES = [
@@ -203,17 +209,18 @@ def _part(part: Part) -> list[Flowable]:
 
 
 def _table(table: Table) -> list[Flowable]:
-    def row(texts: tuple[str, ...], style: ParagraphStyle, number: ParagraphStyle) -> list[Words]:
-        return [_words(t[:_CELL], number if i in table.numbers else style) for i, t in enumerate(texts)]
+    widths, titled = _widths(table), any(table.headings)
 
-    titled = any(table.headings)
+    def row(texts: tuple[str, ...], style: ParagraphStyle, number: ParagraphStyle) -> list[Words]:
+        return [_cell(t, number if i in table.numbers else style, widths[i]) for i, t in enumerate(texts)]
+
     rows = [row(table.headings, _HEAD, _HEAD_NUMBER)] if titled else []
     rows += [row(texts, _CELLS, _NUMBER) for texts in table.rows]
     if not titled:
         for cells, texts in zip(rows, table.rows):
-            cells[0] = _words(texts[0], _NAME)
+            cells[0] = _cell(texts[0], _NAME, widths[0])
     ruled = [*_LINES, ("LINEBELOW", (0, 0), (-1, 0), 0.8, _MUTED)] if titled else _LINES
-    grid = Grid(rows, colWidths=_widths(table), style=ruled, repeatRows=int(titled), splitInRow=1, hAlign="LEFT")
+    grid = Grid(rows, colWidths=widths, style=ruled, repeatRows=int(titled), splitInRow=1, hAlign="LEFT")
     return [grid, _words(table.note, _NOTE) if table.note else Spacer(0, 3 * mm)]
 
 

@@ -73,21 +73,33 @@ class _OnCanvas(RendererBase):
         return False
 
     def draw_path(self, gc: Any, path: Curve, transform: Any, rgbFace: Any = None) -> None:
+        # Lines that leave the page are cut there: PDF readers err on coordinates in the millions.
+        page = None if rgbFace is not None else (0.0, 0.0, self.width, self.height)
+        simplify = False if rgbFace is not None else None
+        self._paint(gc, rgbFace, path.iter_segments(transform, clip=page, simplify=simplify))
+
+    def draw_markers(
+        self, gc: Any, marker_path: Curve, marker_trans: Any, path: Curve, trans: Any, rgbFace: Any = None
+    ) -> None:
+        """All of them as one shape: thousands of single ones would take seconds."""
+        one = [(np.asarray(points), code) for points, code in marker_path.iter_segments(marker_trans, simplify=False)]
+        at = [points[-2:] for points, _ in path.iter_segments(trans, simplify=False)]
+        inside = [p for p in at if -9 < p[0] < self.width + 9 and -9 < p[1] < self.height + 9]
+        self._paint(gc, rgbFace, ((points + np.resize(p, points.size), code) for p in inside for points, code in one))
+
+    def _paint(self, gc: Any, face: Any, segments: Any) -> None:
         canvas = self._canvas
-        fill = rgbFace is not None and _alpha(gc, rgbFace) > 0
+        fill = face is not None and _alpha(gc, face) > 0
         stroke = gc.get_linewidth() > 0 and (len(gc.get_rgb()) < 4 or gc.get_rgb()[3] > 0)
         if not (fill or stroke):
             return
         canvas.saveState()
         self._clip(gc)
         if fill:
-            canvas.setFillColorRGB(*(float(c) for c in rgbFace[:3]), alpha=_alpha(gc, rgbFace))
+            canvas.setFillColorRGB(*(float(c) for c in face[:3]), alpha=_alpha(gc, face))
         if stroke:
             _set_stroke(canvas, gc)
-        # Lines that leave the page are cut there: PDF readers err on coordinates in the millions.
-        page = None if fill else (0.0, 0.0, self.width, self.height)
-        shape = _shape(canvas, path.iter_segments(transform, clip=page, simplify=False if fill else None))
-        canvas.drawPath(shape, stroke=int(stroke), fill=int(fill), fillMode=1)
+        canvas.drawPath(_shape(canvas, segments), stroke=int(stroke), fill=int(fill), fillMode=1)
         canvas.restoreState()
 
     def draw_image(self, gc: Any, x: float, y: float, im: Any, transform: Any = None) -> None:

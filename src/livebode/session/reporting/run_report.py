@@ -13,7 +13,7 @@ from livebode.session.reporting.verdict import verdict
 from livebode.session.reporting.wording import duration, seconds
 
 _SECTIONS = (
-    how, sections.response, sections.tracking, sections.parameters, sections.margins, sections.events,
+    how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
     sections.quality, sections.validation, sections.settings, sections.versions,
 )  # fmt: skip
 

@@ -103,6 +103,20 @@ def parameters(of: Material) -> Section | str:
     return Section("Parameters", tuple(parts))
 
 
+def motion(of: Material) -> Section | None:
+    """The model that moved as the axis did; None where the run was not freed from its motion."""
+    model = of.run.found.get("motion", {}).get("model")
+    if model is None:
+        return None
+    words = (
+        f"The newest chunk's model: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg; on the way:"
+    )
+    columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
+    rows = tuple((f"{x:.4g}", f"{k:.5g}", f"{b:.4g}") for x, k, b in columns)
+    table = Table(("position in m", "Keff in N/m", "bs in N s/m"), rows, (0, 1, 2))
+    return Section("Motion", (Paragraph(words), table))
+
+
 def margins(of: Material) -> Section | str:
     """The loop's margins, with bounds, and where they were read."""
     if of.loop is None:
