@@ -106,7 +106,8 @@ class Run:
             if reading.in_segments(self.path):
                 yield from reading.tables(self.path, name, size_bytes_max, finished=self.finished)
             elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
-                with pq.ParquetFile(file) as parquet:
+                # Else what was read ahead of a long run stays in memory until its end.
+                with pq.ParquetFile(file, pre_buffer=False) as parquet:
                     yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None

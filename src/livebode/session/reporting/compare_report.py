@@ -20,9 +20,10 @@ from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, 
 from livebode.session.said import said
 
 _TEST = (
-    "A line differs where |G₂ − G₁|²/(σ₁² + σ₂²) is larger than chance makes it with a probability of {alpha:.2g}: "
-    "5 % for all {m} together (Bonferroni). Two runs of the same machine are told apart at any line no more often than "
-    "that. σ is of the scatter between windows, degrees of freedom by Welch and Satterthwaite."
+    "A line differs where |G₂ − G₁|² over the variance of both means is larger than chance makes it with a probability "
+    "of {alpha:.2g}: 5 % for all {m} together (Bonferroni). Two runs of the same machine are told apart at any line no "
+    "more often than that. The variance is of the scatter between windows, its degrees of freedom are Welch's and "
+    "Satterthwaite's."
 )
 _TONES = {"good": "same", "look": "look at it", "bad": "differs", "open": "not known"}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40

@@ -31,7 +31,7 @@ _MARGINS = {
     "bandwidth": "bandwidth",
 }
 _LINES_SHOWN = 60
-_PANELS = 8
+_PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses that these can show
 _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and as many responses as these can show
 
 
@@ -64,8 +64,7 @@ def tracking(of: Material) -> Section:
     shown = of.of.overview
     if len(shown.lines) <= _TRACES_MAX:
         shown = shown[:: -(-len(shown) // _TRACED)]
-    thinned = f" (thinned: {len(shown):,} of {of.of.count:,} responses are drawn)" if len(shown) < of.of.count else ""
-    caption = f"Magnitude at each line over time{where}, with 99.7 % bounds{thinned}."
+    caption = f"Magnitude at each line over time{where}, with 99.7 % bounds{_drawn(of, len(shown))}."
     data = {"responses": shown, "schedule_name": of.channels.get("schedule", "")}
     return Section("Tracking", (Picture("tracking", data, caption),))
 
@@ -220,11 +219,13 @@ def versions(of: Material) -> Section:
 def _over_time(of: Material, track: Track, what: str) -> Picture:
     names = [name for name in track.values if np.isfinite(track.values[name]).any() and track.newest[name].sigma > 0]
     shown = [name for name in names if not name.endswith("_frequency")][:_PANELS]
+    every = slice(None, None, -(-len(track.time_s) // _CURVES))
+    time_s = track.time_s[every]
     data = {
-        "time_s": track.time_s,
-        "curves": [(n, track.newest[n].unit, track.values[n], 1.96 * track.sigmas[n]) for n in shown],
+        "time_s": time_s,
+        "curves": [(n, track.newest[n].unit, track.values[n][every], 1.96 * track.sigmas[n][every]) for n in shown],
     }
-    return Picture("parameters", data, f"{what} over time, with 95 % bounds{_thinned(of)}.")
+    return Picture("parameters", data, f"{what} over time, with 95 % bounds{_drawn(of, len(time_s))}.")
 
 
 def _moving(track: Track) -> bool:
@@ -232,7 +233,10 @@ def _moving(track: Track) -> bool:
 
 
 def _thinned(of: Material) -> str:
-    kept = len(of.of.overview)
+    return _drawn(of, len(of.of.overview))
+
+
+def _drawn(of: Material, kept: int) -> str:
     return f" (thinned: {kept:,} of {of.of.count:,} responses are drawn)" if kept < of.of.count else ""
 
 

@@ -14,6 +14,7 @@ from livebode.session.reporting.wording import many, share
 _URGENT = {"bad": 0, "look": 1, "open": 2, "good": 3}
 _INVALID_MANY = 0.05
 _STANDING = 5
+_EPSILON_LARGE = 0.1
 # Usual in motion control: below them a loop rings.
 _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
 _TRUSTED = {"passes": "good", "small error": "good", "fails": "bad", "cannot be judged": "open"}
@@ -99,7 +100,10 @@ def _fits(of: Material) -> list[Finding]:
     if of.fit is None:
         return [Finding("bad", of.fit_words)] if "fit" in of.configuration else []
     lacks = f"it lacks ε = {100 * of.fit.epsilon:.2g} % of |G|"
-    found = [Finding("good", f"The {of.fit.model.name} model fits the run's average: {lacks}.")]
+    rough = of.fit.epsilon > _EPSILON_LARGE
+    if rough and of.of.moved:
+        lacks += "; the axis moved, and one model of its mean cannot hold: read the fits along the run"
+    found = [Finding("look" if rough else "good", f"The {of.fit.model.name} model fits the run's average: {lacks}.")]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
