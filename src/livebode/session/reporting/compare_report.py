@@ -55,6 +55,8 @@ class Comparison:
             words = f"{many(int(overall.differs.sum()), 'line')} of {overall.m} {verb}: {_hz(f[overall.differs])}. "
             words += f"Surest at {f[worst]:g} Hz: {_signed(db)} ± {around} dB, {_signed(deg)} ± {turned}°."
             findings.append(Finding("bad", words))
+        elif not np.isfinite(overall.p).any():
+            findings.append(Finding("open", "At no line both runs have a valid mean with a known sigma."))
         else:
             findings.append(
                 Finding("good", f"No line differs more than chance makes it ({overall.m} tested together).")
@@ -73,7 +75,7 @@ class Comparison:
             words = f"{many(len(moved), what)} of {len(table)} changed: {listed}." if moved else f"No {what} changed."
             if table:
                 findings.append(Finding("bad" if moved else "good", words))
-        return tuple(sorted(findings, key=lambda finding: ("bad", "look", "good").index(finding.tone)))
+        return tuple(sorted(findings, key=lambda finding: ("bad", "look", "open", "good").index(finding.tone)))
 
     @property
     def tables(self) -> tuple[str, ...]:
