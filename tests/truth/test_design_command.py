@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from livebode import Lines, open_log
+from livebode import InputError, Lines, open_log
 from livebode.design import Waveform, choose, write
 from livebode.excitation import multisine
 from livebode.records import Run
@@ -18,6 +18,7 @@ from livebode.report import save_excitation_picture
 from livebode.session.experiment import Experiment
 from livebode.simulation import SimulatedAxis
 from tests.command import livebode, write_parquet
+from tests.structured_text import Machine
 
 ROOT = Path(__file__).parents[2]
 BELT = """
@@ -175,6 +176,23 @@ int main(void) {{
     assert np.array_equal(np.array(printed[:400], dtype=np.float64), waveform.samples.astype(dtype).astype(np.float64))
     assert tuple(map(int, printed[400:407])) == waveform.lines.bins
     assert float(printed[407]) == 4000
+
+
+def test_structured_text_plays_the_period_to_the_bit_and_names_its_seed(tmp_path):
+    lines = Lines((1, 3, 7), 40, 1000.0)
+    waveform = Waveform(lines, multisine(lines, 0.3, "random", seed=7), {"seed": 7, "note": "ends a comment *) or not"})
+    write(tmp_path / "belt_w.st", waveform, "belt_w")
+    text = (tmp_path / "belt_w.st").read_text()
+    block = Machine(text).instance("FB_belt_w")
+    played = []
+    for _ in range(6 * 40):
+        block(enable=True)
+        played.append(block["w"])
+    assert np.array_equal(played[-80:], np.tile(waveform.samples, 2))
+    assert "seed: 7" in text
+    with pytest.raises(InputError, match="belt__w"):
+        write(tmp_path / "bad.st", waveform, "belt__w")
+    assert not (tmp_path / "bad.st").exists()
 
 
 def test_the_seed_in_a_file_makes_the_same_file_again(tmp_path):

@@ -12,6 +12,7 @@ from livebode.design import FORMATS, Design, axis_text, choose, write
 from livebode.nouns import InputError
 from livebode.records import to_json
 from livebode.session.experiment import Experiment
+from livebode.structured_text import PERIOD_MAX
 
 _MARK = "design.json"
 Picture = Callable[[Design, Path], None]
@@ -51,8 +52,8 @@ def design_experiment(
         If nothing can be chosen (see `choose`), a format is not known or forbids the name, something stands in the
         directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
     """
-    kinds = tuple(FORMATS) if suffixes is None else tuple(f".{s.lstrip('.')}" for s in suffixes)
-    for kind in kinds:
+    kinds = None if suffixes is None else tuple(f".{s.lstrip('.')}" for s in suffixes)
+    for kind in kinds or ():
         if kind not in FORMATS:
             raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
     _check_free(directory, force)
@@ -63,7 +64,7 @@ def design_experiment(
         with TemporaryDirectory(prefix=f".{directory.name[:100]}.partial-", dir=directory.parent) as folder:
             partial = Path(folder) / "whole"
             partial.mkdir()
-            for kind in kinds:
+            for kind in kinds or _all_that_hold(lines.window):
                 write(partial / f"{name}{kind}", design.waveform, name)
             configuration = axis_text(
                 design,
@@ -84,6 +85,11 @@ def design_experiment(
     except OSError as error:
         raise InputError(f"{str(directory)!r} could not be written: {error.strerror}; nothing was left there") from None
     return Designed(design, directory, files)
+
+
+def _all_that_hold(window: int) -> list[str]:
+    """The formats for one that names none: a PLC's compiler takes no period of any length."""
+    return [kind for kind in FORMATS if kind != ".st" or window <= PERIOD_MAX]
 
 
 def _check_free(directory: Path, force: bool) -> None:

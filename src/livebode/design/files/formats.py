@@ -9,6 +9,7 @@ from pathlib import Path
 from livebode.design.files.arrays import write_mat, write_npz
 from livebode.design.files.c_header import write_c_header
 from livebode.design.files.delimited import write_csv
+from livebode.design.files.structured_text import write_st
 from livebode.design.waveform import Waveform
 from livebode.nouns import InputError
 
@@ -17,6 +18,7 @@ FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
     ".npz": write_npz,
     ".mat": write_mat,
     ".h": write_c_header,
+    ".st": write_st,
 }
 """What writes an excitation under a name, by the suffix of the file. A further format is a function and a row here."""
 
