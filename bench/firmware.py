@@ -69,3 +69,17 @@ def run(*command: object, cwd: Path | None = None) -> str:
     if done.returncode:
         raise RuntimeError(f"exit code {done.returncode}: {' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
     return done.stdout
+
+
+def kept(core: Core, objects: list[Path], names: tuple[str, ...], file: Path) -> Path:
+    """One object of what these functions need, and nothing else."""
+    wanted = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
+    run("arm-none-eabi-gcc", *core.flags, "-nostdlib", "-r", "-Wl,--gc-sections", *wanted, *objects, "-o", file)
+    return file
+
+
+def undefined(file: Path) -> set[str]:
+    """Symbols that the code of an object leaves to others; the linker keeps the names of what it threw away."""
+    named = {line.split()[-1] for line in run("arm-none-eabi-nm", "-u", file).splitlines()}
+    used = {line.split()[2] for line in run("arm-none-eabi-objdump", "-r", file).splitlines() if " R_ARM_" in line}
+    return named & used
