@@ -78,6 +78,14 @@ def kept(core: Core, objects: list[Path], names: tuple[str, ...], file: Path) ->
     return file
 
 
+def flash(core: Core, objects: list[Path], names: tuple[str, ...], program: Path) -> int:
+    """Bytes of code and constants that these functions need, with those of libgcc."""
+    wanted = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
+    options = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,0", *wanted)
+    run("arm-none-eabi-gcc", *core.flags, *options, *objects, "-lgcc", "-o", program)
+    return int(run("arm-none-eabi-size", program).splitlines()[1].split()[0])
+
+
 def undefined(file: Path) -> set[str]:
     """Symbols that the code of an object leaves to others; the linker keeps the names of what it threw away."""
     named = {line.split()[-1] for line in run("arm-none-eabi-nm", "-u", file).splitlines()}

@@ -1,8 +1,6 @@
 #include "semihosting.h"
 
-#include <stdint.h>
-
-enum { SYS_OPEN = 0x01, SYS_WRITE = 0x05, SYS_READ = 0x06, SYS_EXIT_EXTENDED = 0x20 };
+enum { SYS_OPEN = 0x01, SYS_WRITE = 0x05, SYS_READ = 0x06, SYS_TIME = 0x11, SYS_EXIT_EXTENDED = 0x20 };
 #define APPLICATION_EXIT 0x20026u
 
 static int call(int operation, const void *arguments)
@@ -35,6 +33,8 @@ int host_write(int handle, const void *from, size_t bytes)
     const uint32_t arguments[3] = {(uint32_t)handle, (uint32_t)from, bytes};
     return call(SYS_WRITE, arguments) == 0;
 }
+
+uint32_t host_time_s(void) { return (uint32_t)call(SYS_TIME, 0); }
 
 void host_exit(int code)
 {

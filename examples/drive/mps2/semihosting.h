@@ -3,6 +3,7 @@
 #define SEMIHOSTING_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 enum { HOST_READ = 1, HOST_WRITE = 5 }; /* rb, wb */
 
@@ -12,6 +13,9 @@ int host_open(const char *name, int mode);
 /* Whether all of it was read or written. */
 int host_read(int handle, void *to, size_t bytes);
 int host_write(int handle, const void *from, size_t bytes);
+
+/* Seconds since 1970. */
+uint32_t host_time_s(void);
 
 __attribute__((noreturn)) void host_exit(int code);
 

@@ -1,4 +1,5 @@
-/* Counts instructions on the target and writes a table to the host's counted.txt: what, value. */
+/* Counts instructions on the target, in two windows of samples, and writes a table to the host's counted.txt: for
+ * loops of known length turns and count; for each step the total and the worst; bytes of RAM in all and in delay lines. */
 #include "count.h"
 #include "livebode/sdft.h"
 #include "rls.h"
@@ -38,13 +39,12 @@ static void say_number(uint32_t number)
     say(at);
 }
 
-/* A row "name total worst least", of 2 windows. */
-static void row(const char *name, uint32_t total, uint32_t worst, uint32_t least)
+/* A row of the table: its name and two numbers. */
+static void row(const char *name, uint32_t a, uint32_t b)
 {
     say(name);
-    say(" "), say_number(total);
-    say(" "), say_number(worst);
-    say(" "), say_number(least);
+    say(" "), say_number(a);
+    say(" "), say_number(b);
     say("\n");
 }
 
@@ -63,7 +63,7 @@ static void known_loop(uint32_t turns)
     const uint32_t before = count_ticks();
     __asm volatile("mov r3, %0\n1:\n\tsubs r3, r3, #1\n\tbne 1b" ::"r"(turns) : "r3", "cc");
     const uint32_t total = spent(before);
-    say("loop "), say_number(turns), say(" "), say_number(total), say("\n");
+    row("loop", turns, total);
 }
 
 static real noise(void)
@@ -74,14 +74,13 @@ static real noise(void)
 }
 
 typedef struct {
-    uint32_t total, worst, least;
+    uint32_t total, worst;
 } tally;
 
 static void add(tally *t, uint32_t instructions)
 {
     t->total += instructions;
     t->worst = instructions > t->worst ? instructions : t->worst;
-    t->least = instructions < t->least ? instructions : t->least;
 }
 
 static void quotients(const real *u, const real *y, uint32_t bins, real *frf)
@@ -93,7 +92,7 @@ static void quotients(const real *u, const real *y, uint32_t bins, real *frf)
     }
 }
 
-static void kernel(uint32_t bin_count, lb_table table, const char *push_name, const char *hop_name)
+static void kernel(uint32_t bin_count, lb_table table, const char *name)
 {
     uint32_t bins[BINS_MAX];
     for (uint32_t i = 0; i < bin_count; ++i) {
@@ -101,9 +100,10 @@ static void kernel(uint32_t bin_count, lb_table table, const char *push_name, co
     }
     const lb_config config = {WINDOW, CHANNELS, bin_count, bins, LB_MODULATED, 0.0, LB_BEST, table};
     static real sums[2 * CHANNELS * BINS_MAX], frf[2 * BINS_MAX];
-    tally push = {0, 0, UINT32_MAX}, hop = {0, 0, UINT32_MAX};
+    tally push = {0, 0}, hop = {0, 0};
     dft_type *dft;
-    if (FN(init)(memory, sizeof memory, &config, &dft) != LB_OK) {
+    size_t bytes;
+    if (FN(size)(&config, &bytes) != LB_OK || FN(init)(memory, sizeof memory, &config, &dft) != LB_OK) {
         host_exit(1);
     }
     for (uint32_t n = 0; n < 4u * WINDOW; ++n) {
@@ -118,14 +118,18 @@ static void kernel(uint32_t bin_count, lb_table table, const char *push_name, co
             add(&hop, spent(before));
         }
     }
-    row(push_name, push.total, push.worst, push.least);
-    row(hop_name, hop.total, hop.worst, hop.least);
+    say(name);
+    row(" push", push.total, push.worst);
+    say(name);
+    row(" hop", hop.total, hop.worst);
+    say(name);
+    row(" bytes", (uint32_t)bytes, CHANNELS * WINDOW * sizeof(real));
 }
 
 static void least_squares(void)
 {
     static rls r;
-    tally t = {0, 0, UINT32_MAX};
+    tally t = {0, 0};
     rls_begin(&r, (real)0.995);
     for (uint32_t n = 0; n < 2u * WINDOW; ++n) {
         const real u = noise(), y = noise();
@@ -133,7 +137,7 @@ static void least_squares(void)
         rls_push(&r, u, y);
         add(&t, spent(before));
     }
-    row("rls", t.total, t.worst, t.least);
+    row("rls", t.total, t.worst);
 }
 
 int main(void)
@@ -145,10 +149,10 @@ int main(void)
     for (uint32_t turns = 1; turns <= 100000u; turns *= 10u) {
         known_loop(turns);
     }
-    kernel(7, LB_TABLE_ROWS, "push 7 rows", "hop 7 rows");
-    kernel(21, LB_TABLE_ROWS, "push 21 rows", "hop 21 rows");
-    kernel(7, LB_TABLE_COMPACT, "push 7 compact", "hop 7 compact");
-    kernel(21, LB_TABLE_COMPACT, "push 21 compact", "hop 21 compact");
+    kernel(7, LB_TABLE_ROWS, "7 rows");
+    kernel(21, LB_TABLE_ROWS, "21 rows");
+    kernel(7, LB_TABLE_COMPACT, "7 compact");
+    kernel(21, LB_TABLE_COMPACT, "21 compact");
     least_squares();
     return 0;
 }
