@@ -11,6 +11,7 @@ from livebode.cli.options import Json
 from livebode.cli.pictures import drawing, show
 from livebode.nouns import Responses
 from livebode.records import to_json
+from livebode.session import Audience
 
 
 def demo_command(
@@ -35,8 +36,9 @@ def demo_command(
     with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
         task = bar.add_task("", total=seconds)
 
-        def watch(responses: Responses) -> None:
-            bar.update(task, description=_numbers(responses))
+        class Numbers(Audience):
+            def write(self, responses: Responses) -> None:
+                bar.update(task, description=_numbers(responses))
 
         def progress(done: int, total: int | None) -> None:
             bar.update(task, completed=seconds * done / (total or done))
@@ -47,7 +49,7 @@ def demo_command(
             seed=seed,
             real_time=not fast,
             progress=progress,
-            watch=watch,
+            audience=Numbers(),
             draw=drawing("simulated belt axis", ("u", "velocity")),
         )
     if as_json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,8 @@ import numpy as np
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, Responses
+from livebode.records import Run
+from livebode.session.audience import Audience
 from livebode.session.tracking import Draw, Outcome, Progress, record
 from livebode.simulation import BeltAxis, BeltResponse, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
@@ -48,20 +49,14 @@ def demo(
     seed: int,
     real_time: bool,
     progress: Progress,
-    watch: Callable[[Responses], None],
+    audience: Audience,
     draw: Draw,
 ) -> tuple[Outcome, str]:
     """Track the simulated axis into a run directory, and say in one sentence what was found.
 
-    `watch` is called with each new batch of responses, to show them live. An earlier demo in `directory` is replaced.
+    `audience` sees what is published. An earlier demo in `directory` is replaced.
     """
     axis = demo_axis(seconds, seed)
-    seen: list[Responses] = []
-
-    def look(responses: Responses) -> None:
-        seen.append(responses)
-        watch(responses)
-
     outcome = record(
         SimulatedAxis(axis),
         Tracker(demo_settings()),
@@ -71,10 +66,10 @@ def demo(
         real_time=real_time,
         force=True,
         progress=progress,
-        watch=look,
+        audience=audience,
         draw=draw,
     )
-    return outcome, finding(Responses.join(seen), axis)
+    return outcome, finding(Run.open(directory).responses(), axis)
 
 
 def finding(responses: Responses, axis: BeltAxis) -> str:

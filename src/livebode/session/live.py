@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from livebode.session.audience import Audience
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.fits import Fits
 from livebode.session.plan import live_follower
@@ -26,6 +27,7 @@ def run_live(
     progress: Progress,
     draw: Draw,
     tell: Tell = lambda _: None,
+    audience: Audience | None = None,
 ) -> Outcome:
     """Track a machine while it works and leave a run directory in segments; parameters as in `run`.
 
@@ -38,7 +40,7 @@ def run_live(
         Where the configuration cannot be, or no samples come.
     """
     with open_source(axis.source) as source, ended_by_signals(source):
-        tracker = live_follower(axis, source.rate_hz)
+        tracker = live_follower(axis, source)
         about = {
             "configuration": axis.model_dump(mode="json", exclude_defaults=True),
             "found": {"format": source.format, "rate_from": "the sender"},
@@ -53,10 +55,11 @@ def run_live(
             progress=progress,
             draw=draw,
             fits=fits,
-            watching=make_watching(axis, tracker.settings),
+            watching=make_watching(axis, tracker.settings, samples=source.spectra is None),
             kept=axis.record or RecordSection(),
             again=False,
             tell=tell,
+            audience=audience,
         )
 
 

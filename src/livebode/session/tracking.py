@@ -18,6 +18,7 @@ from livebode.fitting import Fit
 from livebode.kernel import instruction_set
 from livebode.nouns import Block, Channel, Event, InputError, Model, Responses
 from livebode.records import RunDirectory
+from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.fits import Fits
@@ -28,13 +29,13 @@ from livebode.session.plan import make_follower
 from livebode.session.tally import Tally
 from livebode.session.watching import Watching, make_watching
 from livebode.sources import open_log
-from livebode.sources.live import LiveSource
+from livebode.sources.live import Health, LiveSource
 
 if TYPE_CHECKING:
     from livebode.session.segmented import SegmentedRun
 
 Progress = Callable[[int, int | None], None]
-Watch = Callable[[Responses], None]
+Publish = Callable[[Responses], None]
 Draw = Callable[[Responses, Path, str, Model | None], None]
 Tell = Callable[[Event], None]
 
@@ -71,6 +72,7 @@ def run(
     progress: Progress,
     draw: Draw,
     tell: Tell = lambda _: None,
+    audience: Audience | None = None,
 ) -> Outcome:
     """Track a recording and leave a run directory.
 
@@ -90,6 +92,8 @@ def run(
         with its unit, and the newest fit, to add pictures.
     tell
         Called with what the record in segments itself has to say: that it goes on, pauses or removes what is oldest.
+    audience
+        Sees all that the run publishes.
 
     Raises
     ------
@@ -118,6 +122,7 @@ def run(
         watching=watching,
         kept=axis.record,
         tell=tell,
+        audience=audience,
     )
 
 
@@ -130,7 +135,7 @@ def record(
     force: bool,
     progress: Progress,
     draw: Draw,
-    watch: Watch | None = None,
+    audience: Audience | None = None,
     watching: Watching | None = None,
     started: float | None = None,
     fits: Fits | None = None,
@@ -141,13 +146,13 @@ def record(
 ) -> Outcome:
     """Track a source and leave a run directory; `about` is what run.json says of it besides.
 
-    `watch` is called with each new batch of responses, of a correction once a chunk; `started` (perf_counter) is when
-    opening the source began, where that is to count in the speed; `fits` are made of every response; `watching` tells
-    changes; `kept` asks for a record in segments, which goes on where it ended, and which `tell` hears of; `again` says
-    whether the source begins with the same samples each time; `delivery` goes to its `blocks`.
+    `audience` sees all that is published; `started` (perf_counter) is when opening the source began, where that is to
+    count in the speed; `fits` are made of every response; `watching` tells changes; `kept` asks for a record in
+    segments, which goes on where it ended, and which `tell` hears of; `again` says whether the source begins with the
+    same samples each time; `delivery` goes to its `blocks`.
     """
     _keep_freed_memory()
-    settings, overview = tracker.settings, Overview()
+    settings, overview, audience = tracker.settings, Overview(), audience or Audience()
     signals = [name for role in settings.roles if (name := settings.channel(role))]
     wanted = list(dict.fromkeys(signals + ([settings.schedule] if settings.schedule else [])))
     blocks = source.blocks(wanted, **delivery)
@@ -155,7 +160,12 @@ def record(
     tally = Tally(check, time.perf_counter() if started is None else started)
     begun = _begun(about, tracker, response_unit(source.channels, settings))
     channels = {channel.name: channel for channel in source.channels}
-    out = _recorder(
+
+    def said(event: Event) -> None:
+        tell(event)
+        audience.write_event(event)
+
+    recorder = _recorder(
         directory,
         kept,
         force,
@@ -165,8 +175,9 @@ def record(
         parts={"tracker": tracker, "tally": tally} | {k: p for k, p in (("fits", fits), ("watching", watching)) if p},
         again=again,
         ends=source.samples is not None,
-        tell=tell,
+        tell=said,
     )
+    out = Outlet(recorder, audience)
 
     def publish(responses: Responses) -> None:
         overview.add(responses)
@@ -174,18 +185,19 @@ def record(
         parameters = None if fits is None else fits.take(responses, out)
         if watching is not None:
             watching.follow(responses, parameters, out.write_event)
-        if watch is not None and len(responses):
-            watch(responses)
 
-    with out:
-        if not isinstance(out, RunDirectory):
-            for responses in out.before():
+    with recorder:
+        audience.begin(directory, begun, _health(source))
+        if not isinstance(recorder, RunDirectory):
+            for responses in recorder.before():
                 overview.add(responses)
+                audience.write(responses)
                 if fits is not None:
                     fits.take(responses[0:0], out)  # which tells it the lines
-            blocks = out.feed(blocks)
+            blocks = recorder.feed(blocks)
         if watching is not None:
             blocks = watching.over(blocks, out.write_event)
+        blocks = _told(blocks, audience)
         _track(source, blocks, tracker, tally, publish, out, progress, None if kept is None else out.write_event)
         summary = _begun(about, tracker, begun["found"]["unit"]) | _done(tracker, tally)
         newest = None if fits is None else fits.newest()
@@ -193,7 +205,8 @@ def record(
         if watching is not None:
             summary["monitoring"] = watching.finish(out.write_event)
         label = _schedule_label(source, settings.schedule)
-        out.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
+        recorder.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
+    audience.finish(summary)
     return Outcome(directory, summary, overview.responses(), newest)
 
 
@@ -212,8 +225,8 @@ def _track(
     blocks: Iterator[Block],
     tracker: Follower,
     tally: Tally,
-    publish: Watch,
-    out: RunDirectory | SegmentedRun,
+    publish: Publish,
+    out: Outlet,
     progress: Progress,
     say: Tell | None,
 ) -> None:
@@ -226,7 +239,7 @@ def _track(
         if responses is not None:
             tally.take(responses, time.perf_counter() - before)
             publish(responses)
-        for event in [*drained(source), *tracker.drain_events()]:
+        for event in [*drained(source), *tracker.drain_events(), *out.drain_events()]:
             out.write_event(event)
 
     for block in blocks:
@@ -251,12 +264,23 @@ def _judge(tracker: Follower, tally: Tally, hand_out: Callable[[], None]) -> Non
     """Hand out what is held back at the end; InputError where the responses mean nothing."""
     window = tracker.settings.lines.window
     tally.check.finish()
-    check_length(tally.stop, window)
+    check_length(tracker.counts["samples"], window)
     if tally.handed_out != tally.stop:
         hand_out()
         tally.handed_out = tally.stop
     check_excitation(tracker, tally.check.variance)
     check_some_valid(tally.responses, tally.valid_lines, tracker.counts, window)
+
+
+def _told(blocks: Iterator[Block], audience: Audience) -> Iterator[Block]:
+    """The same blocks; `audience` hears of each when the next one is asked for."""
+    for block in blocks:
+        yield block
+        audience.followed(block)
+
+
+def _health(source: Source) -> Callable[[], Health] | None:
+    return (lambda: source.health) if isinstance(source, LiveSource) else None
 
 
 def drained(source: Source) -> list[Event]:

@@ -1,0 +1,68 @@
+"""Audience: who sees what a run publishes while it goes: a dashboard, a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.records import RunDirectory
+from livebode.sources.live import Health
+
+if TYPE_CHECKING:
+    from livebode.session.segmented import SegmentedRun
+
+
+class Audience:
+    """Hears what a run publishes; this one does nothing with it.
+
+    It is called in the thread that tracks, after the record has taken the same, so every method must return at once and
+    may not raise. What it needs time for it does elsewhere, on what it kept; all that it is given is immutable.
+    """
+
+    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
+        """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time."""
+
+    def write(self, responses: Responses) -> None:
+        """New responses; of a run that is gone on with first the newest from before."""
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        """What was fitted to them, what follows from that, and margins."""
+
+    def write_event(self, event: Event) -> None:
+        """What a person should know."""
+
+    def drain_events(self) -> list[Event]:
+        """What the audience has to say since the last call, to be recorded: that somebody acknowledged an event."""
+        return []
+
+    def followed(self, block: Block) -> None:
+        """All that comes of this Block has been published; a LiveBlock says when it arrived."""
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        """The run has ended: run.json as it ends."""
+
+
+class Outlet:
+    """Where a run puts what comes of its samples: into the record first, then before the audience."""
+
+    def __init__(self, record: RunDirectory | SegmentedRun, audience: Audience) -> None:
+        self._record, self._audience = record, audience
+
+    def write(self, responses: Responses) -> None:
+        if len(responses):
+            self._record.write(responses)
+            self._audience.write(responses)
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        self._record.write_parameters(*parts)
+        self._audience.write_parameters(*parts)
+
+    def write_event(self, event: Event) -> None:
+        self._record.write_event(event)
+        self._audience.write_event(event)
+
+    def drain_events(self) -> list[Event]:
+        """What the audience wants recorded."""
+        return self._audience.drain_events()
