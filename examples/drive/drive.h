@@ -9,7 +9,7 @@
 
 #include "excitation.h"
 
-#define DRIVE_HOP 20 /* samples from spectrum to spectrum: 200 a second; it divides the window */
+#define DRIVE_HOP 200 /* samples from spectrum to spectrum, 20 a second; it divides the window */
 #ifndef DRIVE_VELOCITY_RAD_S
 #define DRIVE_VELOCITY_RAD_S 30 /* taken off the velocity: what it is about at this speed */
 #endif
