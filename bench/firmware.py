@@ -12,7 +12,15 @@ KERNEL = ROOT / "kernel"
 BOARD = ROOT / "examples" / "drive" / "mps2"
 PROGRAMS = ("arm-none-eabi-gcc", "qemu-system-arm")
 FLAGS = (
-    *("-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections", "-DLB_SCALAR"),
+    *(
+        "-std=c99",
+        "-O2",
+        "-ffreestanding",
+        "-ffp-contract=off",
+        "-ffunction-sections",
+        "-fdata-sections",
+        "-DLB_SCALAR",
+    ),
     *("-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"),
 )
 

@@ -6,7 +6,15 @@ import pytest
 from bench.firmware import M4F, M7
 from tests.targets import VARIANTS, Job, need_tools, on_host, on_target, replay
 
-SHAPES = [(1, (0,)), (2, (1, 0)), (3, (2, 0)), (7, (1, 2, 3)), (100, tuple(range(1, 8))), (128, (5,)), (129, (0, 64, 128))]
+SHAPES = [
+    (1, (0,)),
+    (2, (1, 0)),
+    (3, (2, 0)),
+    (7, (1, 2, 3)),
+    (100, tuple(range(1, 8))),
+    (128, (5,)),
+    (129, (0, 64, 128)),
+]
 
 
 def noise(seed, count, channels=2, offset=0.0):
@@ -39,7 +47,15 @@ def check(target, jobs):
 
 def test_every_output_and_snapshot_has_the_hosts_bits(target):
     jobs = [
-        Job(noise(window, 3 * window + 5, 1 + window % 3), window, bins, hop, phase, compact=compact, blockwise=blockwise)
+        Job(
+            noise(window, 3 * window + 5, 1 + window % 3),
+            window,
+            bins,
+            hop,
+            phase,
+            compact=compact,
+            blockwise=blockwise,
+        )
         for window, bins in SHAPES
         for phase, hop, compact, blockwise in [
             ("window", 1, False, False),

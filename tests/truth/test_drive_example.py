@@ -1,4 +1,4 @@
-"""The example drive in QEMU, end to end: its frames into `livebode run`, beside the samples that it computed them from."""
+"""The example drive in QEMU, end to end: its frames into `livebode run`, beside the samples they were computed from."""
 
 from __future__ import annotations
 
@@ -26,20 +26,18 @@ from tests.truth.test_live_run import started, table
 FOLDER = ROOT / "examples" / "drive"
 LINES = Lines.parse("20:220:10", rate_hz=4000, window=400)
 SECONDS = 6
-SIGNALS = """
-[signals]
-input = "u"
-output = "y"
-[tracking]
-estimator = "direct"
-"""
+AXIS = (FOLDER / "axis.toml").read_text(encoding="utf-8")
+URL = 'url = "tcp://127.0.0.1:5000"'
 
 
 def constants() -> dict[str, float]:
     """What machine.c defines."""
     text = (FOLDER / "machine.c").read_text(encoding="utf-8")
-    found = dict(re.findall(r"#define (\w+) \(?([^/\n]*f(?: / [\d.]+f\))?)", text))
-    return {name: eval(value.replace("f", "").rstrip(")")) for name, value in found.items()}
+    found = {}
+    for name, value in re.findall(r"#define (\w+) \(?([\d.e/f -]+)", text):
+        over, _, under = value.replace("f", "").partition(" / ")
+        found[name] = float(over) / float(under or 1)
+    return found
 
 
 def built(directory: Path, *defines: str) -> Path:
@@ -114,7 +112,7 @@ def test_twenty_spectra_a_second_are_less_than_a_quarter_of_the_samples(drive):
 
 
 def test_the_excitation_is_the_design_and_the_responses_are_the_machines(drive):
-    """Torque on top of the controller's is the multisine to float's rounding; y/u is the two masses' within the noise."""
+    """Torque beside the controller's is the multisine to float's rounding; y/u is the two masses' within the noise."""
     _, sent = drive
     c = constants()
     u, y = sent.samples
@@ -150,7 +148,9 @@ def test_the_constant_is_worth_its_digits(drive, tmp_path):
         exact = sums_of(given.samples, "float64", 30)
         frf, truth = (s[1, 2:] / s[0, 2:] for s in (given.sums, exact))
         errors[constant] = np.abs(frf / truth - 1).max()
-    print(f"float32 against float64, worst relative error of y/u: {errors[30]:.1e}, without the constant {errors[0]:.1e}")
+    print(
+        f"float32 against float64, worst relative error of y/u: {errors[30]:.1e}, without the constant {errors[0]:.1e}"
+    )
     assert errors[30] < 1e-5
     assert errors[0] > 10 * errors[30]
 
@@ -158,9 +158,11 @@ def test_the_constant_is_worth_its_digits(drive, tmp_path):
 def test_livebode_run_makes_the_same_of_its_frames_as_of_its_samples(drive, tmp_path):
     program, sent = drive
     spectra = live_run(program, tmp_path)
-    write_parquet(tmp_path / "log.parquet", {"t": np.arange(sent.samples.shape[1]) / 4000} | dict(zip("uy", sent.samples)))
+    write_parquet(
+        tmp_path / "log.parquet", {"t": np.arange(sent.samples.shape[1]) / 4000} | dict(zip("uy", sent.samples))
+    )
     lines = '[lines]\nfrequencies = "20:220:10"\nwindow = 400\n'
-    (tmp_path / "log.toml").write_text(f'[source]\nlog = "log.parquet"\n{lines}{SIGNALS}hop = 200\n')
+    (tmp_path / "log.toml").write_text(AXIS.replace(URL, 'log = "log.parquet"') + f"hop = 200\n{lines}")
     assert livebode("run", tmp_path / "log.toml", "--out", tmp_path / "recorded").code == 0
     theirs = table(tmp_path / "recorded")
     assert set(spectra) == set(theirs)
@@ -181,7 +183,7 @@ def live_run(program: Path, folder: Path) -> dict[str, np.ndarray]:
     line = ("-serial", f"tcp:127.0.0.1:{port},server=on,wait=on", "-serial", "null")
     machine = subprocess.Popen(M4F.qemu(program, *line, "-icount", "shift=4,sleep=off"), stdout=subprocess.DEVNULL)
     try:
-        (folder / "axis.toml").write_text(f'[source]\nurl = "tcp://127.0.0.1:{port}"\n{SIGNALS}')
+        (folder / "axis.toml").write_text(AXIS.replace("5000", str(port)))
         process = started(folder / "axis.toml", folder / "live")
         assert machine.wait(PATIENCE_S) == 0
     finally:
