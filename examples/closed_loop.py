@@ -77,10 +77,12 @@ class Drive:
     def run(self, w: np.ndarray, periods: int, sigma: float = 0.0, runs: int = 1, seed: int = 0) -> tuple:
         """u and y, shape (runs, periods·len(w)), from the periodic state on, with white noise sigma on y."""
         rng = np.random.default_rng(seed)
-        total = periods * w.size
-        noise = sigma * rng.standard_normal((total, runs))
-        state = np.tile(self.settled(w), (runs, 1))
-        u, y = np.empty((total, runs)), np.empty((total, runs))
-        for n in range(total):
+        return self.under(w, sigma * rng.standard_normal((periods * w.size, runs)))
+
+    def under(self, w: np.ndarray, noise: np.ndarray) -> tuple:
+        """The same with noise of one's own on y, shape (ticks, runs)."""
+        state = np.tile(self.settled(w), (noise.shape[1], 1))
+        u, y = np.empty((2, *noise.shape))
+        for n in range(len(noise)):
             state, u[n], y[n] = self.tick(state, w[n % w.size], noise[n], n)
         return u.T, y.T

@@ -24,6 +24,7 @@ from livebode.sources.live import Batch, encode_layout, encode_samples, encode_s
 
 BATCH = 100
 CHANNELS = ["w", "u", "velocity", "x"]
+LAYOUT_EVERY_S = 5
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
 
 
@@ -53,13 +54,13 @@ def layout(per_second: float, lines: Lines = LINES) -> SpectraLayout:
 def spectra_frames(
     seconds: float, epoch: int, what: SpectraLayout, lines: Lines = LINES, real_time: bool = True
 ) -> Iterator[bytes]:
-    """Frames of a drive that runs the kernel: the layout first and once a second, each spectrum at its time."""
+    """Frames of a drive that runs the kernel: the layout first and every 5 s, each spectrum at its time."""
     blocks = axis(seconds, lines).blocks(CHANNELS, BATCH, real_time=real_time)
     due = 0
     for sequence, batch in enumerate(KernelDrive(what).spectra(blocks, epoch)):
         if batch.stop > due:
             yield encode_spectra_layout(what, batch.rate_hz, epoch=epoch, sequence=sequence)
-            due += round(batch.rate_hz)
+            due += round(LAYOUT_EVERY_S * batch.rate_hz)
         yield encode_spectra(batch, sequence=sequence)
 
 

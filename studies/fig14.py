@@ -38,14 +38,9 @@ def runs(count: int, seed: int, amplitude: float = 1.0, colour: float = 0.0, sam
     """w, u, y of as many runs of the closed loop at standstill, shape (runs, 3, samples)."""
     rng, total = np.random.default_rng(seed), samples + BEFORE
     noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal((total, count)), axis=0) * SIGMA
-    drive = Drive()
-    state = np.tile(drive.settled(amplitude * EXCITATION), (count, 1))
-    found = np.empty((total, 3, count))
-    for n in range(total):
-        w = amplitude * EXCITATION[n % EXCITATION.size]
-        state, u, y = drive.tick(state, w, noise[n], n)
-        found[n] = np.full(count, w), u, y
-    return np.moveaxis(found[BEFORE:], 2, 0).swapaxes(1, 2)
+    w = amplitude * EXCITATION
+    u, y = Drive().under(w, noise)
+    return np.stack([np.broadcast_to(np.resize(w, total), u.shape), u, y], axis=1)[..., BEFORE:]
 
 
 @cache

@@ -14,7 +14,8 @@ import pyuff
 import scipy.io
 import xarray as xr
 
-from livebode.export import FORMATS, at, mean
+from livebode.export import FORMATS, at
+from livebode.fitting import mean_response
 from livebode.records import Run
 from tests.command import livebode, signals, write_parquet
 
@@ -62,7 +63,7 @@ def test_one_response_and_the_mean(run: Path, tmp_path: Path) -> None:
     batches = Run.open(run).batches
     for options, expected in (
         (("--at", "1.0"), at(batches(), 1.0)),
-        (("--mean",), mean(batches())),
+        (("--mean",), mean_response(batches())[0]),
     ):
         path = tmp_path / "below" / f"{len(options)}{options[0]}.csv"
         assert livebode("export", run, "--to", "csv", *options, "--out", path).code == 0

@@ -15,7 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.export import at, mean, save, write_csv, write_mat, write_netcdf, write_uff
+from livebode.export import at, save, write_csv, write_mat, write_netcdf, write_uff
+from livebode.fitting import mean_response
 from livebode.nouns import InputError, Lines
 from tests.command import livebode, signals, write_parquet
 from tests.responses import made
@@ -38,7 +39,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "excel"), "'excel' is not a format for responses; take csv, mat, netcdf or uff"),
         (("--to", "uff", "--parameters"), "'uff' is not a format for parameters; take csv or mat"),
         (("--to", "xarray"), "xarray is no file; in Python it is to_xarray"),
-        (("--to", "control"), "control is no file; in Python it is mean(Run"),
+        (("--to", "control"), "control is no file; in Python it is mean_response(Run"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
         (("--to", "csv", "--at", "nan"), "nan is not a moment"),
         (("--to", "csv", "--at", "99"), "no valid response stands within half a window (0.05 s) of 99 s; the nearest"),
@@ -140,8 +141,8 @@ def test_nothing_to_export(tmp_path: Path) -> None:
     invalid = made(5, LINES, hole=1.0)
     with pytest.raises(InputError, match="no response has a valid line"):
         at([invalid], 0.0)
-    with pytest.raises(InputError, match="no response has a valid line and a known sigma; track more periods"):
-        mean([invalid])
+    with pytest.raises(InputError, match="none of the responses is valid at any line; track more periods"):
+        mean_response([invalid])
     invalid.valid[:, 0], invalid.value[:, 0] = True, 1.0
     with pytest.raises(InputError, match="no response has 2 valid lines"):
         write_uff(tmp_path / "a", [invalid])
@@ -163,6 +164,6 @@ def test_what_stood_there_still_stands_when_writing_fails(tmp_path: Path) -> Non
 def test_a_run_without_noise_has_a_mean() -> None:
     responses = made(40, LINES, hole=0.0)
     responses.sigma[:], responses.value[:], responses.dof[:] = 0.0, 2 - 1j, 9.0
-    found = mean([responses])
+    found = mean_response([responses])[0]
     np.testing.assert_allclose(found.value, 2 - 1j, rtol=1e-14)
     assert (found.sigma == 0).all()

@@ -16,7 +16,7 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings
 
-from livebode.export import at, only, to_xarray, write_csv, write_mat, write_netcdf, write_uff
+from livebode.export import at, to_xarray, write_csv, write_mat, write_netcdf, write_uff
 from livebode.nouns import InputError, Lines, Responses
 from livebode.sources import open_log
 from tests.responses import any_responses, cut, made
@@ -172,7 +172,7 @@ def test_python_control_from_a_response_of_many() -> None:
 @given(any_responses())
 def test_one_alone_is_that_one(responses: Responses) -> None:
     for i, response in enumerate(responses):
-        alone = only(response)
+        alone = Responses.of(response)
         for name in ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule"):
             same(getattr(alone, name), getattr(responses[i : i + 1], name))
         assert (alone.lines, alone.unit, alone.quantity) == (responses.lines, responses.unit, responses.quantity)

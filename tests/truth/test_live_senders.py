@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from examples.sender import CHANNELS, frames
+from bench.bandwidth import TARGETS, measure
+from examples.sender import CHANNELS, frames, layout, spectra_frames
 from livebode.nouns import Channel, SpectraLayout
 from livebode.sources.live import (
     Batch,
@@ -121,3 +122,19 @@ def test_the_simulated_axis_as_a_sender():
     assert [batch.first_sample for batch in batches] == list(range(0, 2000, 100))
     assert [channel.name for channel in batches[0].channels] == CHANNELS
     assert {batch.epoch for batch in batches} == {9}
+
+
+def test_the_simulated_axis_as_a_drive_that_runs_the_kernel():
+    decoder = FrameDecoder()
+    what = layout(20)
+    batches = [batch for f in spectra_frames(2.2, 9, what, real_time=False) if (batch := decoder.decode(f))]
+    assert [batch.first_sample for batch in batches] == list(range(0, 8800, 200))
+    assert {batch.layout for batch in batches} == {what}
+    assert [int(batch.state[0]) for batch in batches[:3]] == [1, 0, 0]
+
+
+def test_spectra_need_a_fraction_of_the_bandwidth_of_samples():
+    found = {(what, per_second): spectra / samples for what, per_second, samples, spectra in measure()}
+    for (what, per_second), share in found.items():
+        if what != "21 lines, 20 quiet bins":  # which are as much again
+            assert share <= TARGETS[per_second], (what, per_second)

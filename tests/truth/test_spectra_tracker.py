@@ -150,12 +150,14 @@ def test_marks_of_the_drive_and_numbers_that_are_none_are_left_out(record: Block
     blocks = list(sent(record, what, samples=WINDOW))
     blocks[5].state[:] = 2
     blocks[7].sums[1, 0, 3] = np.nan
+    blocks[9].sums[0, 0, 2] *= 1e12
     tracker = SpectraTracker(described(WINDOW), what)
     ours = Responses.join([tracker.process(block) for block in blocks])
-    assert np.flatnonzero(~ours.valid.any(axis=1)).tolist() == [5, 7]
-    assert [(e.kind, e.sample) for e in tracker.drain_events()] == [("spike", 2399), ("not-whole", 3199)]
-    counts = tracker.counts
-    assert (counts["spectra"], counts["spike"], counts["not-whole"]) == (PERIODS, 1, 1)
+    assert np.flatnonzero(~ours.valid.any(axis=1)).tolist() == [5, 7, 9]
+    told = [("spike", 2399), ("not-whole", 3199), ("implausible", 3999)]
+    assert [(e.kind, e.sample) for e in tracker.drain_events()] == told
+    assert {kind: tracker.counts[kind] for kind, _ in told} == {kind: 1 for kind, _ in told}
+    assert tracker.counts["spectra"] == PERIODS
     # An average goes on over a spike, as it does from samples.
     assert tracked(iter(blocks), what, average=True).valid[5].all()
 

@@ -40,14 +40,8 @@ def loop(runs: int, amplitude: float = 1.0, colour: float = 0.0, seed: int = 0) 
     """Many runs of the closed loop, shape (runs, 3, SAMPLES): w, u, y with noise of 0.1 rad/s on y."""
     rng, total = np.random.default_rng(seed), SAMPLES + 1000
     noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal((total, runs)), axis=0) * 0.1
-    drive = Drive()
-    state = np.tile(drive.settled(amplitude * W), (runs, 1))
-    found = np.empty((total, 3, runs))
-    for n in range(total):
-        w = amplitude * W[n % W.size]
-        state, u, y = drive.tick(state, w, noise[n], n)
-        found[n] = np.full(runs, w), u, y
-    return np.moveaxis(found[1000:], 2, 0).swapaxes(1, 2)
+    u, y = Drive().under(amplitude * W, noise)
+    return np.stack([np.broadcast_to(np.resize(amplitude * W, total), u.shape), u, y], axis=1)[..., 1000:]
 
 
 def judged(model: Fit, columns: np.ndarray, excitation: str | None = "w"):  # type: ignore[no-untyped-def]

@@ -1,4 +1,9 @@
-"""The command line: run, fit, inspect, demo, export. Exit codes: 0 done, 2 the user's mistake, 1 ours."""
+"""The command line.
+
+It measures (run, demo), looks into recordings and runs (inspect, query), draws conclusions from runs (fit, margins,
+validate, learn) and hands them on (export). Exit codes: 0 done, 1 our mistake, 2 the user's, 3 no model fits, 130 and
+above stopped from outside.
+"""
 
 from __future__ import annotations
 

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from livebode.nouns import InputError
+from livebode.nouns import InputError, Responses
 from livebode.records import Run
 
 _IN_PYTHON = {
     "xarray": "to_xarray(Run.open(path).responses()); --to netcdf writes a file that xarray opens",
-    "control": "mean(Run.open(path).batches()).to_control()",
+    "control": "mean_response(Run.open(path).batches())[0].to_control()",
 }
 
 
@@ -44,9 +44,11 @@ def export_command(
         print(f"{path}: {written.rows} parameter values")
         return
     if at is not None:
-        parts = iter([export.only(export.at(record.batches(), at))])
+        parts = iter([Responses.of(export.at(record.batches(), at))])
     elif mean:
-        parts = iter([export.only(export.mean(record.batches()))])
+        from livebode.fitting import mean_response
+
+        parts = iter([mean_response(record.batches())])
     else:
         parts = record.batches()
     written = export.save(path, lambda partial: export.FORMATS[to](partial, parts, record.summary), force=force)

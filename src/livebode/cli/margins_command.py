@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from livebode.cli.options import Json
+from livebode.cli.pictures import margins_in_short
 from livebode.records import to_json
 from livebode.session import Axis
 
@@ -108,9 +109,4 @@ def _in_short(margins: Margins) -> str:
     from livebode.margins import worst
 
     least = worst(margins)
-    if not least:
-        return "no margins"
-    return (
-        f"gain {least['gain_margin']:.3g} dB, phase {least['phase_margin']:.3g}°, delay "
-        f"{least['delay_margin']:.3g} ms, Ms {least['peak_sensitivity']:.3g}, bandwidth {least['bandwidth']:.3g} Hz"
-    )
+    return margins_in_short(least) if least else "no margins"

@@ -76,9 +76,14 @@ def _show_loop(found: dict[str, Any]) -> None:
     if not (worst := found["worst_over_places"]):
         print(f"no margins: {found['status']}; check the loop's description and the fit")
         return
-    print(
-        f"margins, worst of {_many(found['places'], 'fit')} over the run: gain {worst['gain_margin']:.3g} dB, "
-        f"phase {worst['phase_margin']:.3g}°, delay {worst['delay_margin']:.3g} ms, Ms {worst['peak_sensitivity']:.3g}"
+    print(f"margins, worst of {_many(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
+
+
+def margins_in_short(worst: dict[str, float]) -> str:
+    """The worst of each margin, as `margins.worst` gives them."""
+    return (
+        f"gain {worst['gain_margin']:.3g} dB, phase {worst['phase_margin']:.3g}°, delay "
+        f"{worst['delay_margin']:.3g} ms, Ms {worst['peak_sensitivity']:.3g}, bandwidth {worst['bandwidth']:.3g} Hz"
     )
 
 

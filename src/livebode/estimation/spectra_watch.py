@@ -15,26 +15,25 @@ _KINDS = {
 
 
 class SpectraWatch:
-    """Counts and Events of a stream of Spectra. One Event for each stretch of marked windows, at its first."""
+    """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
 
     def __init__(self, window: int) -> None:
         self._window = window
         self._next = -1
-        # A stream that begins with the drive is not whole at first.
-        self._marked = dict.fromkeys(_KINDS, False) | {"not-whole": True}
+        self._last = dict.fromkeys(_KINDS, -(1 << 62))
         self.counts = {"samples": 0, "gaps": 0, "missing": 0, "spectra": 0} | dict.fromkeys(_KINDS, 0)
         self._events: list[Event] = []
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         return {
             "next": np.array([self._next]),
-            "marked": np.array(list(self._marked.values())),
+            "last": np.array(list(self._last.values())),
             "counts": np.array(list(self.counts.values())),
         }
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         self._next = int(state["next"][0])
-        self._marked = dict(zip(self._marked, (bool(m) for m in state["marked"])))
+        self._last = dict(zip(_KINDS, (int(n) for n in state["last"])))
         self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
 
     def drain(self) -> list[Event]:
@@ -55,16 +54,20 @@ class SpectraWatch:
             self.counts["missing"] += missing
             many = f"spectra of {missing} samples are" if missing else "an unknown number of spectra is"
             self._say("gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing)
+        if first:
+            # A stream that begins with the drive is not whole at first, which is nothing to tell.
+            self._last["not-whole"] = int(block.sample[0]) - block.layout.hop
         self._count(block, marked["not-whole"], block.layout.hop + missing)
         self._next = block.stop
         begins: list[tuple[int, str]] = []
         for kind, those in marked.items():
-            first = np.diff(np.r_[self._marked[kind], those].astype(np.int8)) > 0
-            begins += [(int(at), kind) for at in np.flatnonzero(first)]
-            self.counts[kind] += int(np.count_nonzero(those))
-            self._marked[kind] = bool(those[-1])
-        for at, kind in sorted(begins):
-            self._say(kind, block, int(block.sample[at]), f"{_KINDS[kind]}; its response is not valid")
+            sample = block.sample[those]
+            apart = np.diff(sample, prepend=self._last[kind]) >= max(self._window, block.layout.hop + 1)
+            begins += [(int(n), kind) for n in sample[apart]]
+            self.counts[kind] += sample.size
+            self._last[kind] = int(sample[-1]) if sample.size else self._last[kind]
+        for number, kind in sorted(begins):
+            self._say(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
 
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples that these windows hold and those before did not; `new` since the window before."""

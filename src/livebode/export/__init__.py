@@ -4,9 +4,8 @@ from livebode.export.delimited import write_csv
 from livebode.export.formats import ENDINGS, FORMATS, TABLES, save
 from livebode.export.labelled import to_xarray, write_netcdf
 from livebode.export.matlab import write_mat
-from livebode.export.mean import mean
 from livebode.export.parameters import ParameterTable, write_parameters_csv, write_parameters_mat
-from livebode.export.selection import at, only
+from livebode.export.selection import at
 from livebode.export.universal import write_uff
 from livebode.export.written import Written
 
@@ -17,8 +16,6 @@ __all__ = [
     "ParameterTable",
     "Written",
     "at",
-    "mean",
-    "only",
     "save",
     "to_xarray",
     "write_csv",

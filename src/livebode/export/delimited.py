@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow.csv import CSVWriter, WriteOptions
 
+from livebode.arrow import from_numpy
 from livebode.export.written import Written
 from livebode.nouns import InputError, Responses
 
@@ -79,4 +80,4 @@ def _as_batch(part: Responses) -> pa.RecordBatch:
         "first": np.repeat(part.first, lines),
         "sample": np.repeat(part.sample, lines),
     }
-    return pa.record_batch(columns)
+    return pa.RecordBatch.from_arrays([from_numpy(c) for c in columns.values()], names=list(columns))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
 
 import numpy as np
 
@@ -47,11 +46,3 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
             f"{nearest.time_s:.9g} s"
         )
     return nearest
-
-
-def only(response: Response) -> Responses:
-    """Responses of this one alone, for what takes many."""
-    per_line = {name: getattr(response, name)[np.newaxis] for name in ("value", "sigma", "coherence", "valid")}
-    scalar = {f.name for f in fields(Responses)} - per_line.keys() - {"lines", "quantity", "unit"}
-    per_row = {name: np.array([getattr(response, name)]) for name in scalar}
-    return Responses(lines=response.lines, quantity=response.quantity, unit=response.unit, **per_line, **per_row)

@@ -2,54 +2,152 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.nouns import InputError, Responses
 
+Floats = NDArray[np.float64]
 
-def mean_response(responses: Responses) -> Responses:
-    """Mean of the valid responses at each line, as a batch of one.
 
-    Windows that overlap count once: m windows that would fit side by side into the run make m − 1 degrees of freedom,
-    and sigma² is the scatter of the responses over m. With fewer than two such windows sigma is the least of them.
+def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
+    """Mean of the valid responses at each line, all alike, as a batch of one.
 
-    Bias: a machine that changes from response to response is averaged, and its change is in sigma. Of an estimate that
-    averages over its periods already (`average`), take the newest response instead.
+    Windows that overlap share noise. Of two windows of N samples that start d apart the errors of white noise correlate
+    as ρ = max(0, 1 − d/N), so that n responses are worth m = n² / Σᵢⱼ ρᵢⱼ windows side by side, and
+
+        sigma² = Σᵢ |Ĝᵢ − mean|² / n / (m − 1),
+
+    without bias, however the noise grows or fades. It has m − 1 degrees of freedom, a careful choice: the scatter of
+    windows that overlap tells a little more. With fewer than two such windows sigma is the least known one of the
+    responses.
+
+    All count alike: the sigmas of single responses scatter and lag, so that weights of 1/sigma² would trust windows
+    that have just become noisy. For the same reason no bound of the mean is made from them.
+
+    Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
+    and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
+    one is given, as it is.
+
+    Parameters
+    ----------
+    responses
+        In order, as one or in parts such as `Run.batches()`; parts are read once, and no more of them is kept than a
+        window holds.
+
+    Returns
+    -------
+    Responses
+        `coherence` is NaN, it does not follow from those of single windows. `time_s` and `schedule` are means over the
+        responses that went in, `first` and `sample` their extent, `dof` the least over the lines.
 
     Raises
     ------
     InputError
         If no line is ever valid.
     """
-    use = responses.valid & np.isfinite(responses.value)
-    count = np.count_nonzero(use, axis=0)
-    if not count.any():
-        raise InputError("none of the responses is valid at any line; there is nothing to fit")
-    rows = np.flatnonzero(use.any(axis=1))
-    step = np.median(np.diff(responses.sample[rows])) if len(rows) > 1 else responses.lines.window
-    share = min(1.0, float(step) / responses.lines.window)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = np.where(use, responses.value, 0).sum(axis=0) / count
-        rest = np.where(use, np.abs(responses.value - value) ** 2, 0.0).sum(axis=0) / count
-        windows = count * share
-        scatter = np.sqrt(rest / (windows - 1))
-        single = np.min(np.where(use & np.isfinite(responses.sigma), responses.sigma, np.inf), axis=0)
+    sums: _Sums | None = None
+    for part in [responses] if isinstance(responses, Responses) else responses:
+        sums = sums or _Sums(part)
+        sums.add(part)
+    if sums is None or sums.newest is None:
+        raise InputError("none of the responses is valid at any line; track more periods")
+    return sums.newest if sums.averages else sums.response(sums.newest)
+
+
+class _Sums:
+    """Sums over responses, each of shape (lines,)."""
+
+    def __init__(self, like: Responses) -> None:
+        n = len(like.lines)
+        self.newest: Responses | None = None
+        self.averages = False
+        self._count, self._mean, self._apart = np.zeros(n), np.zeros(n, dtype=np.complex128), np.zeros(n)
+        self._overlap = _Overlap(like.lines.window, n)
+        self._least, self._dof = np.full(n, np.inf), 0.0
+        self._rows, self._moment, self._schedule, self._scheduled = 0, 0.0, 0.0, 0
+        self._first = np.iinfo(np.int64).max
+
+    def add(self, part: Responses) -> None:
+        used = part.valid & np.isfinite(part.value)
+        rows = np.asarray(used.any(axis=1))
+        if not rows.any():
+            return
+        used, part = used[rows], part[rows]
+        self.newest = part[-1:]
+        self.averages |= bool(np.any(part.sample - part.first >= part.lines.window))
+        self._add_values(used, part.value)
+        self._overlap.add(part.sample + 1, used.astype(np.float64))
+        known = used & np.isfinite(part.sigma)
+        self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
+        self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
+        self._rows += len(part)
+        self._moment += part.time_s.sum()
+        placed = np.isfinite(part.schedule)
+        self._schedule += part.schedule[placed].sum()
+        self._scheduled += int(placed.sum())
+        self._first = min(self._first, int(part.first[0]))
+
+    def _add_values(self, used: NDArray[np.bool_], value: NDArray[np.complex128]) -> None:
+        count = used.sum(axis=0)
+        mean = np.where(used, value, 0).sum(axis=0) / np.maximum(count, 1)
+        apart = (np.abs(np.where(used, value - mean, 0)) ** 2).sum(axis=0)
+        share = count / np.maximum(self._count + count, 1)
+        self._apart += apart + np.abs(mean - self._mean) ** 2 * self._count * share
+        self._mean += (mean - self._mean) * share
+        self._count += count
+
+    def response(self, newest: Responses) -> Responses:
+        valid = self._count > 0
+        count = np.where(valid, self._count, np.nan)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            windows = count**2 / self._overlap.total()
+            scatter = np.sqrt(self._apart / count / (windows - 1))
         several = windows >= 2
-        sigma = np.where(several, scatter, np.where(np.isfinite(single), single, np.nan))
-        dof = float(windows[several].min() - 1) if several.any() else float(np.max(responses.dof[rows]))
-        coherence = np.nanmean(np.where(use, responses.coherence, 0.0), axis=0)
-    last = responses[int(rows[-1]) : int(rows[-1]) + 1]
-    return Responses(
-        lines=responses.lines,
-        value=value[np.newaxis],
-        sigma=sigma[np.newaxis],
-        dof=np.array([dof]),
-        coherence=coherence[np.newaxis],
-        valid=(count > 0)[np.newaxis],
-        first=responses.first[rows[:1]],
-        sample=last.sample,
-        time_s=np.array([responses.time_s[rows].mean()]),
-        schedule=np.array([responses.schedule[rows].mean()]),
-        quantity=responses.quantity,
-        unit=responses.unit,
-    )
+        single = np.where(np.isfinite(self._least), self._least, np.nan)
+        return Responses(
+            lines=newest.lines,
+            value=np.where(valid, self._mean, complex(np.nan, np.nan))[np.newaxis],
+            sigma=np.where(several, scatter, single)[np.newaxis],
+            dof=np.array([windows[several].min() - 1 if several.any() else self._dof or np.nan]),
+            coherence=np.full((1, len(valid)), np.nan),
+            valid=valid[np.newaxis],
+            first=np.array([self._first]),
+            sample=newest.sample,
+            time_s=np.array([self._moment / self._rows]),
+            schedule=np.array([self._schedule / self._scheduled if self._scheduled else np.nan]),
+            quantity=newest.quantity,
+            unit=newest.unit,
+        )
+
+
+class _Overlap:
+    """Σᵢⱼ max(0, 1 − dᵢⱼ/N) = Σₜ C(t)²/N, C(t) the number of windows that hold sample t, as windows go by in order."""
+
+    def __init__(self, window: int, lines: int) -> None:
+        self._window = window
+        self._stop = np.empty(0, dtype=np.int64)
+        self._used = np.empty((0, lines))
+        self._done: int | None = None
+        self._sum = np.zeros(lines)
+
+    def add(self, stop: NDArray[np.int64], used: Floats) -> None:
+        self._stop = np.concatenate([self._stop, stop])
+        self._used = np.concatenate([self._used, used])
+        self._advance(int(self._stop[-1]) - self._window)  # no window to come begins before that
+
+    def total(self) -> Floats:
+        self._advance(int(self._stop[-1]))
+        return self._sum
+
+    def _advance(self, until: int) -> None:
+        start = int(self._stop[0]) - self._window if self._done is None else self._done
+        edges = np.concatenate([self._stop - self._window, self._stop]).clip(start, until)
+        order = np.argsort(edges, kind="stable")
+        covering = np.cumsum(np.concatenate([self._used, -self._used])[order], axis=0)[:-1]
+        self._sum += (covering**2 * np.diff(edges[order])[:, np.newaxis]).sum(axis=0) / self._window
+        self._done = until
+        still = self._stop > until
+        self._stop, self._used = self._stop[still], self._used[still]

@@ -157,7 +157,7 @@ def fit(
     >>> round(found["Keff"]), round(found["mL"], 4), round(found["resonance"], 3)
     (500000, 6.7, 59.357)
     """
-    one = mean_response(measured) if isinstance(measured, Responses) else as_row(measured)
+    one = mean_response(measured) if isinstance(measured, Responses) else Responses.of(measured)
     fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
     return fit_of(fitter, fitter.process(one))
 
@@ -175,12 +175,3 @@ def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
         rate_hz=grid.rate_hz,
         hold=grid.hold,
     )
-
-
-def as_row(response: Response) -> Responses:
-    """One Response as a batch of one."""
-    rows = {name: np.array([getattr(response, name)]) for name in _ROWS}
-    return Responses(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
-
-
-_ROWS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.fitting.fitter import measured_of
-from livebode.fitting.once import as_row
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
 from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
@@ -66,7 +65,7 @@ def fit_rational(
     >>> fit_rational(exact, order=3)["b2"].round(4)
     array([0.1774])
     """
-    responses = measured if isinstance(measured, Responses) else as_row(measured)
+    responses = measured if isinstance(measured, Responses) else Responses.of(measured)
     q, m = order, order - 1 if numerator_order is None else numerator_order
     if not (1 <= q <= _ORDER_MAX and 0 <= m < q):
         raise InputError(

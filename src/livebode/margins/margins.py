@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.nouns import InputError, Parameters
-from livebode.nouns.parameters import OK
+from livebode.nouns.parameters import OK, half_width
+from livebode.nouns.rows import joined
 
 Floats = NDArray[np.float64]
 
@@ -94,11 +95,7 @@ class Margins:
         InputError
             If the probability is not between 0 and 1.
         """
-        if not 0 < probability < 1:
-            raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
-        from scipy.special import ndtri
-
-        return np.asarray(self.sigma * float(ndtri(0.5 + probability / 2)))
+        return half_width(self.sigma, probability)
 
     def parameters(self) -> tuple[Parameters, ...]:
         """For a table in long form: each margin and where it was read, with its place as status."""
@@ -127,6 +124,4 @@ class Margins:
     @classmethod
     def join(cls, parts: list[Margins]) -> Margins:
         """Parts of one run, in order, as one."""
-        if not parts:
-            raise InputError("there are no margins to join; give at least one part")
-        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in PER_ROW})
+        return cls(**joined(parts, PER_ROW, "margins"))

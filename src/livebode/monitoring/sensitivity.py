@@ -7,23 +7,15 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.offset import Offset
 from livebode.motion import MovingModel
-from livebode.nouns import InputError
-from livebode.simulation._axis import Engine
-from livebode.simulation.configuration import BeltAxis, engine_settings
-from livebode.simulation.mechanics import Mechanics
-from livebode.simulation.motion import Standstill
-from livebode.simulation.settings import Drive
+from livebode.motion.replay import PLACE_M, advance, engine, torque_only
 
 Floats = NDArray[np.float64]
 
 DIRECTIONS = ("stiffness", "load", "damping", "inertia")
 """What a change is told apart into: Keff, mL, bs, Js; each as a small change of its logarithm."""
 
-_STATES = 4
 _STEP = 1e-3  # of a logarithm; the change is linear to a twentieth of a percent
 _GRID = 4096
-_PLACE_M = 1.0  # where the small motion is simulated; the belt is set tick by tick
-_ANYWHERE_M = 1e12
 
 
 class Replay:
@@ -39,20 +31,7 @@ class Replay:
         most = float(stiffness.max()), float(damping.max())
         self._stiffness, self._damping = stiffness / most[0], damping / most[1]
         self._load_kg, self._radius_m = model.load_kg, model.radius_m
-        mechanics = Mechanics(
-            inertia_kg_m2=model.inertia_kg_m2,
-            pulley_inertia_kg_m2=model.inertia_kg_m2 / 4,  # part of Js with two masses
-            load_kg=model.load_kg,
-            radius_m=model.radius_m,
-            stiffness_n_per_m=most[0],
-            damping_n_s_per_m=most[1],
-            nominal_position_m=_PLACE_M,
-            frozen_position_m=_PLACE_M,
-        )
-        drive = Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
-                      position_gain_per_s=0.0)  # fmt: skip
-        axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=_PLACE_M))
-        self._settings = engine_settings(axis) | {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
+        self._settings = engine(model, torque_only(rate_hz), most)
         self._inertia_kg_m2 = model.inertia_kg_m2
 
     def __call__(self, u: Floats, position_m: Floats, offset: Offset) -> tuple[Floats, Floats]:
@@ -63,7 +42,7 @@ class Replay:
         """
         factors = np.exp(offset.logarithms)
         inputs = np.zeros((8, u.size))
-        inputs[0], inputs[2] = _PLACE_M / self._radius_m, u
+        inputs[0], inputs[2] = PLACE_M / self._radius_m, u
         inputs[4] = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
         inputs[5] = np.interp(position_m, self._at, self._damping) * factors[2]
         inputs[6] = self._load_kg * factors[1]
@@ -78,8 +57,6 @@ class Replay:
         return plain, (slopes - plain) / _STEP
 
     def _run(self, inertia_kg_m2: float, inputs: Floats) -> Floats:
-        output = np.empty((3 + _STATES, inputs.shape[1]))
-        engine = Engine(self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}, _PLACE_M)
-        if engine.advance(inputs, output) < inputs.shape[1]:
-            raise InputError("the baseline's model does not stay finite under this torque; check its signals and units")
-        return np.asarray(output[1])
+        settings = self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}
+        wrong = "the baseline's model does not stay finite under this torque; check its signals and units"
+        return np.asarray(advance(settings, inputs, wrong)[1])

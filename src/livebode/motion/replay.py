@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,8 +17,8 @@ from livebode.simulation.settings import Drive
 
 Floats = NDArray[np.float64]
 
+PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
 _STATES = 4
-_PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
 _ANYWHERE_M = 1e12
 
 
@@ -26,9 +28,7 @@ def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats)
     Whatever made the torque (excitation, motion, the controllers' answer to noise) moves the model as it moved the
     machine. What is not in u or not in the model, such as friction, makes it drift away slowly; see `without_drift`.
     """
-    drive = Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
-                  position_gain_per_s=0.0)  # fmt: skip
-    _, motor, cart = _run(model, drive, u, position_m)
+    _, motor, cart = _run(model, torque_only(rate_hz), u, position_m)
     return motor, cart
 
 
@@ -56,10 +56,17 @@ def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
     return np.asarray(model + slow)
 
 
-def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats, Floats]:
-    """u, velocity of the motor, velocity of the cart."""
-    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
-    most = float(stiffness.max()), float(damping.max())
+def torque_only(rate_hz: float) -> Drive:
+    """A drive whose controllers do nothing: its torque is what is put in as w."""
+    return Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
+                 position_gain_per_s=0.0)  # fmt: skip
+
+
+def engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[str, Any]:
+    """Settings of the Engine for the model's small motion around `PLACE_M`, however far it goes.
+
+    `most`: the stiffness, N/m, and the damping, N s/m, that its inputs 4 and 5 give tick by tick as shares.
+    """
     mechanics = Mechanics(
         inertia_kg_m2=model.inertia_kg_m2,
         pulley_inertia_kg_m2=model.inertia_kg_m2 / 4,  # part of Js with two masses
@@ -67,16 +74,28 @@ def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tup
         radius_m=model.radius_m,
         stiffness_n_per_m=most[0],
         damping_n_s_per_m=most[1],
-        nominal_position_m=_PLACE_M,
-        frozen_position_m=_PLACE_M,
+        nominal_position_m=PLACE_M,
+        frozen_position_m=PLACE_M,
     )
-    axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=_PLACE_M))
-    wide = {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
-    engine = Engine(engine_settings(axis) | wide, _PLACE_M)
+    axis = BeltAxis(mechanics=mechanics, drive=drive, motion=Standstill(position_m=PLACE_M))
+    return engine_settings(axis) | {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
+
+
+def advance(settings: dict[str, Any], inputs: Floats, otherwise: str) -> Floats:
+    """What the Engine gives for inputs of shape (8, samples), from rest; InputError(otherwise) where it diverges."""
+    output = np.empty((3 + _STATES, inputs.shape[1]))
+    if Engine(settings, PLACE_M).advance(inputs, output) < inputs.shape[1]:
+        raise InputError(otherwise)
+    return output
+
+
+def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats, Floats]:
+    """u, velocity of the motor, velocity of the cart."""
+    stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
+    most = float(stiffness.max()), float(damping.max())
     inputs = np.zeros((8, w.size))
-    inputs[0], inputs[2] = _PLACE_M / model.radius_m, w
+    inputs[0], inputs[2] = PLACE_M / model.radius_m, w
     inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
-    output = np.empty((3 + _STATES, w.size))
-    if engine.advance(inputs, output) < w.size:
-        raise InputError("the fitted model does not stay in its loop; check the loop's description and the radius")
+    wrong = "the fitted model does not stay in its loop; check the loop's description and the radius"
+    output = advance(engine(model, drive, most), inputs, wrong)
     return output[0], output[1], output[6]

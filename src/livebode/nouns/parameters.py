@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.nouns.errors import InputError
+from livebode.nouns.rows import joined
 
 Floats = NDArray[np.float64]
 
@@ -18,6 +19,15 @@ OK = "ok"
 
 _PER_ROW = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
 _STEP = 1e-6
+
+
+def half_width(sigma: Floats, probability: float) -> Floats:
+    """Half-width of the interval that holds a normal value with this probability: 1.96 sigma for 0.95."""
+    if not 0 < probability < 1:
+        raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
+    from scipy.special import ndtri
+
+    return np.asarray(sigma * float(ndtri(0.5 + probability / 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +117,7 @@ class Parameters:
         InputError
             If the probability is not between 0 and 1.
         """
-        if not 0 < probability < 1:
-            raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
-        from scipy.special import ndtri
-
-        return np.asarray(self.sigma * float(ndtri(0.5 + probability / 2)))
+        return half_width(self.sigma, probability)
 
     def derived(self, names: Sequence[str], units: Sequence[str], of: Callable[[Floats], Floats]) -> Parameters:
         """Quantities that follow from these, with their covariance by linear propagation.
@@ -135,10 +141,7 @@ class Parameters:
     @classmethod
     def join(cls, parts: Sequence[Parameters]) -> Parameters:
         """Parts of one run, in order, as one; InputError where they are of different models."""
-        if not parts:
-            raise InputError("there are no parameters to join; give at least one part")
-        head = parts[0]
-        if any((p.model, p.names, p.units) != (head.model, head.names, head.units) for p in parts):
+        if any((p.model, p.names, p.units) != (parts[0].model, parts[0].names, parts[0].units) for p in parts):
             raise InputError("parameters of different models cannot be joined; fit one model")
-        rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _PER_ROW}
-        return replace(head, **rows)
+        rows = joined(parts, _PER_ROW, "parameters")
+        return replace(parts[0], **rows)

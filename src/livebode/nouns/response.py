@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.nouns.errors import GridError, InputError
 from livebode.nouns.lines import Lines
+from livebode.nouns.rows import joined
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 Floats = NDArray[np.float64]
@@ -164,12 +165,15 @@ class Responses(Sequence[Response]):
             return np.asarray(20 * np.log10(np.abs(self.value)))
 
     @classmethod
+    def of(cls, response: Response) -> Responses:
+        """One Response as a batch of one."""
+        rows: dict[str, Any] = {name: np.array([getattr(response, name)]) for name in _PER_ROW}
+        return cls(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
+
+    @classmethod
     def join(cls, parts: Sequence[Responses]) -> Responses:
         """Parts of one run, in order, as one; GridError where their lines differ."""
-        if not parts:
-            raise InputError("there are no responses to join; give at least one part")
-        head = parts[0]
-        if any((p.lines, p.quantity, p.unit) != (head.lines, head.quantity, head.unit) for p in parts):
+        if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
             raise GridError("responses on different lines or of different quantities cannot be joined")
-        rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _PER_ROW}
-        return replace(head, **rows)
+        rows = joined(parts, _PER_ROW, "responses")
+        return replace(parts[0], **rows)

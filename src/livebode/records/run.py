@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.arrow import to_numpy
 from livebode.nouns import Event, InputError, Lines, Responses
 from livebode.records.response_table import SCHEMA
 from livebode.records.segments import json_lines, reading
@@ -142,7 +143,9 @@ class Run:
 
     def _responses(self, table: pa.Table, lines: Lines) -> Responses:
         shape = table.num_rows // len(lines), len(lines)
-        column = {name: table[name].to_numpy().reshape(shape) for name in table.column_names}
+        column: dict[str, Any] = {
+            name: to_numpy(table[name].combine_chunks()).reshape(shape) for name in table.column_names
+        }
         value = np.empty(shape, dtype=np.complex128)
         value.real, value.imag = column["re"], column["im"]
         per_line = {name: column[name] for name in ("sigma", "coherence", "valid")}

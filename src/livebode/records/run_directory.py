@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from livebode.nouns import Event, InputError, Parameters, Responses
-from livebode.records.parameter_table import ParameterTable
+from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.plain_json import to_json
-from livebode.records.response_table import ResponseTable
+from livebode.records.response_table import RESPONSES, as_batch
+from livebode.records.table_file import TableFile
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
@@ -24,7 +25,7 @@ class RunDirectory:
     """Responses, events and a summary of one run in a new directory that appears only when it is whole.
 
     Use it as a context manager: leaving it without an exception puts the directory in its place, any exception removes
-    what was written. What any tool reads: ``responses.parquet`` (see `ResponseTable`), ``events.jsonl`` (one object
+    what was written. What any tool reads: ``responses.parquet`` (see `RESPONSES`), ``events.jsonl`` (one object
     a line: kind, sample, time_s, message, details) and ``run.json``.
 
     Parameters
@@ -52,8 +53,8 @@ class RunDirectory:
             try:
                 self.partial.chmod(0o755)
                 self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
-                self._responses = ResponseTable(self.partial / "responses.parquet")
-                self._parameters: ParameterTable | None = None
+                self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
+                self._parameters: TableFile | None = None
             except BaseException:
                 shutil.rmtree(self.partial, ignore_errors=True)
                 raise
@@ -77,14 +78,15 @@ class RunDirectory:
     def write(self, responses: Responses) -> None:
         """Append responses."""
         with _disk_errors(self.path):
-            self._responses.write(responses)
+            self._responses.write(as_batch(responses))
 
     def write_parameters(self, *parts: Parameters) -> None:
         """Append what was fitted and what follows; the file ``parameters.parquet`` is there once anything was."""
         with _disk_errors(self.path):
             if self._parameters is None:
-                self._parameters = ParameterTable(self.partial / "parameters.parquet")
-            self._parameters.write(*parts)
+                self._parameters = TableFile(self.partial / "parameters.parquet", PARAMETERS)
+            for parameters in parts:
+                self._parameters.write(parameter_rows(parameters))
 
     def write_event(self, event: Event) -> None:
         """Append an event."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyarrow as pa
 
+from livebode.arrow import from_numpy
 from livebode.nouns import Block, Channel
 from livebode.records.table import Table
 
@@ -29,4 +30,4 @@ def samples_of(channels: Sequence[Channel]) -> Table:
 def as_rows(block: Block, table: Table) -> pa.RecordBatch:
     """The samples of a Block whose channels are those of the table."""
     number = np.arange(block.start, block.stop, dtype=np.int64)
-    return pa.record_batch([pa.array(c) for c in (number, block.time_s, *block.data)], schema=table.schema)
+    return pa.record_batch([from_numpy(c) for c in (number, block.time_s, *block.data)], schema=table.schema)

@@ -1,13 +1,13 @@
-"""Arrow schemas as columns and Arrow arrays as NumPy arrays: what Parquet and Arrow IPC have in common."""
+"""Arrow schemas as columns and their values as NumPy arrays: what Parquet and Arrow IPC have in common."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from livebode import arrow
 from livebode.nouns import InputError
 from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
 from livebode.sources.units import split_units
@@ -69,10 +69,9 @@ def to_numpy(array: pa.Array[Any]) -> NDArray[Any]:
         array = array.dictionary_decode()
     if is_temporal(array.type):
         factor = NANOSECONDS[array.type.unit]
-        array = array.view(pa.int64())
-        return np.asarray(array.to_numpy(zero_copy_only=False)) * factor
+        return arrow.to_numpy(array.view(pa.int64())) * factor
     if pa.types.is_decimal(array.type):
         array = array.cast(pa.float64())
     if pa.types.is_boolean(array.type):
         array = array.cast(pa.uint8())
-    return np.asarray(array.to_numpy(zero_copy_only=False))
+    return arrow.to_numpy(array)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import pyarrow as pa
 
+from livebode.arrow import to_numpy
 from livebode.records.segments.frames import ROWS, to_frame
 
 
@@ -44,9 +44,9 @@ class Waiting:
         """Make one frame for each table of what was added."""
         for table, batches in self._new.items():
             batch = pa.concat_batches(batches)
-            sample = batch["sample"].to_numpy()
+            sample = to_numpy(batch["sample"])
             frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
-            self._parts.append(_Part(table, frame, batch.num_rows, int(np.min(sample)), int(np.max(sample))))
+            self._parts.append(_Part(table, frame, batch.num_rows, int(sample.min()), int(sample.max())))
         self._new.clear()
 
     @property

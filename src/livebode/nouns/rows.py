@@ -1,0 +1,17 @@
+"""What all batches share that hold one row for each moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from livebode.nouns.errors import InputError
+
+
+def joined(parts: Sequence[Any], names: Sequence[str], what: str) -> dict[str, Any]:
+    """The arrays of these names of all parts, one behind the other; InputError where there is no part."""
+    if not parts:
+        raise InputError(f"there are no {what} to join; give at least one part")
+    return {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}

@@ -1,0 +1,39 @@
+"""A table as one Parquet file, that any tool reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.records.table import Table
+
+_GROUP_ROWS = 1 << 18
+
+
+class TableFile:
+    """Appends rows of a Table to a Parquet file, by row groups of bounded size."""
+
+    def __init__(self, path: Path, table: Table) -> None:
+        self._schema = table.schema
+        self._file = pq.ParquetWriter(path, table.schema, use_dictionary=list(table.repeating), compression="lz4")
+        self._waiting: list[pa.RecordBatch] = []
+        self._rows = 0
+
+    def write(self, rows: pa.RecordBatch) -> None:
+        if not rows.num_rows:
+            return
+        self._waiting.append(rows)
+        self._rows += rows.num_rows
+        if self._rows >= _GROUP_ROWS:
+            self._flush()
+
+    def close(self) -> None:
+        self._flush()
+        self._file.close()
+
+    def _flush(self) -> None:
+        if self._waiting:
+            self._file.write_table(pa.Table.from_batches(self._waiting, self._schema), row_group_size=_GROUP_ROWS)
+        self._waiting, self._rows = [], 0
