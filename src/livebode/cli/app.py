@@ -17,6 +17,7 @@ import traceback
 import typer
 
 from livebode.cli.demo_command import demo_command
+from livebode.cli.design_command import design_command
 from livebode.cli.export_command import export_command
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
@@ -39,6 +40,7 @@ app.command("run")(run_command)
 app.command("fit")(fit_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
+app.command("design")(design_command)
 app.command("query")(query_command)
 app.command("export")(export_command)
 app.command("margins")(margins_command)
