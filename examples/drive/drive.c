@@ -9,19 +9,14 @@
  * digits of float's seven fewer. So it is taken off before the DFT, and the receiver is told. */
 static const float subtracted[DRIVE_SIGNALS] = {0, DRIVE_VELOCITY_RAD_S};
 
-static const char layout[] = "window\t" TEXT(EXCITATION_PERIOD) "\nhop\t" TEXT(DRIVE_HOP) "\n"
-                             "lines\t" EXCITATION_BINS_TEXT "\n"
-                             "signal\tu\tN m\t0\n"
-                             "signal\ty\trad/s\t" TEXT(DRIVE_VELOCITY_RAD_S) "\n";
-
-static const uint32_t bins[EXCITATION_LINES] = {EXCITATION_BINS};
-
-/* What lb_sdft32_size asks for: 7,448 bytes for 21 lines. */
-static unsigned char memory[8192];
+/* As lb_sdft32_size asks: table and delay lines, then what each line takes, then the object itself. */
+static unsigned char memory[EXCITATION_SAMPLES * (8 + 4 * DRIVE_SIGNALS) + EXCITATION_LINES * (12 + 16 * DRIVE_SIGNALS) +
+                            256];
 
 static lb_sdft32 *dft;
 static uint64_t epoch, samples;
-static uint32_t sequence, layout_crc;
+static char layout[DRIVE_LAYOUT_TEXT];
+static uint32_t sequence, layout_bytes, layout_crc;
 static uint32_t place;       /* of the next sample in the excitation's period */
 static uint32_t whole_after; /* samples until the window holds neither the start nor one that was not finite */
 static struct {
@@ -31,13 +26,46 @@ static struct {
 } latest;
 static volatile int waits;
 
+static void say(const char *text)
+{
+    while (*text) {
+        layout[layout_bytes++] = *text++;
+    }
+}
+
+static void say_bin(unsigned number)
+{
+    char digits[11], *at = digits + sizeof digits;
+    *--at = 0;
+    do {
+        *--at = (char)('0' + number % 10);
+        number /= 10;
+    } while (number);
+    say(at);
+}
+
+static void describe(void)
+{
+    say("window\t" TEXT(EXCITATION_SAMPLES) "\nhop\t" TEXT(DRIVE_HOP) "\nlines");
+    for (int i = 0; i < EXCITATION_LINES; ++i) {
+        say(i ? " " : "\t");
+        say_bin(excitation_bins[i]);
+    }
+    say("\nsignal\tu\tN m\t0\nsignal\ty\trad/s\t" TEXT(DRIVE_VELOCITY_RAD_S) "\n");
+    layout_crc = lb_frame_crc(0, layout, layout_bytes);
+}
+
 int drive_begin(uint64_t epoch_)
 {
-    const lb_config config = {.window = EXCITATION_PERIOD, .channels = DRIVE_SIGNALS, .bin_count = EXCITATION_LINES,
+    uint32_t bins[EXCITATION_LINES];
+    for (int i = 0; i < EXCITATION_LINES; ++i) {
+        bins[i] = excitation_bins[i];
+    }
+    const lb_config config = {.window = EXCITATION_SAMPLES, .channels = DRIVE_SIGNALS, .bin_count = EXCITATION_LINES,
                               .bins = bins, .table = LB_TABLE_COMPACT};
     epoch = epoch_;
-    whole_after = EXCITATION_PERIOD;
-    layout_crc = lb_frame_crc(0, layout, sizeof layout - 1);
+    whole_after = EXCITATION_SAMPLES;
+    describe();
     return lb_sdft32_init(memory, sizeof memory, &config, &dft) != LB_OK;
 }
 
@@ -49,10 +77,10 @@ void drive_tick(float torque_n_m, float velocity_rad_s)
 {
     const float x[DRIVE_SIGNALS] = {torque_n_m - subtracted[0], velocity_rad_s - subtracted[1]};
     (void)lb_sdft32_push(dft, x);
-    place = place + 1 < EXCITATION_PERIOD ? place + 1 : 0;
+    place = place + 1 < EXCITATION_SAMPLES ? place + 1 : 0;
     whole_after -= whole_after > 0;
     if (!is_finite(x[0]) || !is_finite(x[1])) {
-        whole_after = 2 * EXCITATION_PERIOD; /* the kernel has forgotten it by then */
+        whole_after = 2 * EXCITATION_SAMPLES; /* the kernel has forgotten it by then */
     }
     if (++samples % DRIVE_HOP == 0) {
         (void)lb_sdft32_read(dft, LB_PHASE_FIXED, &latest.sums[0][0][0]);
@@ -86,5 +114,5 @@ size_t drive_spectrum(uint8_t frame[DRIVE_FRAME_BYTES], float frf[EXCITATION_LIN
 size_t drive_layout(uint8_t frame[DRIVE_LAYOUT_BYTES])
 {
     return lb_frame(frame, LB_FRAME_SPECTRA_LAYOUT, sequence++, epoch, 0, 0, EXCITATION_RATE_HZ, layout_crc,
-                    DRIVE_SIGNALS, 0, layout, sizeof layout - 1);
+                    DRIVE_SIGNALS, 0, layout, layout_bytes);
 }

@@ -7,6 +7,7 @@
 
 #include "livebode_frame.h"
 
+#define EXCITATION_TYPE float
 #include "excitation.h"
 
 #define DRIVE_HOP 200 /* samples from spectrum to spectrum, 20 a second; it divides the window */
@@ -16,7 +17,8 @@
 
 enum { DRIVE_SIGNALS = 2 };
 #define DRIVE_FRAME_BYTES LB_FRAME_BYTES(LB_FRAME_SPECTRA_PAYLOAD(DRIVE_SIGNALS, EXCITATION_LINES, 0, 1))
-#define DRIVE_LAYOUT_BYTES LB_FRAME_BYTES(512)
+#define DRIVE_LAYOUT_TEXT (160 + 6 * EXCITATION_LINES)
+#define DRIVE_LAYOUT_BYTES LB_FRAME_BYTES(DRIVE_LAYOUT_TEXT)
 
 /* epoch: another number at each start. 0 when it is ready. */
 int drive_begin(uint64_t epoch);

@@ -33,11 +33,8 @@ URL = 'url = "tcp://127.0.0.1:5000"'
 def constants() -> dict[str, float]:
     """What machine.c defines."""
     text = (FOLDER / "machine.c").read_text(encoding="utf-8")
-    found = {}
-    for name, value in re.findall(r"#define (\w+) \(?([\d.e/f -]+)", text):
-        over, _, under = value.replace("f", "").partition(" / ")
-        found[name] = float(over) / float(under or 1)
-    return found
+    found = re.findall(r"#define (\w+) \(?([\d.e-]+)f(?: / ([\d.]+)f)?", text)
+    return {name: float(over) / float(under or 1) for name, over, under in found}
 
 
 def built(directory: Path, *defines: str) -> Path:
