@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from bench.firmware import M4F, M7
+from livebode import open_log
+from tests.real_recordings import recording
 from tests.targets import VARIANTS, Job, need_tools, on_host, on_target, replay
 
 SHAPES = [
@@ -108,3 +110,11 @@ def test_it_goes_on_from_the_hosts_snapshot(target):
         for before in (1, 49, 50, 51, 99, 100, 260)
     ]
     assert len(list(check(target, jobs))) == 14
+
+
+def test_a_real_recording(target):
+    """Two periods and a bit of the motor bench, its position drifting: windows of 2,500 samples, 40 lines."""
+    log = open_log(recording("motorbench/MultisineTypeA.mat"))
+    samples = next(iter(log.blocks(["iq_adx", "theta_mx"]))).data[:, :5600].T
+    jobs = [Job(samples, 2500, tuple(range(11, 51)), 500, compact=compact) for compact in (False, True)]
+    assert [made.rows.shape for _, made in check(target, jobs)] == [(2, 11, 40)] * 2
