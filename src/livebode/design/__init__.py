@@ -3,7 +3,8 @@
 from livebode.design.accuracy import Accuracy, accuracy_of
 from livebode.design.axis_file import axis_text
 from livebode.design.belt import belt_machine
-from livebode.design.choose import Choice, Design, choose
+from livebode.design.choose import Design, choose
+from livebode.design.explain import Choice
 from livebode.design.files import FORMATS, write
 from livebode.design.limits import Bearable
 from livebode.design.machine import QUANTITIES, UNITS, Machine, Place

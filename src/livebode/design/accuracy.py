@@ -48,8 +48,8 @@ def accuracy_of(waveform: Waveform, machine: Machine) -> Accuracy:
     """Sigma of one window of the joint or indirect estimate, sigma² = N·σ²/|U_k|², worst over the places.
 
     For white noise of standard deviation σ on the output, to first order in noise over signal, in the periodic state.
-    Near a lightly damped resonance it comes out up to a third larger in windows of a tenth of a second
-    (docs/estimators.md); what motion changes within a window is not in it.
+    Near a lightly damped resonance it comes out up to 1.4 times larger in windows of a tenth of a second; what motion
+    changes within a window is not in it.
     """
     f = waveform.lines.frequency_hz
     seen = waveform.amplitude * waveform.lines.window / 2

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from livebode.design.accuracy import HOLDING_95, Accuracy, accuracy_of
-from livebode.design.grid import Grid, grid
+from livebode.design.accuracy import Accuracy, accuracy_of
+from livebode.design.explain import Choice, explained
+from livebode.design.grid import grid
 from livebode.design.limits import Bearable, check, room
 from livebode.design.machine import UNITS, Machine
 from livebode.design.make import unit_waveform
@@ -22,19 +23,10 @@ from livebode.nouns import InputError
 # Of the room that the limits leave: what the prediction may err by.
 _RESERVE = 0.1
 _WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
-# From rest the position drifts further than in the periodic state; brought in so slowly, by 4 % (studies/design.py).
+# From rest the position drifts further than in the periodic state; brought in so slowly, by 3 % (studies/design.py).
 _RAMP_S = 0.5
 _STROKES_MIN = 2  # there and back
 _WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One row of the table that explains a design."""
-
-    what: str
-    value: str
-    why: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +114,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     check(predicted, limits, factor * per_unit)
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
-    recording_s = _recording_s(waveform, machine, windows)
+    recording_s, recording_why = _recording(waveform, machine, windows)
     design = Design(
         wish=wish,
         machine=machine,
@@ -137,7 +129,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         ramp_s=ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz,
         choices=(),
     )
-    return replace(design, choices=explained(design, found, why))
+    return replace(design, choices=explained(design, found, why, recording_why))
 
 
 def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> tuple[float, str]:
@@ -160,60 +152,12 @@ def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> t
     return allowed, f"the most that the {first.quantity} bears, less {100 * _RESERVE:g} %"
 
 
-def _recording_s(waveform: Waveform, machine: Machine, windows: int) -> float:
+def _recording(waveform: Waveform, machine: Machine, windows: int) -> tuple[float, str]:
+    """How long, and why."""
     if machine.stroke_s is not None:
-        return max(windows, _STROKES_MIN) * machine.stroke_s
-    return (max(windows, _WINDOWS_MIN) + 1) * waveform.lines.window / waveform.lines.rate_hz
-
-
-def explained(design: Design, found: Grid, amplitude_why: str) -> tuple[Choice, ...]:
-    """The table: what was chosen, and why."""
-    waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
-    f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
-    spacing = f"{np.diff(f).min():g} Hz apart" if len(f) > 1 else "alone"
-    bound = HOLDING_95 * design.accuracy.relative / np.sqrt(design.windows)
-    weakest = int(np.argmax(design.accuracy.relative))
-    rows = [
-        Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
-        Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
-        Choice("amplitude", f"{design.amplitude_n_m:.4g} N m", amplitude_why),
-        Choice(
-            "peak, rms", f"{waveform.peak:.4g}, {waveform.rms:.4g} N m", f"crest factor {waveform.crest_factor:.3f}"
-        ),
-    ]
-    rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
-    if machine.noise > 0:
-        many = f"{design.windows} window{'s' * (design.windows > 1)}"
-        told = f"at {f[weakest]:g} Hz after {many}; σ = {machine.noise:g}"
-        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
-    rows.append(Choice("recording", f"{design.recording_s:.4g} s", _recording_why(design)))
-    rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
-    rows.append(Choice("hop", f"{design.hop} samples", "a divisor of the window near a twentieth"))
-    return tuple(rows)
-
-
-def _recording_why(design: Design) -> str:
-    if design.machine.stroke_s is not None:
-        return f"{max(design.windows, _STROKES_MIN)} strokes: each passes every place once"
-    if design.windows > _WINDOWS_MIN:
-        return f"{design.windows} windows, averaged, and one before the first is whole"
-    return f"{_WINDOWS_MIN} windows to learn sigma from, and one before the first is whole"
-
-
-def _limit_row(peak: Peak, limits: Bearable) -> Choice:
-    low, high = limits.of(peak.quantity)
-    unit = UNITS[peak.quantity]
-    borne = f"limits {low:g} … {high:g}" if peak.quantity == "travel" else f"limit {high:g}"
-    limited = np.isfinite(high) or np.isfinite(low)
-    size = f"{peak.low:.4g} … {peak.high:.4g}" if peak.quantity == "travel" else f"{peak.size:.3g}"
-    alone = (
-        f"{peak.own[0]:.4g} … {peak.own[1]:.4g}"
-        if peak.quantity == "travel"
-        else f"{max(peak.own[1], -peak.own[0]):.3g}"
-    )
-    where = f", {peak.place}" if peak.place else ""
-    return Choice(
-        f"peak {peak.quantity}",
-        f"{size} {unit}",
-        f"{borne if limited else 'no limit'}; the motion alone {alone}{where}",
-    )
+        strokes = max(windows, _STROKES_MIN)
+        return strokes * machine.stroke_s, f"{strokes} strokes: each passes every place once"
+    many = max(windows, _WINDOWS_MIN)
+    why = "averaged" if windows > _WINDOWS_MIN else "to learn sigma from"
+    seconds = (many + 1) * waveform.lines.window / waveform.lines.rate_hz
+    return seconds, f"{many} windows, {why}, and one before the first is whole"

@@ -15,7 +15,7 @@ from livebode.nouns import GridError, Lines
 from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
-_BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2 dB there, and its first zero is well above
+_BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
 _WORTH_FACTORS = 1000  # a window named by lines typed with many digits is no one's wish beyond this many times the rate
 
 

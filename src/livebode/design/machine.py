@@ -62,8 +62,8 @@ class Machine:
         Ticks of the drive per second.
     noise
         Standard deviation of white noise on the measured output, in its unit; 0 where it is not known.
-    moves
-        Whether it moves during the experiment; and in how many seconds it passes each place once.
+    stroke_s
+        Seconds in which the motion passes each place once; None for an axis that stands.
     notes
         What the prediction leaves out, in sentences.
     """

@@ -29,8 +29,8 @@ def chirp(
     The angle over a whole period is a whole number of turns, so that the next period begins where this one ends: low
     and high frequency are brought to bins for a linear sweep (to a sum that is even), and scaled by at most half
     a turn in all for a logarithmic one. The frequency leaps back at the border, the signal does not. Crest factor √2;
-    lines at all bins of the band, of some 2 dB more or less in a linear sweep, falling by 3 dB an octave in a
-    logarithmic one.
+    lines at all bins of the band, of much the same size in a linear sweep, falling by 3 dB an octave in a logarithmic
+    one, and at half their size at the ends.
 
     Raises
     ------

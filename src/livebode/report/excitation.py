@@ -38,7 +38,7 @@ def excitation_figure(design: Design, *, dark: bool = False) -> Figure:
         figure = new_figure(11.0, 6.6)
         height = figure.get_size_inches()[1]
         grid = figure.add_gridspec(
-            3, 2, width_ratios=[4, 1], height_ratios=[4, 2.4, 1.6], left=0.075, right=0.985, top=1 - 1.2 / height,
+            3, 2, width_ratios=[4, 1], height_ratios=[4, 2.7, 1.6], left=0.075, right=0.985, top=1 - 1.2 / height,
             bottom=0.55 / height, hspace=0.42, wspace=0.06,
         )  # fmt: skip
         heading(figure, look, f"Excitation: {_kind(waveform)}", _facts(design), 0.075)

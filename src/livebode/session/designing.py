@@ -57,6 +57,7 @@ def design_experiment(
             raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
     _check_free(directory, force)
     design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
+    lines = design.waveform.lines
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{directory.name[:100]}.partial-", dir=directory.parent) as folder:
@@ -65,7 +66,11 @@ def design_experiment(
             for kind in kinds:
                 write(partial / f"{name}{kind}", design.waveform, name)
             configuration = axis_text(
-                design, signals=experiment.signal_names(), log=experiment.log, loop=experiment.loop_tables()
+                design,
+                signals=experiment.signal_names(),
+                log=experiment.log,
+                loop=experiment.loop_tables(),
+                motion=experiment.motion_table(lines.window / lines.rate_hz),
             )
             (partial / "axis.toml").write_text(configuration, encoding="utf-8")
             (partial / _MARK).write_text(to_json(design.plain(), indent=1) + "\n", encoding="utf-8")

@@ -5,12 +5,11 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping
-from dataclasses import fields
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.design import Bearable, Machine, MeasuredResponse, Wish, belt_machine, measured_machine
 from livebode.design.machine import Quantity
@@ -176,6 +175,14 @@ class Experiment(BaseModel):
                     "held_ticks": drive.position_ticks}  # fmt: skip
         return {"velocity": velocity, "position": position}
 
+    def motion_table(self, window_s: float) -> dict[str, Any]:
+        """[motion] of the axis.toml, where a belt axis moves: a chunk is a stroke, and two windows at least."""
+        axis = self.axis()
+        if axis is None or (cycle := axis.motion.cycle(axis.drive.rate_hz)[0].size) == 1:
+            return {}
+        stroke_s = cycle / 2 / axis.drive.rate_hz
+        return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
+
     def signal_names(self) -> dict[str, str]:
         """[signals] of the axis.toml; those of the simulated axis where nothing is said."""
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
@@ -186,29 +193,16 @@ class Experiment(BaseModel):
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
     """The dataclass from plain data; InputError for a key it has not, or a value of another type."""
-    known = {field.name: field for field in fields(kind)}  # type: ignore[arg-type]
+    known = get_type_hints(kind)
     for name, value in given.items():
         if name not in known:
             raise InputError(f"there is no {section}.{name}; {_near(name, known)}")
-        wanted = str(known[name].type)
-        word = isinstance(value, str)
-        if word != (
-            "str" in wanted or "Literal" in wanted or wanted.split(" ")[0] in ("Kind", "Shape", "Phases", "Sweep")
-        ):
-            raise InputError(
-                f"{section}.{name} = {value!r} is not usable: {'a number' if word else 'a word'} belongs there"
-            )
-        if isinstance(value, bool) and "bool" not in wanted:
-            raise InputError(f"{section}.{name} = {value!r} is not usable: a number belongs there")
-        whole = "int" in wanted and "float" not in wanted
-        if whole and not isinstance(value, int):
-            raise InputError(f"{section}.{name} = {value!r} is not a whole number")
-    try:
-        return kind(**given)
-    except InputError:
-        raise
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{section}: {error}") from None
+        try:
+            TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
+        except ValidationError as error:
+            why = error.errors()[0]["msg"].lower()
+            raise InputError(f"{section}.{name} = {value!r} is not usable: {why}") from None
+    return kind(**given)
 
 
 def _near(name: str, known: Any) -> str:

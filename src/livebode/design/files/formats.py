@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from os import PathLike
 from pathlib import Path
 
 from livebode.design.files.arrays import write_mat, write_npz
@@ -20,7 +21,7 @@ FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
 """What writes an excitation under a name, by the suffix of the file. A further format is a function and a row here."""
 
 
-def write(path: Path, waveform: Waveform, name: str = "excitation") -> None:
+def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation") -> None:
     """Write one period in the format of the suffix.
 
     Raises
@@ -28,6 +29,7 @@ def write(path: Path, waveform: Waveform, name: str = "excitation") -> None:
     InputError
         If the suffix is not known, or the format forbids the name.
     """
-    if path.suffix not in FORMATS:
-        raise InputError(f"{path.name!r} has no suffix that is known; choose {', '.join(FORMATS)}")
-    FORMATS[path.suffix](path, waveform, name)
+    place = Path(path)
+    if place.suffix not in FORMATS:
+        raise InputError(f"{place.name!r} has no suffix that is known; choose {', '.join(FORMATS)}")
+    FORMATS[place.suffix](place, waveform, name)
