@@ -15,14 +15,26 @@ import zlib
 import numpy as np
 import pytest
 
-from livebode.nouns import Channel, InputError
-from livebode.sources.live import Batch, FrameDecoder, Sequencer, SourceSettings, encode_layout, encode_samples
+from livebode.estimation import Settings, SpectraTracker
+from livebode.nouns import Channel, InputError, Spectra, SpectraLayout
+from livebode.sources.live import (
+    Batch,
+    FrameDecoder,
+    Sequencer,
+    SourceSettings,
+    SpectraBatch,
+    encode_layout,
+    encode_samples,
+    encode_spectra,
+    encode_spectra_layout,
+)
 from livebode.sources.live.address import parse_address
-from livebode.sources.live.frame import FRAME_BYTES_MAX, HEADER, FrameSplitter
+from livebode.sources.live.framing import FRAME_BYTES_MAX, HEADER, FrameSplitter
 from livebode.sources.live.lines import LineSplitter
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_line
 from livebode.sources.live.said import Said
 from livebode.sources.live.settings import check_keys
+from livebode.sources.live.spectra_frame import read_spectra_text, spectra_text
 
 CASES = int(os.environ.get("LIVEBODE_LIVE_FUZZ", "10000"))
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
@@ -94,6 +106,87 @@ def test_damaged_frames_give_batches_or_a_sentence():
     assert decoded > CASES // 100
     assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
     assert len(sequencer._waiting) + len(sequencer._doubted) < 64
+
+
+SPECTRA = SpectraLayout(CHANNELS, (Channel("x", "m"),), 400, 20, (2, 4), (3,), (0.5, 0.0), (False, True))
+
+
+def spectra(first: int = 400, many: int = 3) -> SpectraBatch:
+    rng = np.random.default_rng(first)
+    sums = rng.standard_normal((2, many, 3)) + 1j * rng.standard_normal((2, many, 3))
+    state = np.arange(many, dtype=np.uint32) % 4
+    return SpectraBatch(first, sums, rng.standard_normal((1, many)), state, SPECTRA, 4000.0, 5, 1.7e9)
+
+
+def test_damaged_frames_of_spectra_give_batches_or_a_sentence():
+    rng = random.Random(7)
+    layout = encode_spectra_layout(SPECTRA, 4000.0, epoch=5)
+    decoder, sequencer = FrameDecoder(), Sequencer(Said(), reorder=0)
+    decoder.decode(layout)
+    decoder.decode(encode_layout(CHANNELS, 4000.0))
+    sequencer.push(spectra(340))
+    described = Settings(
+        lines=SPECTRA.at(4000.0), output="y", input="w", estimator="direct", schedule="x", hop=SPECTRA.hop
+    )
+    tracker, decoded, tracked = SpectraTracker(described, SPECTRA), 0, 0
+    for case in range(CASES):
+        if case % 100 == 0:
+            decoder.decode(layout)  # as a sender sends it again and again
+        if case % 20 == 0:  # the stream goes on
+            now = spectra(400 + 3 * case)
+            seeds = [layout, encode_spectra(now), encode_spectra(now, double=True), encode_samples(batch())]
+        raw = damaged(rng.choice(seeds), rng)
+        raw = with_crc(raw) if rng.random() < 0.7 else raw
+        try:
+            found = decoder.decode(raw)
+        except InputError as error:
+            refused(error)
+            continue
+        if found is None:
+            continue
+        decoded += 1
+        assert found.nbytes <= 2 * len(raw)
+        for block in sequencer.push(found):
+            # What is well formed goes all the way, whatever numbers it holds.
+            assert isinstance(block, Spectra)
+            tracked += len(tracker.process(block))
+    assert decoded > CASES // 100
+    assert tracked > CASES // 100
+    assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
+    assert len(sequencer._waiting) + len(sequencer._doubted) < 64
+
+
+def test_damaged_texts_of_spectra_give_a_layout_or_a_sentence():
+    rng = random.Random(8)
+    seed = spectra_text(SPECTRA)
+    tokens = [
+        b"\t",
+        b"\n",
+        b" ",
+        b"signal\t",
+        b"value\tx",
+        b"-1",
+        b"1e999",
+        b"nan",
+        b"9" * 30,
+        "ä".encode(),
+        b"\xff",
+        b"0",
+    ]
+    read = 0
+    for _ in range(CASES):
+        raw = bytearray(seed)
+        for _ in range(rng.choice([1, 1, 3])):
+            at = rng.randrange(len(raw))
+            raw[at : at + rng.randrange(6)] = rng.choice(tokens)
+        try:
+            found = read_spectra_text(bytes(raw) if rng.random() < 0.5 else damaged(bytes(raw), rng))
+        except InputError as error:
+            refused(error)
+            continue
+        read += 1
+        assert read_spectra_text(spectra_text(found)) == found
+    assert read > CASES // 100
 
 
 def test_a_stream_of_bytes_finds_its_frames_behind_rubbish():
@@ -218,6 +311,68 @@ def test_lines_are_cut_anywhere_alike():
         assert found + splitter.feed(b"") == lines
 
 
+FRAME = encode_spectra(spectra())
+
+
+def changed(at: int, new: bytes) -> bytes:
+    """The frame of spectra with other bytes from `at` on."""
+    return with_crc(FRAME[:at] + new + FRAME[at + len(new) :])
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [
+        (changed(24, struct.pack("<Q", 420)), r"ends at sample 420; with hop 20 they end one before its multiples"),
+        (changed(24, struct.pack("<Q", 2**64 - 1)), "is not between 0 and 2"),
+        (changed(24, struct.pack("<Q", 0)), "first_sample=-19"),
+        (changed(40, struct.pack("<d", 0.0)), "rate_hz=0"),
+        (changed(40, struct.pack("<d", float("nan"))), "rate_hz=nan"),
+        (changed(52, struct.pack("<H", 4)), "4 channels, its layout 3"),
+        (changed(54, struct.pack("<H", 4)), "4 spectra of 56 bytes each has 168 bytes"),
+        (changed(54, struct.pack("<H", 0)), "0 spectra"),
+        (changed(56, struct.pack("<I", 4)), "state 4; 0 to 3"),
+    ],
+)
+def test_spectra_that_are_refused(frame, message):
+    decoder = FrameDecoder()
+    decoder.decode(encode_spectra_layout(SPECTRA, 4000.0))
+    with pytest.raises(InputError, match=message) as caught:
+        decoder.decode(frame)
+    refused(caught)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"window\t400\n", b"", "needs one line 'window'"),
+        (b"window\t400\n", b"window\t400\nwindow\t400\n", "needs one line 'window'"),
+        (b"hop\t20", b"hop\t20\t5", "needs one line 'hop'"),
+        (b"400", b"4e2", "window '4e2', which are not whole numbers"),
+        (b"2 4", b"2  4", "are not whole numbers"),
+        (b"lines", b"line", "'line', which is none of window, hop"),
+        (b"\t0.5", b"\tnan", "the constant 'nan'"),
+        (b"differenced", b"differential", "says 'differential'"),
+        (b"rad/s\t0\tdifferenced", b"rad/s\t0\tdifferenced\tx", "a signal with 5 parts"),
+        (b"value\tx\tm", b"value\tx\tm\t1", "a value with 3 parts"),
+        (b"value\tx", b"value\t", "empty, too long"),
+        (b"value\tx", b"value\ty", "share a name"),
+        (b"\tx\tm", b"\tx\t\xff", "not UTF-8"),
+    ],
+)
+def test_texts_of_spectra_that_are_refused(old, new, message):
+    text = spectra_text(SPECTRA)
+    assert old in text
+    with pytest.raises(InputError, match=message) as caught:
+        read_spectra_text(text.replace(old, new, 1))
+    refused(caught)
+
+
+def test_spectra_without_their_layout_are_dropped():
+    decoder = FrameDecoder()
+    decoder.decode(encode_layout(CHANNELS, 4000.0))
+    assert decoder.decode(FRAME) is None
+
+
 @pytest.mark.parametrize(
     ("frame", "message"),
     [
@@ -226,7 +381,7 @@ def test_lines_are_cut_anywhere_alike():
         (encode_samples(batch())[:-1], "declares"),
         (encode_samples(batch())[:-4] + b"\0\0\0\0", "CRC"),
         (with_crc(b"LBOD\x02" + encode_samples(batch())[5:]), "version 2"),
-        (with_crc(b"LBOD\x01\x03" + encode_samples(batch())[6:]), "kind 3"),
+        (with_crc(b"LBOD\x01\x05" + encode_samples(batch())[6:]), "kind 5"),
         (with_crc(b"LBOD\x01\x01\x80" + encode_samples(batch())[7:]), "flags 128"),
         (with_crc(encode_samples(batch())[:54] + b"\x07\x00" + encode_samples(batch())[56:]), "7 samples"),
         (with_crc(encode_layout(CHANNELS, 1.0)[:-4] + b"x\n" + b"    "), "not the one that its header names"),

@@ -144,7 +144,7 @@ def test_a_line_without_excitation_is_not_valid() -> None:
         ({"dtype": "float16"}, "dtype='float16' is not known; choose 'float64' or 'float32'"),
         ({"estimator": "jiont"}, "estimator='jiont' is not known; choose 'direct' or 'joint' or 'indirect'"),
         ({"excitation": None}, "the joint estimator of the plant needs the excitation signal"),
-        ({"hop": 0}, "hop=0 is not between 1 and the window of 100 samples"),
+        ({"hop": 0}, "hop=0 is not between 1 and the window of 100 samples, and no multiple of it"),
         ({"hop": 101}, "hop=101 is not between 1 and the window"),
         ({"forgetting": 0.0}, "forgetting=0.0 is not in 0 < λ ≤ 1"),
         ({"forgetting": 1.5}, "forgetting=1.5"),

@@ -44,9 +44,10 @@ class UdpPeer(Peer):
 
 class TcpPeer(Peer):
     layout = encode_layout(CHANNELS, RATE_HZ)
+    port = 0
 
     def __enter__(self) -> TcpPeer:
-        self._server = socket.create_server(("127.0.0.1", 0))
+        self._server = socket.create_server(("127.0.0.1", self.port))
         self.settings = {"url": f"tcp://127.0.0.1:{self._server.getsockname()[1]}"}
         self._link: socket.socket | None = None
         self._thread = threading.Thread(target=self._accept, daemon=True)

@@ -53,8 +53,8 @@ def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def table(out: Path) -> dict[str, np.ndarray]:
-    table = pa.concat_tables(Run.open(out).tables("responses"))
+def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
+    table = pa.concat_tables(Run.open(out).tables(what))
     return {name: np.array(column) for name, column in table.to_pydict().items()}
 
 

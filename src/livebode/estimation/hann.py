@@ -34,9 +34,12 @@ class Hann:
         self.bins = np.unique(np.concatenate([at - 1, at, at + 1]))
         self._at = np.searchsorted(self.bins, at)
 
-    def combine(self, spectrum: Complex, sample: NDArray[np.int64]) -> Complex:
-        """Windowed lines (channels, rows, lines) from spectra (channels, rows, bins) on the fixed phase grid."""
+    def combine(self, spectrum: Complex, place: NDArray[np.int64]) -> Complex:
+        """Windowed lines (channels, rows, lines) from spectra (channels, rows, bins) on the fixed phase grid.
+
+        `place` (rows,) is the number of each window's newest sample, plus one, modulo N.
+        """
         # On the fixed grid bin k lags the window's own phase by k(n + 1)/N turns; neighbours differ by one such step.
-        turn = np.exp(2j * np.pi * ((sample + 1) % self._window) / self._window)[:, np.newaxis]
+        turn = np.exp(2j * np.pi * place / self._window)[:, np.newaxis]
         below, above = spectrum[..., self._at - 1], spectrum[..., self._at + 1]
         return np.asarray(0.5 * spectrum[..., self._at] - 0.25 * (below * turn.conj() + above * turn))

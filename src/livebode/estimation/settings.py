@@ -30,7 +30,8 @@ class Settings:
     quantity
         "plant", "open loop", "closed loop" or "sensitivity".
     hop
-        Samples between responses, counted within the period; by default a twentieth of the window.
+        Samples between responses, counted within the period; by default a twentieth of the window. Longer than the
+        window only as a multiple of it; "a period before" is then a hop before, also for `forgetting`.
     average
         Whether a response speaks for the weighted mean over the remembered periods instead of the newest window alone.
     forgetting
@@ -76,8 +77,11 @@ class Settings:
         self._check_words()
         if self.hop is None:
             object.__setattr__(self, "hop", default_hop(self.lines.window))
-        if not 1 <= self.step <= self.lines.window:
-            raise InputError(f"hop={self.hop} is not between 1 and the window of {self.lines.window} samples")
+        window = self.lines.window
+        if self.step < 1 or (self.step > window and self.step % window):
+            raise InputError(
+                f"hop={self.hop} is not between 1 and the window of {window} samples, and no multiple of it"
+            )
         if not 0 < self.forgetting <= 1:
             raise InputError(f"forgetting={self.forgetting} is not in 0 < λ ≤ 1; 0.8 remembers about nine periods")
         for role in self.roles:

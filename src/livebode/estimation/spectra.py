@@ -43,7 +43,8 @@ class LineSpectra:
     """Sliding DFT of several signals, with bookkeeping of what each window holds.
 
     Hops count within the period: rows stand at the multiples of `hop` in each period, so that every row has one
-    exactly a period before it. Where `hop` does not divide N, the last step of each period is longer.
+    exactly a period before it. Where `hop` does not divide N, the last step of each period is longer. A hop of several
+    windows counts within itself.
 
     Parameters
     ----------
@@ -75,9 +76,7 @@ class LineSpectra:
         self._differenced = differenced
         self._spikes = spikes
         self._range = PlausibleRange(differenced.size, window)
-        z = np.exp(2j * np.pi * bins / window)
-        self._after = z ** advanced[:, np.newaxis]
-        self._after[differenced] /= 1 - 1 / z
+        self._after = after(bins, window, differenced, advanced)
         self._plain = bool(np.all(self._after == 1))
         self._dft = self._fresh()
         self._next = -1
@@ -160,8 +159,11 @@ class LineSpectra:
         # Rows stand behind the samples whose count is a multiple of the step, which divides the window.
         position = np.arange(self._step - first % self._step - 1, data.shape[1], self._step)
         if self._step != self._hop:
-            place = (first + position + 1) % self._window
-            chosen = (place % self._hop == 0) & (place > 0)
+            if self._hop > self._window:
+                chosen = (self._next + offset + position + 1) % self._hop == 0
+            else:
+                place = (first + position + 1) % self._window
+                chosen = (place % self._hop == 0) & (place > 0)
             spectrum, position = spectrum[:, chosen], position[chosen]
         if not self._plain:
             spectrum = spectrum * self._after[:, np.newaxis, :]
@@ -177,3 +179,11 @@ class LineSpectra:
             number = np.maximum.accumulate(number)
             self._last_bad[kind], last_bad = int(number[-1]), number[position]
         return np.asarray(self._next + position - last_bad >= self._window)
+
+
+def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], advanced: NDArray[np.int64]) -> Complex:
+    """What spectra of signals are multiplied by at each bin: z^advanced, over 1 − z⁻¹ where they are differenced."""
+    z = np.exp(2j * np.pi * bins / window)
+    factor = z ** advanced[:, np.newaxis]
+    factor[differenced] /= 1 - 1 / z
+    return np.asarray(factor)

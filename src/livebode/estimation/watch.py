@@ -1,4 +1,4 @@
-"""What a Tracker sees of its input: starts, gaps, samples left out, and whether there is excitation."""
+"""What a Tracker sees of its input: starts, gaps, and samples that are left out."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ _KINDS = {
 
 
 class Watch:
-    """Counts and Events of a stream of Blocks, and the largest excitation seen."""
+    """Counts and Events of a stream of Blocks."""
 
     def __init__(self, window: int) -> None:
         self._window = window
         self._next = -1
-        self._largest = 0.0
         self._last = dict.fromkeys(_KINDS, -window)
         self.counts = {"samples": 0, "gaps": 0, "missing": 0} | dict.fromkeys(_KINDS, 0)
         self._events: list[Event] = []
@@ -29,13 +28,12 @@ class Watch:
     def state(self) -> dict[str, NDArray[np.generic]]:
         return {
             "next": np.array([self._next]),
-            "largest": np.array([self._largest]),
             "last": np.array(list(self._last.values())),
             "counts": np.array(list(self.counts.values())),
         }
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._next, self._largest = int(state["next"][0]), float(state["largest"][0])
+        self._next = int(state["next"][0])
         self._last = dict(zip(_KINDS, (int(n) for n in state["last"])))
         self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
 
@@ -76,12 +74,6 @@ class Watch:
             new += [(int(sample), kind) for sample in number[apart]]
         for sample, kind in sorted(new):
             self._say(kind, block, sample, _KINDS[kind])
-
-    def excited(self, power: NDArray[np.float64], whole: NDArray[np.bool_], share: float) -> NDArray[np.bool_]:
-        """Which lines have at least this share of the largest excitation so far, shape of `power` (rows, lines)."""
-        largest = np.maximum.accumulate(np.r_[self._largest, np.where(whole, power.max(axis=1), 0.0)])
-        self._largest = float(largest[-1])
-        return np.asarray((power > share * largest[1:, np.newaxis]) & (power > 0))
 
     def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
         time_s = block.origin_s + sample / block.rate_hz

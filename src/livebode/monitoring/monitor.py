@@ -45,7 +45,7 @@ class Monitor:
         baseline.check(settings, corrected)
         self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
         mean_s, lines = seconds_between(false_alarms), settings.lines
-        self._step_s = lines.window / lines.rate_hz
+        self._step_s = max(lines.window, settings.step) / lines.rate_hz
         self._machine: MachineMonitor | None = None
         self._tables: dict[str, TableMonitor] = {}
         if baseline.machine is not None:

@@ -43,11 +43,14 @@ class Rows:
 
 
 class Apart:
-    """Takes one row for each window from a stream of responses or parameters: the first in each period."""
+    """Takes one row for each window from a stream of responses or parameters: the first in each period.
+
+    Of responses further apart than a window it takes each.
+    """
 
     def __init__(self, window: int, hop: int) -> None:
-        self._window, self._place = window, hop % window
-        self._sample, self._schedule = -2 * window, np.nan  # no row stands a window behind it
+        self._window, self._place, self._apart = window, hop % window, max(window, hop)
+        self._sample, self._schedule = -2 * self._apart, np.nan  # no row stands so far behind it
 
     def of_responses(self, responses: Responses) -> Rows:
         """Rows of complex values at the lines."""
@@ -75,7 +78,7 @@ class Apart:
         sample: NDArray[np.int64], ok: NDArray[np.bool_],
     ) -> Rows:  # fmt: skip
         before = np.concatenate([[self._schedule], schedule])
-        follows = np.diff(np.concatenate([[self._sample], sample])) == self._window
+        follows = np.diff(np.concatenate([[self._sample], sample])) == self._apart
         if len(sample):
             self._sample, self._schedule = int(sample[-1]), float(schedule[-1])
         step = np.diff(before)

@@ -20,10 +20,7 @@ def check(
             raise InputError(f"{name}={value!r} cannot be corrected for motion; take {wanted!r}, or leave out [motion]")
     if not (np.isfinite(radius_m) and radius_m > 0):
         raise InputError(f"{radius_m=} is not a positive number of metres per radian")
-    if chunk_samples < 2 * settings.lines.window:
-        raise InputError(
-            f"chunk_samples={chunk_samples} is less than two windows of {settings.lines.window}; take a stroke"
-        )
+    _check_lengths(settings.lines.window, settings.step, chunk_samples)
     if driven_by not in ("torque", "excitation"):
         raise InputError(f"{driven_by=} is not known; choose 'torque' or 'excitation'")
     if passes < 1:
@@ -31,3 +28,10 @@ def check(
     for name, many in zip(("stiffness_splines", "damping_splines"), splines):
         if many != 1 and many < 4:
             raise InputError(f"{name}={many} is neither 1 nor at least 4")
+
+
+def _check_lengths(window: int, hop: int, chunk_samples: int) -> None:
+    if chunk_samples < 2 * window:
+        raise InputError(f"{chunk_samples=} is less than two windows of {window}; take a stroke")
+    if hop > window:
+        raise InputError(f"{hop=} is longer than the window of {window}; a correction follows the motion, so take less")

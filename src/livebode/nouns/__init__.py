@@ -9,9 +9,12 @@ from livebode.nouns.loop import Loop
 from livebode.nouns.model import Gain, Model, as_model
 from livebode.nouns.parameters import Parameters
 from livebode.nouns.response import Quantity, Response, Responses, widened
+from livebode.nouns.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 
 __all__ = [
+    "NOT_WHOLE",
     "PID",
+    "SPIKE",
     "Block",
     "Cascade",
     "Channel",
@@ -27,7 +30,10 @@ __all__ = [
     "Quantity",
     "Response",
     "Responses",
+    "Spectra",
+    "SpectraLayout",
     "as_model",
     "missing_channel",
+    "rms",
     "widened",
 ]

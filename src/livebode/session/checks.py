@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from livebode.estimation import Settings
-from livebode.nouns import Block, InputError
+from livebode.nouns import NOT_WHOLE, Block, InputError, Spectra, rms
 from livebode.session.follower import Follower
 
 # A DFT leaves 1e-30 of a signal's power at a line where there is none.
@@ -31,6 +31,9 @@ class ChannelCheck:
 
     def take(self, block: Block) -> None:
         """Look at the signals that have been constant up to here."""
+        if isinstance(block, Spectra):
+            self._take_spectra(block)
+            return
         x = block[self._reference]
         x = x[np.isfinite(x)]
         self._moments += x.size, x.sum(), np.dot(x, x)
@@ -42,6 +45,17 @@ class ChannelCheck:
                 self._unvaried[name] = value = finite[0]
             if np.any(finite != value):
                 del self._unvaried[name]
+
+    def _take_spectra(self, block: Spectra) -> None:
+        """The same of spectra, where a constant signal is nothing at the lines."""
+        for signal, level in zip(block.layout.signals, rms(block.sums, block.layout)):
+            level = level[(block.state & NOT_WHOLE == 0) & np.isfinite(level)]
+            if signal.name == self._reference:
+                self._moments += level.size, 0.0, np.dot(level, level)
+            if signal.name in self._unvaried and level.size:
+                self._unvaried[signal.name] = 0.0
+                if np.any(level > 0):
+                    del self._unvaried[signal.name]
 
     def state(self) -> dict[str, Any]:
         """All that was seen, as plain data."""
@@ -139,6 +153,11 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
 
 def check_some_valid(responses: int, valid: int, counts: dict[str, int], window: int) -> None:
     """InputError where no response of the whole run is valid."""
+    if responses and not valid and "spectra" in counts:
+        raise InputError(
+            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
+            f"whole and {counts['spike']} hold a spike; see to the drive's samples, or let it take a shorter window"
+        )
     if responses and not valid:
         raise InputError(
             f"none of {responses} responses is valid: no stretch of {window} samples has excitation and none of "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from livebode.nouns import Block
+from livebode.nouns import Block, Spectra
 
 
 def offered_again(blocks: Iterable[Block], sample: int) -> Iterator[Block]:
@@ -23,7 +23,9 @@ def begun_anew(blocks: Iterable[Block], sample: int, origin_s: float, away_s: fl
     shift: int | None = None
     for block in blocks:
         if shift is None:
-            shift = sample + max(1, round(away_s * block.rate_hz)) - block.start
+            # Spectra keep to their grid of hops.
+            step = block.layout.hop if isinstance(block, Spectra) else 1
+            shift = sample + step * max(1, round(away_s * block.rate_hz / step)) - block.start
             block = replace(block, gap=True)
         yield replace(block, start=block.start + shift, origin_s=origin_s)
 

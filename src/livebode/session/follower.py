@@ -12,7 +12,10 @@ from livebode.nouns import Block, Event, Responses
 
 
 class Follower(Protocol):
-    """What turns the samples of a run into responses: a Tracker, or a MotionCorrection, which holds some back."""
+    """What turns the samples of a run into responses: a Tracker, or a MotionCorrection, which holds some back.
+
+    Or, of a drive that sends spectra, a SpectraTracker.
+    """
 
     settings: Settings
 

@@ -40,7 +40,7 @@ def run_live(
         Where the configuration cannot be, or no samples come.
     """
     with open_source(axis.source) as source, ended_by_signals(source):
-        tracker = live_follower(axis, source.rate_hz)
+        tracker = live_follower(axis, source)
         about = {
             "configuration": axis.model_dump(mode="json", exclude_defaults=True),
             "found": {"format": source.format, "rate_from": "the sender"},
@@ -55,7 +55,7 @@ def run_live(
             progress=progress,
             draw=draw,
             fits=fits,
-            watching=make_watching(axis, tracker.settings),
+            watching=make_watching(axis, tracker.settings, samples=source.spectra is None),
             kept=axis.record or RecordSection(),
             again=False,
             tell=tell,

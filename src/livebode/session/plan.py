@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.estimation import Settings, Tracker
+from livebode.estimation import Settings, SpectraTracker, Tracker
 from livebode.nouns import InputError, Lines
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.session.follower import Follower
+from livebode.session.spectra_plan import check_spectra
 from livebode.sources import Log
+from livebode.sources.live import LiveSource
 
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
 
@@ -19,8 +21,12 @@ def make_follower(axis: Axis, log: Log) -> Follower:
     return _follower(axis, make_settings(axis, log))
 
 
-def live_follower(axis: Axis, rate_hz: float) -> Follower:
-    """The same for a machine that sends at `rate_hz`, whose lines and window must be given."""
+def live_follower(axis: Axis, source: LiveSource) -> Follower:
+    """The same for a machine that sends: samples, whose lines and window must be given, or spectra, which say them."""
+    rate_hz = source.rate_hz
+    if (layout := source.spectra) is not None:
+        lines = check_spectra(axis, layout, rate_hz)
+        return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if frequencies == "auto" or window == "auto":
         raise InputError(
@@ -55,7 +61,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
     return settings
 
 
-def _settings(axis: Axis, rate_hz: float, lines: Lines) -> Settings:
+def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
     signals, tracking = axis.signals, axis.tracking
     return Settings(
         lines=lines,
@@ -66,7 +72,7 @@ def _settings(axis: Axis, rate_hz: float, lines: Lines) -> Settings:
         estimator=tracking.estimator,
         loop=axis.loop.build(rate_hz),
         quantity=tracking.quantity,
-        hop=tracking.hop,
+        hop=hop or tracking.hop,
         average=tracking.average,
         forgetting=tracking.forgetting,
         noise=tracking.noise,

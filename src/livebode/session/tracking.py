@@ -264,7 +264,7 @@ def _judge(tracker: Follower, tally: Tally, hand_out: Callable[[], None]) -> Non
     """Hand out what is held back at the end; InputError where the responses mean nothing."""
     window = tracker.settings.lines.window
     tally.check.finish()
-    check_length(tally.stop, window)
+    check_length(tracker.counts["samples"], window)
     if tally.handed_out != tally.stop:
         hand_out()
         tally.handed_out = tally.stop

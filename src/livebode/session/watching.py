@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from livebode.estimation import Settings
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 _CANNOT_TELL = "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
 _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
+_NO_SAMPLES = " The baseline's model of the machine is left out: it needs samples, and the drive sends spectra."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _KEPT = 100  # sentences in run.json; events.jsonl has all
 
@@ -69,16 +71,21 @@ class Watching:
         self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_KEPT]
 
 
-def make_watching(axis: Axis, settings: Settings) -> Watching:
-    """For these settings; InputError where the baseline cannot be read or does not fit."""
+def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Watching:
+    """For these settings; InputError where the baseline cannot be read or does not fit.
+
+    Without `samples` its tables judge alone, for the model of the machine needs them.
+    """
     section = axis.monitoring
     if section.baseline is None:
         asked = section.false_alarms != MonitoringSection().false_alarms
         return Watching(None, None, f" false_alarms = {section.false_alarms!r} has no effect without one." * asked)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
-    monitor = Monitor(
-        Baseline.load(section.baseline), settings, section.false_alarms, corrected=axis.motion is not None
-    )
+    baseline = Baseline.load(section.baseline)
+    left_out = not samples and baseline.machine is not None
+    if left_out:
+        baseline = replace(baseline, machine=None)
+    monitor = Monitor(baseline, settings, section.false_alarms, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
-    return Watching(monitor, str(section.baseline), _NOT_FITTED * blind)
+    return Watching(monitor, str(section.baseline), _NOT_FITTED * blind + _NO_SAMPLES * left_out)

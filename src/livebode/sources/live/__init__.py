@@ -8,6 +8,8 @@ from livebode.sources.live.said import KINDS
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
+from livebode.sources.live.spectra_batch import SpectraBatch
+from livebode.sources.live.spectra_frame import encode_spectra, encode_spectra_layout
 
 __all__ = [
     "KINDS",
@@ -18,7 +20,10 @@ __all__ = [
     "LiveSource",
     "Sequencer",
     "SourceSettings",
+    "SpectraBatch",
     "encode_layout",
     "encode_samples",
+    "encode_spectra",
+    "encode_spectra_layout",
     "open_source",
 ]

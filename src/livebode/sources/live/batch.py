@@ -56,24 +56,42 @@ class Batch:
                 f"a batch of {len(self.channels)} channels has data of shape {self.data.shape}; "
                 f"it takes (channels, samples), at most {VALUES_MAX} values"
             )
-        if not 0 <= self.first_sample < SAMPLE_MAX:
-            raise InputError(f"first_sample={self.first_sample} is not between 0 and 2^62")
-        if not (np.isfinite(self.rate_hz) and 0 < self.rate_hz < 1e9):
-            raise InputError(f"rate_hz={self.rate_hz} is not a number of samples per second between 0 and 1e9")
-        if self.stamp_s is not None and not abs(self.stamp_s) < 1e11:
-            raise InputError(f"stamp_s={self.stamp_s} is not a number of seconds since 1970")
+        check_numbers(self.first_sample, self.rate_hz, self.stamp_s)
         check_channels(self.channels)
+
+    @property
+    def samples(self) -> int:
+        return int(self.data.shape[1])
 
     @property
     def stop(self) -> int:
         """Number of the sample that would follow the last one."""
-        return self.first_sample + int(self.data.shape[1])
+        return self.first_sample + self.samples
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.data.nbytes)
+
+    def block(self, number: int, start: int, gap: bool) -> LiveBlock:
+        """The samples from the sender's number `start` on, as a Block that begins at `number`."""
+        data = self.data[:, start - self.first_sample :]
+        return LiveBlock(data, self.channels, self.rate_hz, start=number, gap=gap, arrived_s=self.arrived_s)
 
 
-def check_channels(channels: tuple[Channel, ...]) -> None:
+def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> None:
+    """InputError where a sender's number, rate or stamp cannot be."""
+    if not 0 <= first_sample < SAMPLE_MAX:
+        raise InputError(f"first_sample={first_sample} is not between 0 and 2^62")
+    if not (np.isfinite(rate_hz) and 0 < rate_hz < 1e9):
+        raise InputError(f"rate_hz={rate_hz} is not a number of samples per second between 0 and 1e9")
+    if stamp_s is not None and not abs(stamp_s) < 1e11:
+        raise InputError(f"stamp_s={stamp_s} is not a number of seconds since 1970")
+
+
+def check_channels(channels: tuple[Channel, ...], at_least: int = 1) -> None:
     """InputError where a sender's channels have no name, a name twice, or one that no line of text can hold."""
-    if not 0 < len(channels) <= CHANNELS_MAX:
-        raise InputError(f"{len(channels)} channels are not between 1 and {CHANNELS_MAX}")
+    if not at_least <= len(channels) <= CHANNELS_MAX:
+        raise InputError(f"{len(channels)} channels are not between {at_least} and {CHANNELS_MAX}")
     names = {channel.name for channel in channels}
     if len(names) != len(channels):
         raise InputError("two channels share a name; each needs its own")

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.nouns import Channel
-from livebode.sources.live.batch import Batch
+from livebode.nouns import Channel, SpectraLayout
 from livebode.sources.live.said import Said
+from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 
 SAME_RATE = 1e-9
 
@@ -16,7 +16,8 @@ SAME_RATE = 1e-9
 class Face:
     """Channels and rate of a stream. A batch that states others is left out, for its values would mean something else.
 
-    Channels that come in another order or beside new ones are put in order and taken.
+    Channels that come in another order or beside new ones are put in order and taken. Spectra must be of the very same
+    layout, and the first batch says whether the stream is of samples or of spectra.
 
     Parameters
     ----------
@@ -30,25 +31,27 @@ class Face:
         self._said = said
         self.channels: tuple[Channel, ...] = ()
         self.rate_hz = rate_hz
-        self._seen: tuple[tuple[Channel, ...], float] | None = None
+        self.spectra: SpectraLayout | None = None
+        """What the spectra of the stream are of; None for samples."""
+        self._seen: tuple[SpectraLayout | tuple[Channel, ...], float] | None = None
         self._rows: list[int] | None = None
 
-    def aligned(self, batch: Batch) -> Batch | None:
+    def aligned(self, batch: AnyBatch) -> AnyBatch | None:
         """The batch with the stream's channels; None where it is not of the stream."""
-        stated = (batch.channels, batch.rate_hz)
+        stated = (_layout(batch) or batch.channels, batch.rate_hz)
         if not self.channels:
-            self.channels = batch.channels
+            self.channels, self.spectra = batch.channels, _layout(batch)
             self.rate_hz = self.rate_hz or batch.rate_hz
         if stated != self._seen:
             self._seen = stated
             self._rows = self._compared(batch)
         if self._rows is None:
             return None
-        if batch.channels == self.channels:
+        if isinstance(batch, SpectraBatch) or batch.channels == self.channels:
             return batch
         return replace(batch, data=np.ascontiguousarray(batch.data[self._rows]), channels=self.channels)
 
-    def _compared(self, batch: Batch) -> list[int] | None:
+    def _compared(self, batch: AnyBatch) -> list[int] | None:
         """Rows of the stream's channels in the batch; None where it cannot be taken. Says what changed."""
         assert self.rate_hz is not None
         if abs(batch.rate_hz / self.rate_hz - 1) > SAME_RATE:
@@ -57,6 +60,12 @@ class Face:
                 f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are left out",
                 stated_hz=batch.rate_hz,
                 rate_hz_expected=self.rate_hz,
+            )
+            return None
+        if (layout := _layout(batch)) != self.spectra:
+            now = "samples" if layout is None else "spectra" if self.spectra is None else "spectra of another layout"
+            self._said.say(
+                "layout-changed", f"the sender now sends {now}; they are left out until it sends what it began with"
             )
             return None
         units = {channel.name: channel.unit for channel in batch.channels}
@@ -83,3 +92,7 @@ class Face:
                 "layout-changed", "the sender's channels changed; those known before are taken by name", channels=names
             )
         return [names.index(channel.name) for channel in self.channels]
+
+
+def _layout(batch: AnyBatch) -> SpectraLayout | None:
+    return batch.layout if isinstance(batch, SpectraBatch) else None

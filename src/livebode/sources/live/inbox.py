@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 
-from livebode.sources.live.batch import Batch
+from livebode.sources.live.spectra_batch import AnyBatch
 
 INBOX_BYTES_MAX = 64 << 20
 _ENTRY_BYTES = 1000
@@ -16,7 +16,7 @@ class Inbox:
 
     def __init__(self, bytes_max: int = INBOX_BYTES_MAX) -> None:
         self._bytes_max = bytes_max
-        self._batches: deque[Batch] = deque()
+        self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
         self._changed = threading.Condition()
         self._closed = False
@@ -31,9 +31,9 @@ class Inbox:
         with self._changed:
             return self._closed and not self._batches
 
-    def put(self, batch: Batch, wait: bool) -> bool:
+    def put(self, batch: AnyBatch, wait: bool) -> bool:
         """Whether the batch was taken. A full inbox refuses it, or with `wait` lets the sender wait."""
-        size = batch.data.nbytes + _ENTRY_BYTES
+        size = batch.nbytes + _ENTRY_BYTES
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._closed or self._bytes + size <= self._bytes_max)
@@ -44,14 +44,14 @@ class Inbox:
             self._changed.notify_all()
             return True
 
-    def get(self, timeout_s: float) -> Batch | None:
+    def get(self, timeout_s: float) -> AnyBatch | None:
         """The oldest batch; None where none came in time or none will come."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._batches, timeout_s)
             if not self._batches:
                 return None
             batch = self._batches.popleft()
-            self._bytes -= batch.data.nbytes + _ENTRY_BYTES
+            self._bytes -= batch.nbytes + _ENTRY_BYTES
             self._changed.notify_all()
             return batch
 

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 from livebode.nouns import InputError
 from livebode.sources.live.address import Address
-from livebode.sources.live.frame import FRAME_BYTES_MAX, FrameDecoder
+from livebode.sources.live.frame import FrameDecoder
+from livebode.sources.live.framing import FRAME_BYTES_MAX
 from livebode.sources.live.ndjson import LineDecoder
 from livebode.sources.live.secret import existing, password
 from livebode.sources.live.settings import SourceSettings

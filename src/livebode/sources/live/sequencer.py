@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 
-from livebode.sources.live.batch import Batch, LiveBlock
+from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.clock import ClockWatch
 from livebode.sources.live.face import Face
 from livebode.sources.live.said import Said
+from livebode.sources.live.spectra_batch import AnyBatch
 
 FAR_BACK_S = 60.0
 FAR_AHEAD_S = 3600.0
@@ -58,8 +59,8 @@ class Sequencer:
         self._left: deque[int] = deque(maxlen=_EPOCHS_REMEMBERED)
         self._next: int | None = None
         self._highest = -1
-        self._waiting: dict[int, Batch] = {}
-        self._doubted: list[Batch] = []
+        self._waiting: dict[int, AnyBatch] = {}
+        self._doubted: list[AnyBatch] = []
         self._progress_s = 0.0
         self._gap = False
         self._number = 0
@@ -72,7 +73,7 @@ class Sequencer:
         """The sender's number of the sample at which it was begun, or begun anew; None before."""
         return None if self._next is None else self._begun_at
 
-    def push(self, batch: Batch) -> list[LiveBlock]:
+    def push(self, batch: AnyBatch) -> list[LiveBlock]:
         """Blocks that this batch completes."""
         aligned = self.face.aligned(batch)
         if aligned is None:
@@ -97,7 +98,7 @@ class Sequencer:
         self._dismiss()
         return self._release(0)
 
-    def _fits(self, batch: Batch) -> bool:
+    def _fits(self, batch: AnyBatch) -> bool:
         if batch.epoch != self._epoch:
             return False
         if self._next is None:
@@ -105,7 +106,7 @@ class Sequencer:
             return abs(batch.first_sample - near) <= FAR_BACK_S * batch.rate_hz
         return batch.stop > self._next and batch.first_sample <= self._next + FAR_AHEAD_S * batch.rate_hz
 
-    def _insert(self, batch: Batch) -> list[LiveBlock]:
+    def _insert(self, batch: AnyBatch) -> list[LiveBlock]:
         known = self._waiting.get(batch.first_sample)
         if known is not None and known.stop >= batch.stop:
             self._repeat(batch)
@@ -136,19 +137,11 @@ class Sequencer:
                 blocks.append(self._emit(batch, self._next))
         return blocks
 
-    def _emit(self, batch: Batch, start: int) -> LiveBlock:
-        skipped = start - batch.first_sample
-        block = LiveBlock(
-            batch.data[:, skipped:],
-            batch.channels,
-            batch.rate_hz,
-            start=self._number,
-            gap=self._gap,
-            arrived_s=batch.arrived_s,
-        )
+    def _emit(self, batch: AnyBatch, start: int) -> LiveBlock:
+        block = batch.block(self._number, start, self._gap)
         if batch.stamp_s is not None:
             self.clock = self.clock or ClockWatch(self._said, batch.rate_hz)
-            self.clock.take(start, batch.stamp_s + skipped / batch.rate_hz, self._number)
+            self.clock.take(start, batch.stamp_s + (start - batch.first_sample) / batch.rate_hz, self._number)
         self._gap = False
         self._next, self._number = batch.stop, block.stop
         self._progress_s = batch.arrived_s
@@ -170,10 +163,10 @@ class Sequencer:
         )
         self._next, self._gap = first, True
 
-    def _repeat(self, batch: Batch) -> None:
+    def _repeat(self, batch: AnyBatch) -> None:
         self._said.say("repeat", f"sample {batch.first_sample} of the sender came again and was dropped")
 
-    def _doubt(self, batch: Batch) -> list[LiveBlock]:
+    def _doubt(self, batch: AnyBatch) -> list[LiveBlock]:
         """A batch that is not where the stream goes on: a repeat, another sender, or this one begun anew."""
         if batch.epoch in self._left:
             self._said.say("foreign", "a batch of a sender that was replaced, or of a second one, was dropped")
@@ -188,7 +181,7 @@ class Sequencer:
             return []
         return self._restart()
 
-    def _is_far(self, batch: Batch) -> bool:
+    def _is_far(self, batch: AnyBatch) -> bool:
         return self._next is None or (
             batch.stop < self._next - FAR_BACK_S * batch.rate_hz or batch.first_sample > self._next
         )

@@ -12,15 +12,16 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from livebode.nouns import Channel, Event, InputError, missing_channel
+from livebode.nouns import Channel, Event, InputError, SpectraLayout, missing_channel
 from livebode.sources.live.address import Address
-from livebode.sources.live.batch import Batch, LiveBlock
+from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import CONFIRMED, Sequencer
 from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live.spectra_batch import AnyBatch
 
 TICK_S = 0.1
 """How soon a request to end is seen."""
@@ -91,6 +92,11 @@ class LiveSource(ABC):
         return self._sequencer.face.rate_hz
 
     @property
+    def spectra(self) -> SpectraLayout | None:
+        """What its spectra are of, where the drive sends spectra; None where it sends samples."""
+        return self._sequencer.face.spectra
+
+    @property
     def samples(self) -> int | None:
         """None: it has no end that is known."""
         return None
@@ -132,6 +138,8 @@ class LiveSource(ABC):
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock]:
         """The samples of `channels` as they come, from the first received; ends with the sender or with `close`.
+
+        Of a drive that sends spectra they are LiveSpectra, whose sums are of all its signals.
 
         There is one stream: what one iteration took, another does not see.
 
@@ -222,17 +230,16 @@ class LiveSource(ABC):
         self._said.say("malformed", f"{self.address}: {why}")
         self._trouble = str(why)
 
-    def _deliver(self, batch: Batch) -> None:
+    def _deliver(self, batch: AnyBatch) -> None:
         now = time.monotonic()
         self._pauses.reset()
-        samples = batch.data.shape[1]
         latency = None
         if batch.stamp_s is not None:
-            latency = time.time() - (batch.stamp_s + (samples - 1) / batch.rate_hz)
+            latency = time.time() - (batch.stamp_s + (batch.samples - 1) / batch.rate_hz)
         self._newest = (now, latency)
-        self._received += samples
+        self._received += batch.samples
         self._first = self._first or (now, self._received)
         if np.isnan(batch.arrived_s):
             batch = replace(batch, arrived_s=now)
         if not self._inbox.put(batch, self.waits) and not self._stop.is_set():
-            self._said.say("overflow", f"{samples} samples came faster than they were taken and were dropped")
+            self._said.say("overflow", f"{batch.samples} samples came faster than they were taken and were dropped")

@@ -6,7 +6,8 @@ import socket
 from typing import ClassVar
 
 from livebode.nouns import InputError
-from livebode.sources.live.frame import FrameDecoder, FrameSplitter
+from livebode.sources.live.frame import FrameDecoder
+from livebode.sources.live.framing import FrameSplitter
 from livebode.sources.live.source import TICK_S, LiveSource
 
 PIECE_BYTES = 1 << 16

@@ -1,0 +1,182 @@
+"""SpectraTracker: a drive's spectra in, frequency responses with bounds out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import snapshots
+from livebode.estimation.implausible import PlausibleRange
+from livebode.estimation.line_stage import LineStage
+from livebode.estimation.settings import Settings
+from livebode.estimation.spectra import Rows, after
+from livebode.estimation.spectra_watch import SpectraWatch
+from livebode.nouns import NOT_WHOLE, SPIKE, Block, Event, InputError, Responses, Spectra, SpectraLayout
+
+Floats = NDArray[np.float64]
+
+_NONE = np.zeros(0, dtype=np.intp)
+
+
+class SpectraTracker:
+    """Frequency responses of a machine whose drive runs the kernel and sends the spectra: a Tracker without its kernel.
+
+    From a kernel in the same precision it gives the Responses that a Tracker gives from the samples; a Response speaks
+    for its window's centre and is (N − 1)/2 samples late. What the drive marks as not whole or with a spike is left
+    out, and so are sums that are not finite or 1e8 times larger than all in the period before. Lost spectra leave no
+    window invalid, for the drive goes on.
+
+    With a hop of m windows, the spectra behind `sigma`, the mean and the coherence are those m periods apart:
+    `forgetting` then counts spectra, and what the machine changes within that time is taken for noise. Where it moves,
+    take the noise from quiet bins, which each spectrum has of its own.
+
+    Parameters
+    ----------
+    settings
+        As for a Tracker, with the layout's lines and hop. `differenced` may be left out: the layout says it.
+    layout
+        What the spectra are of.
+
+    Raises
+    ------
+    InputError
+        If a signal, a bin or the schedule that the settings need is not sent, or they ask for what needs samples.
+    """
+
+    def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
+        _check(settings, layout)
+        self.settings, self._layout = settings, layout
+        names = [channel.name for channel in layout.signals]
+        self._signals = [names.index(settings.channel(role) or "") for role in settings.roles]
+        self._lines = LineStage(settings)
+        bins = self._lines.bins
+        why = "a Hann window needs" if settings.hann else "the noise needs"
+        self._columns = layout.columns([int(k) for k in bins], why)
+        advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
+        differenced = np.array(layout.differenced)[self._signals]
+        self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
+        self._watch = SpectraWatch(layout.window)
+        self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
+        self._nothing: Responses | None = None
+        self._parts: dict[str, LineStage | SpectraWatch | PlausibleRange] = {
+            "lines": self._lines,
+            "watch": self._watch,
+            "range": self._range,
+        }
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many samples the windows held, how many are missing, and how many spectra were left out."""
+        return self._watch.counts
+
+    def found(self) -> dict[str, Any]:
+        """What the responses stand on, as plain data for a record."""
+        layout = self._layout
+        constants = {signal.name: c for signal, c in zip(layout.signals, layout.subtracted)}
+        return self._lines.found() | {"from": "spectra", "subtracted": constants}
+
+    def excitation_power(self) -> Floats:
+        """Mean |R|² of the reference at each line over the remembered windows, shape (lines,); NaN before the first."""
+        return self._lines.excitation_power()
+
+    def repeatability(self) -> Floats:
+        """Share of the reference's power that repeats from spectrum to spectrum, shape (lines,); see `LineStage`."""
+        return self._lines.repeatability()
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call: missing spectra, and windows that the drive marks."""
+        return self._watch.drain()
+
+    def process(self, block: Block) -> Responses:
+        """Responses of these Spectra, which follow the ones before.
+
+        Raises
+        ------
+        InputError
+            If they are of another layout, are samples, or came twice.
+        """
+        if not isinstance(block, Spectra) or block.layout != self._layout:
+            raise InputError("these are not spectra of the layout that the tracker was made for; make another one")
+        hop, window = self._layout.hop, self._layout.window
+        sums = block.sums[self._signals][:, :, self._columns]
+        finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
+        with np.errstate(over="ignore", invalid="ignore"):  # what comes of implausible numbers is left out
+            spectrum = np.where(finite[:, np.newaxis], sums, 0.0) * self._after
+            size = np.nan_to_num(np.abs(spectrum).max(axis=2))
+        implausible = np.zeros(len(block), dtype=np.bool_)
+        implausible[self._range.process(size)] = True
+        not_whole, spike = (block.state & NOT_WHOLE != 0) | ~finite, block.state & SPIKE != 0
+        self._watch.take(block, {"not-whole": not_whole, "implausible": implausible, "spike": spike})
+        whole = ~(not_whole | implausible)
+        rows = Rows(spectrum, block.sample, whole, whole & ~spike, _NONE, _NONE, _NONE)
+        place = (block.place + hop * np.arange(len(block))) % window
+        time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
+        schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)
+        responses = self._lines.process(rows, place, np.stack([time_s, schedule]), block.channels)
+        self._nothing = responses[0:0]
+        return responses
+
+    def finish(self) -> Responses | None:
+        """What is held back at the end: nothing, every response has come; None without spectra."""
+        return self._nothing
+
+    def snapshot(self) -> bytes:
+        """Everything that the next spectrum's result depends on, exact; see `restore`."""
+        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self._identity)
+
+    def restore(self, snapshot: bytes) -> None:
+        """Go on from a snapshot of a SpectraTracker with the same settings and layout.
+
+        Raises
+        ------
+        InputError
+            If the snapshot is damaged or belongs to others; the tracker is then as it was.
+        """
+        for name, state in snapshots.unpack(snapshot, self._identity).items():
+            self._parts[name].load(state)
+
+    @property
+    def _identity(self) -> str:
+        return f"{self.settings.identity} {self._layout}"
+
+
+def _check(settings: Settings, layout: SpectraLayout) -> None:
+    """InputError where these settings cannot be had from such spectra."""
+    mine = settings.lines
+    if (mine.window, mine.bins) != (layout.window, layout.lines) or settings.step != layout.hop:
+        raise InputError("lines, window or hop are not those of the spectra; take them from the layout")
+    if settings.spikes:
+        raise InputError(
+            "spikes are found in samples, and the drive sends spectra; leave them out, and let it mark its windows"
+        )
+    if settings.dtype != "float64":
+        raise InputError(
+            f"dtype={settings.dtype!r} is for samples, and spectra come as the drive computed them; leave it out"
+        )
+    _check_channels(settings, layout)
+
+
+def _check_channels(settings: Settings, layout: SpectraLayout) -> None:
+    signals, values = ([channel.name for channel in part] for part in (layout.signals, layout.values))
+    for role in settings.roles:
+        name = settings.channel(role) or ""
+        if name not in signals:
+            raise InputError(
+                f"the drive sends no spectrum of {name!r}, which the {settings.estimator} estimator needs; "
+                f"it sends those of {', '.join(signals)}"
+            )
+    if settings.schedule is not None and settings.schedule not in values:
+        raise InputError(
+            f"the drive does not send the value of {settings.schedule!r} to plot over; let it, or leave out the "
+            f"schedule (values: {', '.join(values) or 'none'})"
+        )
+    used = {settings.channel(role) for role in settings.roles}
+    theirs = {name for name, d in zip(signals, layout.differenced) if d and name in used}
+    if settings.differenced and set(settings.differenced) != theirs:
+        odd = sorted(set(settings.differenced) ^ theirs)[0]
+        does = "differences" if odd in theirs else "does not difference"
+        raise InputError(
+            f"the drive {does} {odd!r}, which cannot be changed in spectra; say so in differenced, or leave it out"
+        )

@@ -1,0 +1,112 @@
+"""What all frames have in common: header, CRC, and how they are cut out of a stream.
+
+The header is little endian: magic, version, kind, flags, length, sequence, epoch, sample, stamp, rate, layout,
+channels, samples; then the payload; then the CRC-32 of all before.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from livebode.nouns import InputError
+
+MAGIC = b"LBOD"
+VERSION = 1
+SAMPLES, LAYOUT, SPECTRA, SPECTRA_LAYOUT = 1, 2, 3, 4
+"""Kinds of frames."""
+FLOAT64 = 1
+"""Flag: the payload is float64 instead of float32."""
+HEADER = struct.Struct("<4sBBHIIQQqdIHH")
+CRC = struct.Struct("<I")
+FRAME_BYTES_MIN = HEADER.size + CRC.size
+FRAME_BYTES_MAX = 1 << 20
+LAYOUT_BYTES_MAX = 1 << 16
+SAMPLES_MAX = (1 << 16) - 1
+
+
+@dataclass(frozen=True)
+class Header:
+    """The fields of a frame's header, in their order; `stamp_ns` is 0 where the sender has no clock."""
+
+    magic: bytes
+    version: int
+    kind: int
+    flags: int
+    length: int
+    sequence: int
+    epoch: int
+    sample: int
+    stamp_ns: int
+    rate_hz: float
+    layout: int
+    channels: int
+    samples: int
+
+
+def framed(
+    kind: int, flags: int, sequence: int, epoch: int, sample: int, stamp_ns: int, rate_hz: float, layout: int,
+    channels: int, samples: int, payload: bytes,
+) -> bytes:  # fmt: skip
+    """A whole frame; InputError where it would be too long."""
+    length = FRAME_BYTES_MIN + len(payload)
+    if length > FRAME_BYTES_MAX:
+        raise InputError(f"a frame of {length} bytes is longer than {FRAME_BYTES_MAX}; send fewer samples at once")
+    head = HEADER.pack(
+        MAGIC, VERSION, kind, flags, length, sequence, epoch, sample, stamp_ns, rate_hz, layout, channels, samples
+    )
+    return head + payload + CRC.pack(zlib.crc32(payload, zlib.crc32(head)))
+
+
+def read_header(frame: bytes | memoryview) -> Header:
+    """The header of what may be a frame; InputError where it cannot begin one."""
+    if len(frame) < FRAME_BYTES_MIN:
+        raise InputError(f"a frame of {len(frame)} bytes is shorter than a header")
+    header = Header(*HEADER.unpack_from(frame))
+    if header.magic != MAGIC:
+        raise InputError(f"a frame begins with {bytes(frame[:4])!r} instead of {MAGIC!r}")
+    if header.version != VERSION:
+        raise InputError(f"a frame of version {header.version}; this livebode reads version {VERSION}")
+    if not FRAME_BYTES_MIN <= header.length <= FRAME_BYTES_MAX:
+        raise InputError(f"a frame declares {header.length} bytes, not {FRAME_BYTES_MIN} to {FRAME_BYTES_MAX}")
+    return header
+
+
+class FrameSplitter:
+    """Cuts a stream of bytes into frames, and finds the next one behind rubbish. Memory: one frame."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+        self.skipped = 0
+        """Bytes that belonged to no frame."""
+        self.damaged = 0
+        """Frames with a wrong CRC since the last whole one."""
+
+    def feed(self, piece: bytes) -> list[bytes]:
+        """Frames that `piece` completes."""
+        self._bytes += piece
+        frames = []
+        while len(self._bytes) >= FRAME_BYTES_MIN:
+            try:
+                header = read_header(bytes(self._bytes[:FRAME_BYTES_MIN]))
+            except InputError:
+                self._skip()
+                continue
+            if len(self._bytes) < header.length:
+                break
+            frame = bytes(self._bytes[: header.length])
+            if zlib.crc32(frame[: -CRC.size]) != CRC.unpack(frame[-CRC.size :])[0]:
+                self.damaged += 1
+                self._skip()  # its length may be what is damaged
+                continue
+            self.damaged = 0
+            del self._bytes[: header.length]
+            frames.append(frame)
+        return frames
+
+    def _skip(self) -> None:
+        at = self._bytes.find(MAGIC, 1)
+        cut = at if at > 0 else max(1, len(self._bytes) - len(MAGIC) + 1)
+        self.skipped += cut
+        del self._bytes[:cut]

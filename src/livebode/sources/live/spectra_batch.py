@@ -1,0 +1,111 @@
+"""SpectraBatch: what a drive delivers at once that sends spectra, and LiveSpectra: Spectra that know when they came."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Channel, InputError, Spectra, SpectraLayout, rms
+from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
+
+
+@dataclass(frozen=True, eq=False)
+class LiveSpectra(Spectra, LiveBlock):
+    """Spectra from a live source; `arrived_s` as in `LiveBlock`."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpectraBatch:
+    """Consecutive spectra from one sender; each stands for the `hop` samples that end with its window's newest one.
+
+    Parameters
+    ----------
+    first_sample
+        The sender's number of the first of those samples.
+    sums, state
+        As in `Spectra`.
+    values
+        float64, shape (values, spectra).
+    layout
+        What the spectra are of.
+    rate_hz, epoch, stamp_s, arrived_s
+        As in `Batch`.
+
+    Raises
+    ------
+    InputError
+        If there are no spectra or too many, shapes disagree, or a number cannot be.
+    """
+
+    first_sample: int
+    sums: NDArray[np.complex128]
+    values: NDArray[np.float64]
+    state: NDArray[np.uint32]
+    layout: SpectraLayout
+    rate_hz: float
+    epoch: int = 0
+    stamp_s: float | None = None
+    arrived_s: float = nan
+
+    def __post_init__(self) -> None:
+        signals, values, bins = len(self.layout.signals), len(self.layout.values), len(self.layout.bins)
+        spectra = len(self.state)
+        if (
+            self.sums.shape != (signals, spectra, bins)
+            or self.values.shape != (values, spectra)
+            or not 0 < 2 * self.sums.size + self.values.size <= VALUES_MAX
+        ):
+            raise InputError(
+                f"a batch of {spectra} spectra has sums of shape {self.sums.shape} and values of shape "
+                f"{self.values.shape}; it takes (signals, spectra, bins) and (values, spectra), at most "
+                f"{VALUES_MAX} numbers"
+            )
+        check_numbers(self.first_sample, self.rate_hz, self.stamp_s)
+        if self.first_sample % self.layout.hop:
+            raise InputError(
+                f"a spectrum ends at sample {self.first_sample + self.layout.hop - 1}; with hop {self.layout.hop} they "
+                "end one before its multiples"
+            )
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.layout.channels
+
+    @property
+    def samples(self) -> int:
+        """Samples that the spectra stand for."""
+        return len(self.state) * self.layout.hop
+
+    @property
+    def stop(self) -> int:
+        """The sender's number of the newest sample, plus one."""
+        return self.first_sample + self.samples
+
+    @property
+    def nbytes(self) -> int:
+        return int(self.sums.nbytes + self.values.nbytes + self.state.nbytes)
+
+    def block(self, number: int, start: int, gap: bool) -> LiveSpectra:
+        """Spectra from sample `start` of the sender on, which get the number `number`."""
+        skipped = (start - self.first_sample) // self.layout.hop
+        layout, sums = self.layout, self.sums[:, skipped:]
+        shown = dict(zip((c.name for c in layout.signals), rms(sums, layout)))
+        shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
+        return LiveSpectra(
+            np.stack([shown[channel.name] for channel in self.channels]),
+            self.channels,
+            self.rate_hz,
+            start=number,
+            gap=gap,
+            layout=layout,
+            sums=sums,
+            state=self.state[skipped:],
+            place=(start + layout.hop) % layout.window,
+            arrived_s=self.arrived_s,
+        )
+
+
+AnyBatch = Batch | SpectraBatch

@@ -1,0 +1,167 @@
+r"""Spectra in frames, and the text that says what they are of. docs/live.md has both byte by byte.
+
+The text is UTF-8, one thing in each line, its parts set apart by tabs: ``window``, ``hop``, ``lines``, ``quiet``, then
+a ``signal`` for each spectrum and a ``value`` for each plain value, in the order of the payload.
+"""
+
+from __future__ import annotations
+
+import zlib
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Channel, InputError, SpectraLayout
+from livebode.sources.live.batch import check_channels
+from livebode.sources.live.framing import FLOAT64, SPECTRA, SPECTRA_LAYOUT, Header, framed
+from livebode.sources.live.spectra_batch import SpectraBatch
+
+_STATES = 3
+_DIFFERENCED = "differenced"
+
+
+def spectra_text(layout: SpectraLayout) -> bytes:
+    r"""Payload of a layout frame of spectra.
+
+    >>> spectra_text(SpectraLayout((Channel("w", "N m"),), (Channel("x", "m"),), window=400, hop=20, lines=(2, 4)))
+    b'window\t400\nhop\t20\nlines\t2 4\nsignal\tw\tN m\t0\nvalue\tx\tm\n'
+    """
+    rows = [f"window\t{layout.window}", f"hop\t{layout.hop}", "lines\t" + " ".join(map(str, layout.lines))]
+    if layout.quiet:
+        rows.append("quiet\t" + " ".join(map(str, layout.quiet)))
+    for signal, constant, differenced in zip(layout.signals, layout.subtracted, layout.differenced):
+        rows.append(f"signal\t{signal.name}\t{signal.unit}\t{constant:.17g}" + f"\t{_DIFFERENCED}" * differenced)
+    rows += [f"value\t{value.name}\t{value.unit}" for value in layout.values]
+    return "".join(f"{row}\n" for row in rows).encode("utf-8")
+
+
+def read_spectra_text(text: bytes) -> SpectraLayout:
+    """The layout in such a text; InputError where it is none."""
+    found: dict[str, list[list[str]]] = {word: [] for word in ("window", "hop", "lines", "quiet", "signal", "value")}
+    try:
+        rows = text.decode("utf-8").removesuffix("\n").split("\n")
+    except UnicodeDecodeError:
+        raise InputError("a layout is not UTF-8") from None
+    for row in rows:
+        word, *parts = row.split("\t")
+        if word not in found:
+            raise InputError(f"a layout of spectra says {word[:40]!r}, which is none of {', '.join(found)}")
+        found[word].append(parts)
+    for word in ("window", "hop", "lines", "quiet"):
+        if [len(parts) for parts in found[word]] not in ([1], [] if word == "quiet" else [1]):
+            raise InputError(f"a layout of spectra needs one line {word!r} with one part behind it")
+    signals = [_signal(parts) for parts in found["signal"]]
+    values = [_channel("value", parts, 2) for parts in found["value"]]
+    check_channels(tuple(signal for signal, _, _ in signals))
+    check_channels(tuple(values), at_least=0)
+    return SpectraLayout(
+        signals=tuple(signal for signal, _, _ in signals),
+        values=tuple(values),
+        window=_numbers("window", found)[0],
+        hop=_numbers("hop", found)[0],
+        lines=_numbers("lines", found),
+        quiet=_numbers("quiet", found) if found["quiet"] else (),
+        subtracted=tuple(constant for _, constant, _ in signals),
+        differenced=tuple(differenced for _, _, differenced in signals),
+    )
+
+
+def _numbers(word: str, found: dict[str, list[list[str]]]) -> tuple[int, ...]:
+    text = found[word][0][0]
+    numbers = text.split(" ")
+    if not all(number.isascii() and number.isdigit() and len(number) < 9 for number in numbers):
+        raise InputError(f"a layout of spectra has {word} {text[:40]!r}, which are not whole numbers")
+    return tuple(map(int, numbers))
+
+
+def _channel(word: str, parts: list[str], most: int) -> Channel:
+    if not 1 <= len(parts) <= most:
+        raise InputError(f"a layout of spectra has a {word} with {len(parts)} parts; give 1 to {most}")
+    return Channel(*parts[:2])
+
+
+def _signal(parts: list[str]) -> tuple[Channel, float, bool]:
+    channel = _channel("signal", parts, 4)
+    try:
+        constant = float(parts[2]) if len(parts) > 2 else 0.0
+    except ValueError:
+        constant = float("nan")
+    if not isfinite(constant):
+        raise InputError(f"signal {channel.name[:40]!r} has the constant {parts[2][:40]!r}, which is no number")
+    if len(parts) > 3 and parts[3] != _DIFFERENCED:
+        raise InputError(f"signal {channel.name[:40]!r} says {parts[3][:40]!r}; it may say {_DIFFERENCED!r}")
+    return channel, constant, len(parts) > 3
+
+
+def encode_spectra_layout(layout: SpectraLayout, rate_hz: float, *, epoch: int = 0, sequence: int = 0) -> bytes:
+    """A frame that says what spectra are of; a sender sends it first, and then once a second.
+
+    >>> layout = SpectraLayout((Channel("w", "N m"),), (), window=400, hop=20, lines=(2, 4))
+    >>> len(encode_spectra_layout(layout, 4000))
+    103
+    """
+    text = spectra_text(layout)
+    count = len(layout.signals) + len(layout.values)
+    return framed(SPECTRA_LAYOUT, 0, sequence, epoch, 0, 0, rate_hz, zlib.crc32(text), count, 0, text)
+
+
+def encode_spectra(batch: SpectraBatch, *, sequence: int = 0, double: bool = False) -> bytes:
+    """A frame with the spectra of a batch, as float32 unless `double`."""
+    layout = batch.layout
+    dtype = _payload(layout, double)
+    rows = np.zeros(len(batch.state), dtype)
+    rows["state"], rows["values"] = batch.state, batch.values.T
+    sums = batch.sums.transpose(1, 0, 2)
+    rows["sums"][..., 0], rows["sums"][..., 1] = sums.real, sums.imag
+    late_s = (layout.hop - 1) / batch.rate_hz
+    stamp_ns = 0 if batch.stamp_s is None else round((batch.stamp_s + late_s) * 1e9)
+    count = len(layout.signals) + len(layout.values)
+    return framed(
+        SPECTRA, FLOAT64 if double else 0, sequence, batch.epoch, batch.first_sample + layout.hop - 1, stamp_ns,
+        batch.rate_hz, zlib.crc32(spectra_text(layout)), count, len(rows), rows.tobytes(),
+    )  # fmt: skip
+
+
+def _payload(layout: SpectraLayout, double: bool) -> np.dtype[Any]:
+    """One spectrum in the payload."""
+    real = "<f8" if double else "<f4"
+    sums = (len(layout.signals), len(layout.bins), 2)
+    return np.dtype([("state", "<u4"), ("values", real, (len(layout.values),)), ("sums", real, sums)])
+
+
+def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLayout, arrived_s: float) -> SpectraBatch:
+    """The batch in the payload of a frame; InputError where it contradicts its header or its layout."""
+    count = len(layout.signals) + len(layout.values)
+    if header.channels != count:
+        raise InputError(f"a frame of spectra has {header.channels} channels, its layout {count}")
+    dtype = _payload(layout, bool(header.flags & FLOAT64))
+    if not header.samples or len(payload) != header.samples * dtype.itemsize:
+        raise InputError(
+            f"a frame of {header.samples} spectra of {dtype.itemsize} bytes each has {len(payload)} bytes of them"
+        )
+    rows = np.frombuffer(payload, dtype)
+    if np.any(rows["state"] > _STATES):
+        raise InputError(f"a spectrum has the state {int(rows['state'].max())}; 0 to {_STATES} are known")
+    with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+        sums = rows["sums"].astype(np.float64)
+        values = rows["values"].T.astype(np.float64, order="C")
+    # The stamp is that of the newest sample, a batch's that of its first.
+    late_s = (layout.hop - 1) / header.rate_hz if header.rate_hz else 0.0
+    return SpectraBatch(
+        header.sample + 1 - layout.hop,
+        complex_of(sums),
+        values,
+        np.array(rows["state"]),
+        layout,
+        header.rate_hz,
+        header.epoch,
+        header.stamp_ns / 1e9 - late_s if header.stamp_ns else None,
+        arrived_s,
+    )
+
+
+def complex_of(pairs: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Sums (signals, spectra, bins) from float64 pairs (spectra, signals, bins, 2)."""
+    return np.ascontiguousarray(np.ascontiguousarray(pairs).view(np.complex128)[..., 0].transpose(1, 0, 2))

@@ -1,0 +1,250 @@
+"""From a drive's spectra the responses are those that a Tracker gives from the same samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive
+from examples.kernel_drive import KernelDrive
+from livebode.estimation import Settings, SpectraTracker, Tracker
+from livebode.excitation import multisine
+from livebode.nouns import PID, Block, Cascade, Channel, InputError, Lines, Loop, Responses, Spectra, SpectraLayout
+from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
+
+WINDOW, PERIODS = 400, 12
+LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=WINDOW)
+SIGNALS = (Channel("y", "rad/s"), Channel("u", "N m"), Channel("w", "N m"))
+LOOP = Loop(
+    Cascade(PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ), PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2))
+)
+
+
+def layout(hop: int = 20, **options: object) -> SpectraLayout:
+    given = {"quiet": (1, *LINES.quiet, 15)} | options
+    return SpectraLayout(SIGNALS, (Channel("x", "m"),), WINDOW, hop, LINES.bins, **given)
+
+
+@pytest.fixture(scope="module")
+def record() -> Block:
+    """The loop of the examples under noise, and a position that moves."""
+    rng = np.random.default_rng(3)
+    w = multisine(LINES)
+    u, y = Drive().run(w, periods=PERIODS)
+    n = w.size * PERIODS
+    noise = rng.standard_normal((2, n)) * 1e-3
+    return Block(
+        np.array(
+            [y[0] + noise[0] * np.std(y[0]), u[0] + noise[1] * np.std(u[0]), np.tile(w, PERIODS), np.arange(n) * 1e-4]
+        ),
+        (*SIGNALS, Channel("x", "m")),
+        RATE_HZ,
+    )
+
+
+def sent(block: Block, what: SpectraLayout, dtype: str = "float32", samples: int = 170) -> Iterator[Spectra]:
+    """What arrives of a drive's spectra, through frames."""
+    decoder = FrameDecoder()
+    decoder.decode(encode_spectra_layout(what, block.rate_hz))
+    pieces = (block.cut(at, at + samples) for at in range(0, len(block), samples))
+    for batch in KernelDrive(what, dtype).spectra(pieces):
+        got = decoder.decode(encode_spectra(batch, double=dtype == "float64"))
+        yield got.block(got.first_sample, got.first_sample, gap=False)
+
+
+def tracked(spectra: Iterator[Spectra], what: SpectraLayout, **options: object) -> Responses:
+    tracker = SpectraTracker(described(what.hop, **options), what)
+    return Responses.join([tracker.process(block) for block in spectra])
+
+
+def described(hop: int, **options: object) -> Settings:
+    given = {"lines": LINES, "output": "y", "input": "u", "excitation": "w", "schedule": "x", "hop": hop} | options
+    return Settings(**given)
+
+
+def same(ours: Responses, theirs: Responses) -> None:
+    for name in ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
+    assert (ours.lines, ours.unit, ours.quantity) == (theirs.lines, theirs.unit, theirs.quantity)
+
+
+@pytest.mark.parametrize("hop", [20, 50, 400, 800])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"estimator": "direct"},
+        {"estimator": "indirect", "loop": LOOP},
+        {"average": True, "forgetting": 0.9},
+        {"hann": True},
+        {"noise": "quiet"},
+        {"quantity": "sensitivity", "loop": Loop(input_logged="before", output_logged="after")},
+    ],
+)
+def test_float32_spectra_give_what_float32_samples_give_to_the_bit(record: Block, hop: int, options: dict) -> None:
+    ours = tracked(sent(record, layout(hop)), layout(hop), **options)
+    theirs = Tracker(described(hop, dtype="float32", **options)).process(record)
+    same(ours, theirs)
+    np.testing.assert_allclose(ours.schedule, theirs.schedule, rtol=2.0**-23)  # of a mean, a digit more
+    assert ours.valid[-1].all()
+
+
+@pytest.mark.parametrize("hop", [20, 800])
+def test_float64_frames_lose_nothing(record: Block, hop: int) -> None:
+    ours = tracked(sent(record, layout(hop), "float64"), layout(hop))
+    theirs = Tracker(described(hop)).process(record)
+    same(ours, theirs)
+    np.testing.assert_array_equal(ours.schedule, theirs.schedule)
+
+
+def test_float32_is_off_by_no_more_than_its_kernel_promises(record: Block) -> None:
+    ours = tracked(sent(record, layout()), layout(), estimator="direct")
+    exact = Tracker(described(20, estimator="direct")).process(record)
+    # 1e-6·√N·‖x‖₂ of the window for each spectrum, and half a unit of the last digit of each sample besides.
+    share = 0.0
+    for name in ("y", "u"):
+        x = record[name][-WINDOW:]
+        promised = (1e-6 + 2.0**-24) * np.sqrt(WINDOW) * np.linalg.norm(x)
+        share = share + promised / np.abs(np.fft.fft(x)[list(LINES.bins)])
+    assert np.all(np.abs(ours.value[-1] / exact.value[-1] - 1) < share)
+
+
+def test_a_constant_that_is_subtracted_saves_the_digits(record: Block) -> None:
+    offset = np.array([[1e4], [0.0], [0.0], [0.0]])
+    far = Block(record.data + offset, record.channels, RATE_HZ)
+    near = layout(subtracted=(1e4, 0.0, 0.0))
+    exact = Tracker(described(20)).process(record).value[-1]
+    plain, less = (np.abs(tracked(sent(far, what), what).value[-1] / exact - 1).max() for what in (layout(), near))
+    assert 100 * less < plain
+
+
+def test_a_drive_that_differences_is_exact_for_a_signal_that_drifts(record: Block) -> None:
+    ramp = np.zeros_like(record.data)
+    ramp[0] = np.arange(len(record)) * 1e-2
+    drifting = Block(record.data + ramp, record.channels, RATE_HZ)
+    what = layout(differenced=(True, False, False))
+    theirs = Tracker(described(20, differenced=("y",))).process(drifting)
+    same(tracked(sent(drifting, what, "float64"), what), theirs)
+    same(tracked(sent(drifting, what, "float64"), what, differenced=("y",)), theirs)
+
+
+def test_samples_that_are_not_finite_leave_the_same_windows_out(record: Block) -> None:
+    data = record.data.copy()
+    data[0, 1234], data[1, 2500] = np.nan, np.inf
+    broken = Block(data, record.channels, RATE_HZ)
+    what = layout()
+    tracker = SpectraTracker(described(20), what)
+    ours = Responses.join([tracker.process(block) for block in sent(broken, what)])
+    same(ours, Tracker(described(20, dtype="float32")).process(broken))
+    assert [event.kind for event in tracker.drain_events()] == ["not-whole", "not-whole"]
+    assert tracker.counts["samples"] == len(record)
+
+
+def test_marks_of_the_drive_and_numbers_that_are_none_are_left_out(record: Block) -> None:
+    what = layout(hop=WINDOW)
+    blocks = list(sent(record, what, samples=WINDOW))
+    blocks[5].state[:] = 2
+    blocks[7].sums[1, 0, 3] = np.nan
+    blocks[9].sums[0, 0, 2] *= 1e12
+    tracker = SpectraTracker(described(WINDOW), what)
+    ours = Responses.join([tracker.process(block) for block in blocks])
+    assert np.flatnonzero(~ours.valid.any(axis=1)).tolist() == [5, 7, 9]
+    told = [("spike", 2399), ("not-whole", 3199), ("implausible", 3999)]
+    assert [(e.kind, e.sample) for e in tracker.drain_events()] == told
+    assert {kind: tracker.counts[kind] for kind, _ in told} == {kind: 1 for kind, _ in told}
+    assert tracker.counts["spectra"] == PERIODS
+    # An average goes on over a spike, as it does from samples.
+    assert tracked(iter(blocks), what, average=True).valid[5].all()
+
+
+def test_lost_spectra_leave_the_others_as_they_are(record: Block) -> None:
+    what = layout()
+    blocks = list(sent(record, what, samples=100))
+    kept = [block for at, block in enumerate(blocks) if at % 7 != 3]
+    tracker = SpectraTracker(described(20), what)
+    ours = Responses.join([tracker.process(block) for block in kept])
+    theirs = Tracker(described(20, dtype="float32")).process(record)
+    at = np.searchsorted(theirs.sample, ours.sample)
+    np.testing.assert_array_equal(ours.value, theirs.value[at])
+    np.testing.assert_array_equal(ours.valid, theirs.valid[at])
+    assert tracker.counts["gaps"] == len(blocks) - len(kept)
+    assert tracker.counts["missing"] == 100 * (len(blocks) - len(kept))
+    with pytest.raises(InputError, match="came twice"):
+        tracker.process(kept[-1])
+
+
+@settings(max_examples=20, deadline=None)
+@given(cuts=st.lists(st.integers(0, 120), max_size=6), stop=st.integers(0, 119))
+def test_any_cutting_and_a_restored_tracker_give_the_same(record: Block, cuts: list[int], stop: int) -> None:
+    what, hop = layout(hop=40), 40
+    whole = next(sent(record, what, samples=len(record)))
+    one = SpectraTracker(described(hop), what)
+    expected = one.process(whole)
+    edges = sorted({0, len(whole), *cuts, stop})
+    tracker, parts = SpectraTracker(described(hop), what), []
+    for a, b in pairwise(edges):
+        if a == stop:
+            other = SpectraTracker(described(hop), what)
+            other.restore(tracker.snapshot())
+            tracker = other
+        parts.append(tracker.process(whole.cut(a, b)))
+    same(Responses.join(parts), expected)
+    assert tracker.counts == one.counts
+
+
+@pytest.mark.parametrize(
+    ("options", "what", "message"),
+    [
+        ({"hop": 40}, {}, "not those of the spectra"),
+        ({"lines": Lines.parse("20", RATE_HZ, WINDOW)}, {}, "not those of the spectra"),
+        ({"spikes": ("u",)}, {}, "spikes are found in samples"),
+        ({"dtype": "float32"}, {}, "is for samples"),
+        ({"output": "x"}, {}, "no spectrum of 'x', which the joint estimator needs; it sends those of y, u, w"),
+        ({"schedule": "y"}, {}, r"does not send the value of 'y' to plot over; let it, or leave out .* \(values: x\)"),
+        ({"differenced": ("y",)}, {}, "does not difference 'y'"),
+        ({"hann": True}, {"quiet": LINES.quiet}, "a Hann window needs bin 1, which the drive does not send"),
+        ({"noise": "quiet"}, {"quiet": (3, 5)}, "the noise needs bin 7, which the drive does not send"),
+    ],
+)
+def test_what_spectra_cannot_give_is_refused(options: dict, what: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        SpectraTracker(described(**({"hop": 20} | options)), layout(**what))
+    assert "\n" not in str(caught.value)
+
+
+def test_samples_and_other_layouts_are_refused(record: Block) -> None:
+    tracker = SpectraTracker(described(20), layout())
+    for wrong in (record, next(sent(record, layout(quiet=())))):
+        with pytest.raises(InputError, match="not spectra of the layout"):
+            tracker.process(wrong)
+    other = SpectraTracker(described(20), layout(quiet=()))
+    with pytest.raises(InputError, match="other settings"):
+        other.restore(tracker.snapshot())
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"signals": ()}, "spectra of no signal"),
+        ({"signals": (Channel("y"), Channel("y", "m"))}, "share a name"),
+        ({"values": (Channel("y", "deg"),)}, "share a name"),
+        ({"window": 2}, "window=2"),
+        ({"hop": 30}, "hop=30 neither divides the window of 400 samples nor is a multiple of it"),
+        ({"hop": 0}, "hop=0"),
+        ({"lines": ()}, "without a line"),
+        ({"lines": (4, 2)}, "not ascending"),
+        ({"lines": (2, 200)}, "bin 200 is not between"),
+        ({"quiet": (2,)}, "bin 2 is named as a line and as quiet"),
+        ({"subtracted": (1.0,)}, "as many constants"),
+        ({"subtracted": (1.0, float("nan"), 0.0)}, "not finite"),
+    ],
+)
+def test_layouts_that_cannot_be_are_refused(options: dict, message: str) -> None:
+    given = {"signals": SIGNALS, "values": (), "window": 400, "hop": 20, "lines": (2, 4)} | options
+    with pytest.raises(InputError, match=message):
+        SpectraLayout(**given)
