@@ -53,6 +53,7 @@ monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault 
 fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
+	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py

@@ -1,11 +1,12 @@
 /* Which inner kernel runs. With LB_DISPATCH the build holds several and the machine is asked. */
 #include "state.h"
+#ifndef LB_SCALAR
 
 extern const lb_kernel LB(kernel_baseline);
 extern const lb_kernel LB(kernel_avx2);
 extern const lb_kernel LB(kernel_avx512);
 
-const lb_kernel *LB(kernel_of)(lb_instruction_set set)
+static const lb_kernel *kernel_of(lb_instruction_set set)
 {
 #ifdef LB_DISPATCH
     if (set == LB_AVX512 && lb_best_instruction_set() >= LB_AVX512) {
@@ -17,3 +18,12 @@ const lb_kernel *LB(kernel_of)(lb_instruction_set set)
 #endif
     return set == LB_BASELINE ? &LB(kernel_baseline) : 0;
 }
+
+lb_status LB(choose)(LB_DFT *t, lb_instruction_set set)
+{
+    t->set = set == LB_BEST ? lb_best_instruction_set() : set;
+    t->kernel = kernel_of(t->set);
+    return t->kernel ? LB_OK : LB_ERROR_INSTRUCTION_SET;
+}
+
+#endif

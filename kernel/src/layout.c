@@ -1,8 +1,12 @@
-/* size, init, reset: how an object lies in the caller's memory, and its tables. */
+/* size, init, reset: how an object lies in the caller's memory. */
 #include "state.h"
-#include "twiddle.h"
 
+/* Of vectors; without them of double and uint64_t. */
+#if LB_BLOCK == 1
+#define LB_ALIGN 8u
+#else
 #define LB_ALIGN 64u
+#endif
 
 static lb_status check(const lb_config *c)
 {
@@ -23,11 +27,14 @@ static lb_status check(const lb_config *c)
             return LB_ERROR_BINS;
         }
     }
-    if (c->variant < LB_MODULATED || c->variant > LB_BLACKMAN) {
+    if ((unsigned)c->variant > LB_BLACKMAN) {
         return LB_ERROR_VARIANT;
     }
     if (c->variant == LB_DAMPED && !(c->damping > 0.0 && c->damping < 1.0)) {
         return LB_ERROR_DAMPING;
+    }
+    if ((unsigned)c->table > LB_TABLE_COMPACT || (c->table == LB_TABLE_COMPACT && c->window > LB_COMPACT_WINDOW_MAX)) {
+        return LB_ERROR_TABLE;
     }
     return LB_OK;
 }
@@ -54,12 +61,14 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     const uint64_t inner = most < c->window ? most : c->window;
     const uint64_t blocks = (inner + LB_BLOCK - 1u) / LB_BLOCK;
     const uint64_t line = (c->window * bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN / bytes;
-    const uint64_t rows = (c->window + 1u) / 2u + 1u;
+    const uint64_t row = blocks * 2u * LB_BLOCK, rows = (c->window + 1u) / 2u + 1u;
 
-    t->row_length = (size_t)(blocks * 2u * LB_BLOCK);
+    t->compact = c->table == LB_TABLE_COMPACT;
+    t->row_length = (size_t)row;
     t->line_length = (size_t)line;
     t->blocks = (size_t)blocks;
-    t->table = (real *)take(at, rows * blocks * 2u * LB_BLOCK * bytes);
+    t->table = (real *)take(at, (t->compact ? c->window * UINT64_C(2) : rows * row) * bytes);
+    t->rows = (real *)take(at, t->compact ? (LB_TILE + 1u) * row * bytes : 0u);
     t->sums = (real *)take(at, c->channels * blocks * 4u * LB_BLOCK * bytes);
     t->line = (real *)take(at, c->channels * line * bytes);
     t->delta = (real *)take(at, (uint64_t)c->channels * 3u * LB_TILE * bytes);
@@ -125,22 +134,6 @@ static lb_status fill_bins(LB_DFT *t, const lb_config *c)
     return LB_OK;
 }
 
-static void fill_table(LB_DFT *t)
-{
-    for (size_t i = 0; i < t->blocks * LB_BLOCK; ++i) {
-        const uint32_t k = i < t->inner_count ? t->bins[i] : 0u;
-        real *at = t->table + lb_cos_at(i);
-        uint32_t r = 0; /* k·j mod N, without the product */
-        for (uint32_t j = 0; j <= t->half; ++j, at += t->row_length) {
-            double cosine, sine;
-            lb_twiddle(r, t->window, &cosine, &sine);
-            at[0] = (real)cosine;
-            at[LB_BLOCK] = (real)sine;
-            r = r < t->window - k ? r + k : r - (t->window - k);
-        }
-    }
-}
-
 lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT **dft)
 {
     if (!memory || !dft) {
@@ -155,18 +148,13 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     if (bytes < needed) {
         return LB_ERROR_MEMORY;
     }
-    const lb_instruction_set set =
-        config->instruction_set == LB_BEST ? lb_best_instruction_set() : config->instruction_set;
-    const lb_kernel *kernel = LB(kernel_of)(set);
-    if (!kernel) {
-        return LB_ERROR_INSTRUCTION_SET;
-    }
-
     cursor at = {0, (unsigned char *)memory + (LB_ALIGN - (uintptr_t)memory % LB_ALIGN) % LB_ALIGN};
     LB_DFT *t = (LB_DFT *)take(&at, sizeof(LB_DFT));
     lay_out(t, &at, config);
-    t->kernel = kernel;
-    t->set = set;
+    status = LB(choose)(t, config->instruction_set);
+    if (status != LB_OK) {
+        return status;
+    }
     t->variant = config->variant;
     t->window = config->window;
     t->channels = config->channels;
@@ -184,7 +172,7 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     if (status != LB_OK) {
         return status;
     }
-    fill_table(t);
+    LB(fill_table)(t);
     *dft = t;
     return LB(reset)(t);
 }

@@ -34,31 +34,17 @@ static void apply_taps(const LB_DFT *t, real *out)
     }
 }
 
-/* The way of the inner kernels' rows, and so their bits. */
-static void row(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
-{
-    lb_tile tile;
-    tile.sums = lb_sums(t, channel);
-    tile.row = lb_next_row(t, &tile.backwards);
-    tile.blocks = t->blocks;
-    tile.phase = phase;
-    tile.bins = t->inner_count;
-    tile.out = out;
-    tile.out_end = out + 2 * (size_t)t->inner_count;
-    t->kernel->read(&tile);
-}
-
 void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
     if (t->variant == LB_MODULATED) {
-        row(t, channel, phase, out);
+        LB(row)(t, channel, phase, out);
         return;
     }
     if (lb_is_windowed(t->variant)) {
-        row(t, channel, LB_PHASE_WINDOW, t->spectrum);
+        LB(row)(t, channel, LB_PHASE_WINDOW, t->spectrum);
         apply_taps(t, out);
     } else {
-        row(t, channel, LB_PHASE_FIXED, out); /* their sums are in the window's phase as they are */
+        LB(row)(t, channel, LB_PHASE_FIXED, out); /* their sums are in the window's phase as they are */
     }
     if (phase == LB_PHASE_FIXED) {
         turn_back(t, out);

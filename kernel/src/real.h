@@ -18,7 +18,7 @@ typedef int32_t lb_lane_index;
 #error "compile with -DLB_BITS=32 or -DLB_BITS=64"
 #endif
 
-/* Bins are padded to blocks of 64 bytes, the widest vector; without vector units to single bins. */
+/* Bins are padded to blocks of 64 bytes, the widest vector; without vectors (one.c) not at all. */
 #if !defined(LB_SCALAR) && !(defined(__GNUC__) || defined(__clang__))
 #define LB_SCALAR 1
 #endif
@@ -29,7 +29,9 @@ typedef int32_t lb_lane_index;
 #endif
 
 /* Samples whose sums are done in one go: long enough that loading and storing the sums is cheap. */
-#ifndef LB_TILE
+#if !defined(LB_TILE) && defined(LB_SCALAR)
+#define LB_TILE 0 /* none waits */
+#elif !defined(LB_TILE)
 #define LB_TILE 128
 #endif
 

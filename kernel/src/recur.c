@@ -5,7 +5,7 @@
 void LB(recur)(const LB_DFT *t, size_t channel, const real *delta, size_t length)
 {
     real *sums = lb_sums(t, channel);
-    const real *row = t->table + t->row_length; /* index 1 */
+    const real *row = lb_table_row(t, 1u);
     for (size_t i = 0; i < length; ++i) {
         for (size_t b = 0; b < t->inner_count; ++b) {
             real *x = sums + lb_sum_at(b);

@@ -20,7 +20,9 @@ struct LB_DFT {
     uint64_t count;       /* samples that the sums have seen */
     uint32_t index;       /* of the next sample in its period: count mod N */
     uint32_t queued;      /* newer samples that wait, < LB_TILE */
-    real *table;          /* [half + 1][blocks][2][LB_BLOCK]: cos, sin */
+    int compact;          /* the table is [window][2]: cos, sin of 2πr/N */
+    real *table;          /* else [half + 1][blocks][2][LB_BLOCK]: cos, sin */
+    real *rows;           /* compact: [LB_TILE + 1][blocks][2][LB_BLOCK], gathered from the table */
     real *sums;           /* [channels][blocks][4][LB_BLOCK] */
     real *line;           /* [channels][line_length], the newest N samples, by index */
     real *delta;          /* [channels][3][LB_TILE], of the tile at work: see tile.h */
@@ -51,11 +53,21 @@ static inline size_t lb_cos_at(size_t bin)
     return bin / LB_BLOCK * 2 * LB_BLOCK + lb_slot(bin % LB_BLOCK);
 }
 
+void LB(fill_table)(LB_DFT *t);
+
+/* Row `number` of a compact table, gathered at `place` among the rows. */
+const real *LB(gathered)(const LB_DFT *t, uint32_t number, size_t place);
+
+static inline const real *lb_table_row(const LB_DFT *t, uint32_t number)
+{
+    return t->compact ? LB(gathered)(t, number, 0) : t->table + (size_t)number * t->row_length;
+}
+
 /* The table row of the index, and whether it is to be conjugated. */
 static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards)
 {
     *backwards = index >= t->half;
-    return t->table + (size_t)(*backwards ? t->window - index : index) * t->row_length;
+    return lb_table_row(t, *backwards ? t->window - index : index);
 }
 
 /* The row that demodulates the sums now: the next sample's, as the last one's direction finds it. It is the same row
@@ -64,19 +76,45 @@ static inline const real *lb_next_row(const LB_DFT *t, int *backwards)
 {
     const uint32_t last = (t->index ? t->index : t->window) - 1u;
     *backwards = last >= t->half;
-    return t->table + (size_t)(*backwards ? t->window - last - 1u : last + 1u) * t->row_length;
+    return lb_table_row(t, *backwards ? t->window - last - 1u : last + 1u);
 }
 
 static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + channel * t->blocks * 4 * LB_BLOCK; }
 
-/* The instruction set's kernel, or null. */
-const lb_kernel *LB(kernel_of)(lb_instruction_set set);
+/* The instruction set, where this machine and this build have it. */
+lb_status LB(choose)(LB_DFT *t, lb_instruction_set set);
+
+/* Where samples come from. */
+typedef struct {
+    const real *samples;
+    ptrdiff_t channel_stride, sample_stride;
+} lb_input;
+
+/* Rows that samples are to make. */
+typedef struct {
+    size_t first, hop;
+    lb_phase phase;
+    real *out;            /* next row of channel 0 */
+    size_t channel_reals; /* from channel to channel */
+    const real *end;      /* of channel 0's rows */
+} lb_rows_due;
+
+/* `length` samples without rows. */
+void LB(skip)(LB_DFT *t, lb_input *in, size_t length);
+
+#ifndef LB_SCALAR
+/* The same with rows, which the inner kernels write themselves; LB_MODULATED only. */
+void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
+#endif
 
 /* Brings the sums up to date with the samples that wait. */
 void LB(catch_up)(LB_DFT *t);
 
 /* The unrenewed variants' recursion over a tile. */
 void LB(recur)(const LB_DFT *t, size_t channel, const real *delta, size_t length);
+
+/* One channel's inner bins: S, or in the window's phase. out[inner_count][2] */
+void LB(row)(const LB_DFT *t, size_t channel, lb_phase phase, real *out);
 
 /* One channel's spectrum; nothing may wait. out[bin_count][2] */
 void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out);

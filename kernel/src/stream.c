@@ -1,175 +1,5 @@
-/* push, queue, process: samples in, rows out. */
+/* Blocks of samples in, rows out. */
 #include "state.h"
-
-static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
-
-/* The differences and the delay line of one channel's next samples. */
-static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
-{
-    real *line = t->line + channel * t->line_length + t->index;
-    real *delta = t->delta + channel * 3 * LB_TILE;
-    if (t->variant != LB_DAMPED) {
-        t->kernel->take_in(delta, line, samples, stride, length);
-        return;
-    }
-    for (size_t i = 0; i < length; ++i, samples += stride) {
-        delta[i] = *samples - t->radius_window * line[i];
-        line[i] = *samples;
-    }
-}
-
-/* F = x_0, the sample without an image. */
-static void seed(LB_DFT *t, size_t channel)
-{
-    real *sums = lb_sums(t, channel);
-    const real first = t->line[channel * t->line_length];
-    for (size_t block = 0; block < t->blocks; ++block, sums += 4 * LB_BLOCK) {
-        for (size_t i = 0; i < LB_BLOCK; ++i) {
-            sums[2 * LB_BLOCK + i] = first;
-            sums[3 * LB_BLOCK + i] = 0;
-        }
-    }
-}
-
-/* Rows that a tile is to make. */
-typedef struct {
-    size_t first, hop;
-    lb_phase phase;
-    real *out;            /* next row of channel 0 */
-    size_t channel_reals; /* from channel to channel */
-    const real *end;      /* of channel 0's rows */
-} rows_due;
-
-/* The sums of `length` samples from `start` on, which lie in one half of the period and whose differences begin at
- * `offset`, and the rows due among them. */
-static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length, const rows_due *due)
-{
-    lb_tile tile;
-    tile.channels = t->channels;
-    tile.blocks = t->blocks;
-    tile.sums = t->sums;
-    tile.line = t->line + start;
-    tile.image = (ptrdiff_t)t->window - 2 * (ptrdiff_t)start;
-    tile.line_step = t->line_length;
-    tile.middle = 2 * start == t->window;
-    tile.row = lb_row(t, start, &tile.backwards);
-    tile.row_step = tile.backwards ? -(ptrdiff_t)t->row_length : (ptrdiff_t)t->row_length;
-    tile.delta = t->delta + offset;
-    tile.length = length;
-    tile.swap = start + length == t->window;
-    tile.first = due->first;
-    tile.hop = due->hop;
-    tile.phase = due->phase;
-    tile.bins = t->inner_count;
-    tile.out = due->out;
-    tile.out_end = due->end;
-    tile.out_step = due->channel_reals;
-    for (size_t c = 0; c < t->channels && (start == t->half || t->window == 1); ++c) {
-        seed(t, c);
-    }
-    t->kernel->run(&tile);
-}
-
-/* Moves on to the rows due after `length` further samples. */
-static void passed(rows_due *due, size_t length, size_t row_reals)
-{
-    if (due->first >= length) {
-        due->first -= length;
-        return;
-    }
-    const uint32_t beyond = (uint32_t)(length - 1 - due->first); /* < LB_TILE */
-    const uint32_t rows = due->hop > beyond ? 1u : 1u + beyond / (uint32_t)due->hop;
-    due->out += rows * row_reals;
-    due->first += rows * due->hop - length;
-}
-
-/* The sums of the `length` samples taken in last, which end at the index. */
-static void run(LB_DFT *t, uint32_t length, rows_due *due)
-{
-    const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
-    uint32_t start = t->index - length;
-    if (!lb_renews(t->variant)) {
-        for (size_t c = 0; c < t->channels; ++c) {
-            LB(recur)(t, c, t->delta + c * 3 * LB_TILE, length);
-        }
-        start = t->index;
-    }
-    for (uint32_t offset = 0; start < t->index;) {
-        const uint32_t end = start < t->half ? t->half : t->window;
-        const uint32_t ahead = (t->index < end ? t->index : end) - start;
-        const uint32_t part = ahead < longest ? ahead : longest;
-        run_part(t, start, offset, part, due);
-        if (due->out) {
-            passed(due, part, 2 * (size_t)t->bin_count);
-        }
-        start += part;
-        offset += part;
-    }
-    t->index = t->index == t->window ? 0 : t->index;
-}
-
-/* Where the next samples come from. */
-typedef struct {
-    const real *samples;
-    ptrdiff_t channel_stride, sample_stride;
-} input;
-
-/* As many of the samples as make one tile within the period, at most `length`; returns their number. */
-static size_t next_tile(LB_DFT *t, input *in, size_t length, rows_due *due)
-{
-    const size_t n = smaller(length, smaller(LB_TILE, t->window - t->index));
-    for (size_t c = 0; c < t->channels; ++c) {
-        take_in(t, c, in->samples + (ptrdiff_t)c * in->channel_stride, in->sample_stride, n);
-    }
-    in->samples += (ptrdiff_t)n * in->sample_stride;
-    t->count += n;
-    t->index += (uint32_t)n;
-    run(t, (uint32_t)n, due);
-    return n;
-}
-
-/* Without rows. */
-static void skip(LB_DFT *t, input *in, size_t length)
-{
-    rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
-    while (length) {
-        length -= next_tile(t, in, length, &none);
-    }
-}
-
-void LB(catch_up)(LB_DFT *t)
-{
-    if (t->queued) {
-        input in = {t->queue, LB_TILE, 1};
-        skip(t, &in, t->queued);
-        t->queued = 0;
-    }
-}
-
-lb_status LB(queue)(LB_DFT *t, const real *samples)
-{
-    if (!t || !samples) {
-        return LB_ERROR_NULL;
-    }
-    for (size_t c = 0; c < t->channels; ++c) {
-        t->queue[c * LB_TILE + t->queued] = samples[c];
-    }
-    if (++t->queued == LB_TILE) {
-        LB(catch_up)(t);
-    }
-    return LB_OK;
-}
-
-lb_status LB(push)(LB_DFT *t, const real *samples)
-{
-    if (!t || !samples) {
-        return LB_ERROR_NULL;
-    }
-    LB(catch_up)(t);
-    input in = {samples, 1, 1};
-    skip(t, &in, 1);
-    return LB_OK;
-}
 
 lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
 {
@@ -180,19 +10,11 @@ lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
     return LB_OK;
 }
 
-/* Rows written by the inner kernels themselves. */
-static void fused_rows(LB_DFT *t, input *in, size_t length, rows_due due)
-{
-    while (length) {
-        length -= next_tile(t, in, length, &due);
-    }
-}
-
-/* Rows read one by one: for the variants to compare with. */
-static void read_rows(LB_DFT *t, input *in, size_t length, rows_due due)
+/* Rows read one by one. */
+static void read_rows(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
 {
     while (due.first < length) {
-        skip(t, in, due.first + 1);
+        LB(skip)(t, in, due.first + 1);
         length -= due.first + 1;
         due.first = due.hop - 1;
         for (size_t c = 0; c < t->channels; ++c) {
@@ -200,7 +22,7 @@ static void read_rows(LB_DFT *t, input *in, size_t length, rows_due due)
         }
         due.out += 2 * t->bin_count;
     }
-    skip(t, in, length);
+    LB(skip)(t, in, length);
 }
 
 lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, ptrdiff_t sample_stride,
@@ -217,23 +39,25 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
     if (rows != expected) {
         return LB_ERROR_ROWS;
     }
-    input in = {samples, channel_stride, sample_stride};
+    lb_input in = {samples, channel_stride, sample_stride};
     LB(catch_up)(t);
     if (!rows) {
-        skip(t, &in, length);
+        LB(skip)(t, &in, length);
         return LB_OK;
     }
-    rows_due due;
+    lb_rows_due due;
     due.first = hop - 1 - (size_t)(t->count % hop);
     due.hop = hop;
     due.phase = phase;
     due.out = out;
     due.channel_reals = rows * 2 * t->bin_count;
     due.end = out + due.channel_reals;
+#ifndef LB_SCALAR
     if (t->variant == LB_MODULATED) {
-        fused_rows(t, &in, length, due);
-    } else {
-        read_rows(t, &in, length, due);
+        LB(fused_rows)(t, &in, length, due);
+        return LB_OK;
     }
+#endif
+    read_rows(t, &in, length, due);
     return LB_OK;
 }

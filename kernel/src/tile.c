@@ -1,6 +1,7 @@
 /* Compiled once per number type and instruction set, always with -ffp-contract=off: products are rounded before
  * they are added, on every machine, so every object makes the same bits. */
 #include "tile.h"
+#ifndef LB_SCALAR
 #include "vec.h"
 
 #ifndef LB_KERNEL_NAME
@@ -346,3 +347,5 @@ static void take_in(real *restrict delta, real *restrict line, const real *restr
 }
 
 const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row};
+
+#endif

@@ -1,12 +1,10 @@
-/* Vectors of LB_LANES numbers, in the language of gcc and clang; plain numbers elsewhere. Private. */
+/* Vectors of LB_LANES numbers, in the language of gcc and clang. Private. */
 #ifndef LB_VEC_H
 #define LB_VEC_H
 
 #include "real.h"
 
 #ifdef LB_LANES
-#elif defined(LB_SCALAR)
-#define LB_LANES 1
 #elif defined(__AVX512F__)
 #define LB_LANES (512 / LB_BITS)
 #elif defined(__AVX2__)
@@ -16,21 +14,6 @@
 #endif
 
 #define LB_INLINE static inline __attribute__((always_inline))
-
-#if LB_LANES == 1
-
-#undef LB_INLINE
-#define LB_INLINE static inline
-typedef real vec;
-LB_INLINE vec lb_load(const real *p) { return *p; }
-LB_INLINE void lb_store(real *p, vec v) { *p = v; }
-LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
-{
-    out[0] = re;
-    out[1] = im;
-}
-
-#else
 
 typedef real vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_alias));
 typedef real loose_vec
@@ -74,8 +57,6 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
     *(loose_vec *)(void *)(out + LB_BLOCK) = (loose_vec)LB_SHUFFLE(re, im, LB_HIGH);
 }
 
-#endif
-
 #if defined(__clang__)
 #define LB_UNROLL_4 _Pragma("clang loop unroll_count(4)")
 #elif defined(__GNUC__)
@@ -92,7 +73,7 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 
 /* Blocks worked on at once: enough independent sums to hide the adder's latency, few enough for the registers. */
 #ifndef LB_ABREAST
-#if LB_LANES > 1 && LB_LANES == LB_BLOCK
+#if LB_LANES == LB_BLOCK
 #define LB_ABREAST 2
 #else
 #define LB_ABREAST 1

@@ -1,13 +1,13 @@
 /* One number type's part of bits.c; included once per type, so no guard. */
 
 /* The hash of a run by blocks; the same samples pushed one by one must end in the same snapshot. */
-static uint64_t RUN(uint32_t window, uint32_t bin_count, lb_variant variant, lb_instruction_set set)
+static uint64_t RUN(uint32_t window, uint32_t bin_count, lb_variant variant, lb_instruction_set set, lb_table table)
 {
     uint32_t bins[64], state = window * 97u + bin_count;
     for (uint32_t i = 0; i < bin_count; ++i) {
         bins[i] = (i * (window / bin_count) + 1u) % window;
     }
-    const lb_config config = {window, CHANNELS, bin_count, bins, variant, 0.99, set};
+    const lb_config config = {window, CHANNELS, bin_count, bins, variant, 0.99, set, table};
     size_t bytes, snapshot_bytes;
     DFT *blocks, *pushes;
     DEMAND(FN(size)(&config, &bytes) == LB_OK);

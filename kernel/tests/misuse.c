@@ -16,7 +16,7 @@ static void expect(lb_status got, lb_status want, const char *what)
 #define EXPECT(want, call) expect((call), (want), #call)
 
 static const uint32_t bins[] = {1, 2, 3}, twice[] = {1, 2, 1}, beyond[] = {1, 8};
-static const lb_config good = {8, 2, 3, bins, LB_MODULATED, 0.0, LB_BEST};
+static const lb_config good = {8, 2, 3, bins, LB_MODULATED, 0.0, LB_BEST, LB_TABLE_ROWS};
 
 static void configurations(void)
 {
@@ -41,6 +41,10 @@ static void configurations(void)
     EXPECT(LB_ERROR_BINS, lb_sdft64_size(&c, &bytes));
     c = good, c.variant = (lb_variant)17;
     EXPECT(LB_ERROR_VARIANT, lb_sdft64_size(&c, &bytes));
+    c = good, c.table = (lb_table)2;
+    EXPECT(LB_ERROR_TABLE, lb_sdft64_size(&c, &bytes));
+    c.table = LB_TABLE_COMPACT, c.window = LB_COMPACT_WINDOW_MAX + 1u;
+    EXPECT(LB_ERROR_TABLE, lb_sdft64_size(&c, &bytes));
     c = good, c.variant = LB_DAMPED, c.damping = 1.0;
     EXPECT(LB_ERROR_DAMPING, lb_sdft64_size(&c, &bytes));
 }

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from livebode.estimation import Settings, Tracker, welch
-    from livebode.excitation import Excitation, multisine, recognise
+    from livebode.excitation import (
+        Excitation,
+        chirp,
+        low_crest_phases,
+        multisine,
+        odd_lines,
+        prbs,
+        quantised,
+        recognise,
+        stepped_sine,
+    )
     from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
     from livebode.kernel import SlidingDFT
     from livebode.motion import MotionCorrection
@@ -33,7 +43,17 @@ if TYPE_CHECKING:
 
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),
-    "excitation": ("Excitation", "multisine", "recognise"),
+    "excitation": (
+        "Excitation",
+        "chirp",
+        "low_crest_phases",
+        "multisine",
+        "odd_lines",
+        "prbs",
+        "quantised",
+        "recognise",
+        "stepped_sine",
+    ),
     "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
     "kernel": ("SlidingDFT",),
     "motion": ("MotionCorrection",),
@@ -87,11 +107,17 @@ __all__ = [
     "SlidingDFT",
     "Strokes",
     "Tracker",
+    "chirp",
     "fit",
     "fit_rational",
+    "low_crest_phases",
     "multisine",
+    "odd_lines",
     "open_log",
+    "prbs",
+    "quantised",
     "recognise",
+    "stepped_sine",
     "welch",
 ]
 

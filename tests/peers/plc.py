@@ -12,8 +12,10 @@ from pyads.testserver import AdsTestServer, AdvancedHandler, PLCVariable
 from pyads.testserver.handler import AmsPacket, AmsResponseData
 
 from livebode.sources.live import Batch
-from livebode.sources.live.ring import FILETIME_1970, HEADER, MAGIC
+from livebode.sources.live.ring import FILETIME_1970
+from livebode.structured_text import ring_block, ring_type
 from tests.peers.peer import CHANNELS, RATE_HZ, Peer, free_port, until
+from tests.structured_text import Machine
 
 LENGTH = 2048
 NET_ID = "127.0.0.1.1.1"
@@ -87,31 +89,37 @@ class AdsPeer(Peer):
 
 
 class RingPeer(AdsPeer):
+    """The PLC program that livebode writes fills the ring, cycle by cycle."""
+
     def _prepare(self) -> None:
-        self._count = self._epoch = self._stamp = 0
-        self._rows = np.zeros((LENGTH, len(CHANNELS)))
+        names = [channel.name for channel in CHANNELS]
+        self._machine = Machine(ring_type(len(names), RATE_HZ, length=LENGTH), ring_block(names, length=LENGTH))
         self._variable = PLCVariable("MAIN.livebode", b"", constants.ADST_BIGTYPE, "ST_LivebodeRing")
         self._memory.add_variable(self._variable)
-        self._write()
+        self._restart(0)
+
+    def _restart(self, epoch: int) -> None:
+        self._ring, self._block = (self._machine.instance(n) for n in ("ST_LivebodeRing", "FB_LivebodeRing"))
+        self._epoch = epoch
+        self._variable.value = self._ring.bytes()
 
     def wait_ready(self) -> None:
         until(lambda: self._served(constants.ADSCOMMAND_READ), "the ring to be read")
 
-    def _write(self) -> None:
-        head = HEADER.pack(MAGIC, 1, len(CHANNELS), LENGTH, self._epoch, RATE_HZ, self._stamp, self._count)
-        self._variable.value = head + self._rows.tobytes()
-
     def send(self, batch: Batch) -> None:
         with self._memory.lock:
-            numbers = np.arange(batch.first_sample, batch.stop)
-            self._rows[numbers % LENGTH] = batch.data.T
-            if self._count == 0:
+            if batch.epoch != self._epoch:
+                self._restart(batch.epoch)
+            ring = self._ring.memory
+            if ring.v_count == 0:
                 # A machine that has run for long: what stands in the ring was written before.
-                before = np.arange(max(0, batch.stop - LENGTH), batch.first_sample)
-                self._rows[before % LENGTH, 0] = before
-            self._count, self._epoch = batch.stop, batch.epoch
-            self._stamp = FILETIME_1970 + round((batch.stamp_s + (len(numbers) - 1) / RATE_HZ) * 1e7)
-            self._write()
+                for number in range(max(0, batch.stop - LENGTH), batch.first_sample):
+                    ring.v_data[number % LENGTH * len(CHANNELS)] = float(number)
+            ring.v_count = batch.first_sample
+            for i, row in enumerate(batch.data.T.tolist()):
+                stamp = FILETIME_1970 + round((batch.stamp_s + i / RATE_HZ) * 1e7)
+                self._block(ring=ring, stamp=stamp, **{c.name: value for c, value in zip(CHANNELS, row)})
+            self._variable.value = self._ring.bytes()
 
     def lose(self, lost: Sequence[Batch]) -> None:
         with self._memory.lock:

@@ -18,6 +18,7 @@ extern "C" {
 /* A limit on everything: all products of these fit 64 bits. */
 #define LB_WINDOW_MAX 16777216u
 #define LB_CHANNELS_MAX 1024u
+#define LB_COMPACT_WINDOW_MAX 65536u
 
 typedef enum {
     LB_OK = 0,
@@ -35,7 +36,8 @@ typedef enum {
     LB_ERROR_SNAPSHOT_LENGTH, /* a snapshot of another length: cut off, or of another configuration */
     LB_ERROR_SNAPSHOT_MAGIC,  /* not a snapshot, or one of another byte order or version */
     LB_ERROR_SNAPSHOT_CONFIG, /* a snapshot of another configuration */
-    LB_ERROR_SNAPSHOT_CRC     /* a damaged snapshot */
+    LB_ERROR_SNAPSHOT_CRC,    /* a damaged snapshot */
+    LB_ERROR_TABLE            /* unknown table, or a compact one with window > LB_COMPACT_WINDOW_MAX */
 } lb_status;
 
 /* All but the first are there to compare with. Windows are exact taps over neighbouring bins (Jacobsen & Lyons
@@ -60,6 +62,10 @@ typedef enum {
     LB_AVX512
 } lb_instruction_set;
 
+/* The twiddles in memory. ROWS: window/2 + 2 rows of bin_count each, read as they lie. COMPACT: window entries for all
+ * bins, gathered for every sample: for machines with little memory. The bits are the same. */
+typedef enum { LB_TABLE_ROWS = 0, LB_TABLE_COMPACT } lb_table;
+
 typedef struct {
     uint32_t window;      /* samples, N */
     uint32_t channels;    /* sharing one index */
@@ -68,6 +74,7 @@ typedef struct {
     lb_variant variant;
     double damping; /* pole radius of LB_DAMPED; ignored by the others */
     lb_instruction_set instruction_set;
+    lb_table table;
 } lb_config;
 
 /* The instruction set that LB_BEST stands for on this machine. */

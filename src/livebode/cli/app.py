@@ -16,13 +16,17 @@ import traceback
 
 import typer
 
+from livebode.cli.compare_command import compare_command
 from livebode.cli.demo_command import demo_command
+from livebode.cli.design_command import design_command
 from livebode.cli.export_command import export_command
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
 from livebode.cli.margins_command import margins_command
+from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
+from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
 from livebode.nouns import InputError
@@ -39,11 +43,15 @@ app.command("run")(run_command)
 app.command("fit")(fit_command)
 app.command("inspect")(inspect_command)
 app.command("demo")(demo_command)
+app.command("design")(design_command)
 app.command("query")(query_command)
 app.command("export")(export_command)
 app.command("margins")(margins_command)
 app.command("validate")(validate_command)
 app.command("learn")(learn_command)
+app.command("plc")(plc_command)
+app.command("report")(report_command)
+app.command("compare")(compare_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,6 +1,31 @@
 """Excitations: to recognise one in a recording, and to make one."""
 
-from livebode.excitation.multisine import multisine, schroeder_phases
+from livebode.excitation.chirp import chirp, chirp_lines
+from livebode.excitation.low_crest import crest_between_samples, low_crest_phases
+from livebode.excitation.multisine import Phases, multisine, schroeder_phases
+from livebode.excitation.odd import check_band, odd_lines
+from livebode.excitation.prbs import check_order, prbs
+from livebode.excitation.quantised import quantised
 from livebode.excitation.recognise import Excitation, recognise
+from livebode.excitation.shaped import equal_snr
+from livebode.excitation.stepped import stepped_lines, stepped_sine
 
-__all__ = ["Excitation", "multisine", "recognise", "schroeder_phases"]
+__all__ = [
+    "Excitation",
+    "Phases",
+    "check_band",
+    "check_order",
+    "chirp",
+    "chirp_lines",
+    "crest_between_samples",
+    "equal_snr",
+    "low_crest_phases",
+    "multisine",
+    "odd_lines",
+    "prbs",
+    "quantised",
+    "recognise",
+    "schroeder_phases",
+    "stepped_lines",
+    "stepped_sine",
+]

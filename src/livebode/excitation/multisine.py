@@ -7,9 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.excitation.low_crest import low_crest_phases
 from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
+Phases = Literal["schroeder", "random", "low crest"]
 
 
 def schroeder_phases(count: int) -> Floats:
@@ -29,7 +31,7 @@ def schroeder_phases(count: int) -> Floats:
 
 
 def multisine(
-    lines: Lines, amplitude: ArrayLike = 1.0, phases: ArrayLike | Literal["schroeder"] = "schroeder"
+    lines: Lines, amplitude: ArrayLike = 1.0, phases: ArrayLike | Phases = "schroeder", *, seed: int = 0
 ) -> Floats:
     """One period of Σ A_k·sin(2πkn/N + φ_k), n = 0 … N − 1, shape (lines.window,), unit of `amplitude`.
 
@@ -43,7 +45,10 @@ def multisine(
     amplitude
         One for all lines, or one for each.
     phases
-        ``"schroeder"`` for a low crest factor, or radians for each line.
+        ``"schroeder"``, eq. (7); ``"random"``, uniform, for telling distortion; ``"low crest"``, searched for seconds
+        (`low_crest_phases`); or radians for each line.
+    seed
+        Of random and low-crest phases.
 
     Raises
     ------
@@ -57,12 +62,9 @@ def multisine(
     >>> len(period), round(float(np.std(period)) ** 2, 6)
     (200, 0.875)
     """
-    if isinstance(phases, str) and phases != "schroeder":
-        raise InputError(f"{phases=} is not known; choose 'schroeder' or give radians for each line")
-    angles = schroeder_phases(len(lines)) if isinstance(phases, str) else phases
-    each_amplitude, each_angle = (
-        _each(v, len(lines), name) for v, name in ((amplitude, "amplitude"), (angles, "phases"))
-    )
+    each_amplitude = each(amplitude, len(lines), "amplitude")
+    angles = _named(phases, lines, each_amplitude, seed) if isinstance(phases, str) else phases
+    each_angle = each(angles, len(lines), "phases")
     n = np.arange(lines.window, dtype=np.int64)
     period = np.zeros(lines.window)
     for k, size, phase in zip(lines.bins, each_amplitude, each_angle):
@@ -70,7 +72,20 @@ def multisine(
     return period
 
 
-def _each(value: ArrayLike, count: int, name: str) -> Floats:
+def _named(phases: str, lines: Lines, amplitude: Floats, seed: int) -> Floats:
+    if phases == "schroeder":
+        return schroeder_phases(len(lines))
+    if phases == "random":
+        return np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+    if phases == "low crest":
+        return low_crest_phases(lines.bins, amplitude, seed=seed)
+    raise InputError(
+        f"{phases=} is not known; choose 'schroeder', 'random', 'low crest', or give radians for each line"
+    )
+
+
+def each(value: ArrayLike, count: int, name: str) -> Floats:
+    """One finite number for each of `count` lines, shape (count,); InputError where they are not."""
     given = np.asarray(value, dtype=np.float64)
     if given.shape not in ((), (count,)):
         raise InputError(f"{name} has shape {given.shape} for {count} lines; give one number, or one for each line")

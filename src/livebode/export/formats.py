@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import pyarrow as pa
 
@@ -35,10 +35,11 @@ TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], Written]] = {
 
 ENDINGS: Mapping[str, str] = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}
 
+Done = TypeVar("Done")
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
 
-def save(path: Path, write: Callable[[Path], Written], *, force: bool = False) -> Written:
+def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> Done:
     """Let `write` make a file beside its place, and move it there when it is whole.
 
     Parameters

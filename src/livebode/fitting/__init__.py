@@ -2,7 +2,7 @@
 
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.fitter import Fitter
-from livebode.fitting.mean import mean_response
+from livebode.fitting.mean import RunningMean, mean_response
 from livebode.fitting.models import MODELS, model_named
 from livebode.fitting.once import Fit, fit, fit_of
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel
@@ -20,6 +20,7 @@ __all__ = [
     "PhysicalModel",
     "Rational",
     "Rigid",
+    "RunningMean",
     "ThreeMass",
     "TwoMass",
     "TwoMassGain",

@@ -40,50 +40,64 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     Returns
     -------
     Responses
-        `coherence` is NaN, it does not follow from those of single windows. `time_s` and `schedule` are means over the
-        responses that went in, `first` and `sample` their extent, `dof` the least over the lines.
+        `coherence`, `time_s` and `schedule` are means over the responses that went in, `first` and `sample` their
+        extent, `dof` the least over the lines.
 
     Raises
     ------
     InputError
         If no line is ever valid.
     """
-    sums: _Sums | None = None
+    mean = RunningMean()
     for part in [responses] if isinstance(responses, Responses) else responses:
-        sums = sums or _Sums(part)
-        sums.add(part)
-    if sums is None or sums.newest is None:
-        raise InputError("none of the responses is valid at any line; track more periods")
-    return sums.newest if sums.averages else sums.response(sums.newest)
+        mean.add(part)
+    return mean.response()
 
 
-class _Sums:
-    """Sums over responses, each of shape (lines,)."""
+class RunningMean:
+    """`mean_response` of responses that come in parts, in order.
 
-    def __init__(self, like: Responses) -> None:
+    Attributes
+    ----------
+    rows
+        How many responses went in, those with a valid line.
+    averages
+        Whether they average over periods already, so that the newest one is given.
+    """
+
+    def __init__(self) -> None:
+        self.rows, self.averages = 0, False
+        self._newest: Responses | None = None
+
+    def _begin(self, like: Responses) -> None:
         n = len(like.lines)
-        self.newest: Responses | None = None
-        self.averages = False
         self._count, self._mean, self._apart = np.zeros(n), np.zeros(n, dtype=np.complex128), np.zeros(n)
         self._overlap = _Overlap(like.lines.window, n)
         self._least, self._dof = np.full(n, np.inf), 0.0
-        self._rows, self._moment, self._schedule, self._scheduled = 0, 0.0, 0.0, 0
+        self._coherent, self._coherence = np.zeros(n), np.zeros(n)
+        self._moment, self._schedule, self._scheduled = 0.0, 0.0, 0
         self._first = np.iinfo(np.int64).max
 
     def add(self, part: Responses) -> None:
+        """The next responses."""
         used = part.valid & np.isfinite(part.value)
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
             return
         used, part = used[rows], part[rows]
-        self.newest = part[-1:]
+        if self._newest is None:
+            self._begin(part)
+        self._newest = part[-1:]
         self.averages |= bool(np.any(part.sample - part.first >= part.lines.window))
         self._add_values(used, part.value)
         self._overlap.add(part.sample + 1, used.astype(np.float64))
         known = used & np.isfinite(part.sigma)
         self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
         self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
-        self._rows += len(part)
+        coherent = used & np.isfinite(part.coherence)
+        self._coherent += coherent.sum(axis=0)
+        self._coherence += np.where(coherent, part.coherence, 0.0).sum(axis=0)
+        self.rows += len(part)
         self._moment += part.time_s.sum()
         placed = np.isfinite(part.schedule)
         self._schedule += part.schedule[placed].sum()
@@ -99,12 +113,20 @@ class _Sums:
         self._mean += (mean - self._mean) * share
         self._count += count
 
-    def response(self, newest: Responses) -> Responses:
+    def response(self) -> Responses:
+        """The mean so far; InputError where no line was ever valid."""
+        newest = self._newest
+        if newest is None:
+            raise InputError("none of the responses is valid at any line; track more periods")
+        return newest if self.averages else self._mean_of_all(newest)
+
+    def _mean_of_all(self, newest: Responses) -> Responses:
         valid = self._count > 0
         count = np.where(valid, self._count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             windows = count**2 / self._overlap.total()
             scatter = np.sqrt(self._apart / count / (windows - 1))
+            coherence = self._coherence / self._coherent
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
         return Responses(
@@ -112,11 +134,11 @@ class _Sums:
             value=np.where(valid, self._mean, complex(np.nan, np.nan))[np.newaxis],
             sigma=np.where(several, scatter, single)[np.newaxis],
             dof=np.array([windows[several].min() - 1 if several.any() else self._dof or np.nan]),
-            coherence=np.full((1, len(valid)), np.nan),
+            coherence=coherence[np.newaxis],
             valid=valid[np.newaxis],
             first=np.array([self._first]),
             sample=newest.sample,
-            time_s=np.array([self._moment / self._rows]),
+            time_s=np.array([self._moment / self.rows]),
             schedule=np.array([self._schedule / self._scheduled if self._scheduled else np.nan]),
             quantity=newest.quantity,
             unit=newest.unit,

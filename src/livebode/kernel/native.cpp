@@ -70,7 +70,8 @@ class Engine {
                                   bins.data(),
                                   static_cast<lb_variant>(variant),
                                   damping,
-                                  static_cast<lb_instruction_set>(set)};
+                                  static_cast<lb_instruction_set>(set),
+                                  LB_TABLE_ROWS};
         size_t bytes = 0;
         expect(is_double ? lb_sdft64_size(&config, &bytes) : lb_sdft32_size(&config, &bytes));
         memory_.reset(new unsigned char[bytes]);

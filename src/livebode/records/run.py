@@ -107,7 +107,8 @@ class Run:
             if reading.in_segments(self.path):
                 yield from reading.tables(self.path, name, size_bytes_max, finished=self.finished)
             elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
-                with pq.ParquetFile(file) as parquet:
+                # Else what was read ahead of a long run stays in memory until its end.
+                with pq.ParquetFile(file, pre_buffer=False) as parquet:
                     yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None
@@ -130,14 +131,23 @@ class Run:
 
     def events(self) -> list[Event]:
         """What is in events.jsonl; of a run that is not finished, up to the first line that is not whole."""
+        return list(self.each_event())
+
+    def each_event(self) -> Iterator[Event]:
+        """The same one by one, however many they are."""
         name = self.path / "events.jsonl"
         try:
-            data = name.read_bytes()
-            lines, end = json_lines.whole_lines(data)
-            if end < len(data) and self.finished:
-                json_lines.from_line(data[end:].split(b"\n")[0])
-                raise ValueError("its last line is not whole")
-            return [Event(**line) for line in lines]
+            with name.open("rb") as file:
+                for line in file:
+                    try:
+                        event = json_lines.from_line(line)
+                        if not line.endswith(b"\n"):
+                            raise ValueError("its last line is not whole")
+                    except ValueError:
+                        if self.finished:
+                            raise
+                        return
+                    yield Event(**event)
         except (OSError, ValueError, TypeError) as error:
             raise InputError(f"{str(name)!r} cannot be read: {error}") from None
 

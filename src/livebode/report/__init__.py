@@ -4,6 +4,7 @@ Importing this costs nothing: Matplotlib and plotext are loaded when the first p
 """
 
 from livebode.report.bode import bode_figure
+from livebode.report.excitation import excitation_figure, save_excitation_picture
 from livebode.report.loop import loop_figure, save_loop_picture
 from livebode.report.pictures import save_pictures
 from livebode.report.terminal import terminal_bode
@@ -12,7 +13,9 @@ from livebode.report.validation import save_validation_picture, validation_figur
 
 __all__ = [
     "bode_figure",
+    "excitation_figure",
     "loop_figure",
+    "save_excitation_picture",
     "save_loop_picture",
     "save_pictures",
     "save_validation_picture",

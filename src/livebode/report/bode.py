@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Model, Responses
+from livebode.nouns import Model, Response, Responses
 from livebode.report import ticks, words
 from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.report.summary import PROBABILITY, Summary, decibels, summarised
+from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, decibels, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,7 @@ def bode_figure(
     title: str = "",
     names: tuple[str, str] | None = None,
     fitted: Model | None = None,
+    mean: Response | None = None,
     dark: bool = False,
 ) -> Figure:
     """Magnitude (dB), unwrapped phase (degrees) and, where known, coherence over logarithmic frequency.
@@ -48,23 +49,25 @@ def bode_figure(
     names
         Names of the input and the output channel.
     fitted
-        The newest fit, drawn from the first to the last line.
+        The newest fit, or that of the mean, drawn from the first to the last line.
+    mean
+        The mean of the run, drawn with its 95 % bound in place of the median and of the newest response.
     dark
         Light on dark.
     """
     look = style(dark)
-    summary = summarised(responses)
+    summary = summarised(responses, mean)
     with drawing(look):
         coherent = bool(np.isfinite(summary.coherence).any())
         figure = new_figure(9.0, 7.6 if coherent else 6.6)
         heading(figure, look, title or "Bode plot", words.facts(responses, summary.count, names), _LEFT)
         magnitude, phase, *rest = _panels(figure, coherent)
-        _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary))
-        _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary))
+        _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary), mean is None)
+        _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary), mean is None)
         magnitude.set_ylabel(words.magnitude_label(responses, 46))
         phase.set_ylabel("phase in degrees")
         if rest:
-            _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary))
+            _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary), mean is None)
             rest[0].set_ylabel("coherence γ²")
         curve = _curve(summary, fitted) if fitted is not None and summary.count else None
         _scales(look, summary, curve, magnitude, phase, *rest)
@@ -79,7 +82,7 @@ def bode_figure(
                 }
                 magnitude.plot(curve[0], curve[1], **line)
                 phase.plot(curve[0], curve[2], **line)
-            _legend(figure, look, summary, fitted is not None)
+            _legend(figure, look, summary, fitted is not None, mean is not None)
     return figure
 
 
@@ -131,13 +134,16 @@ def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
     return np.where(np.isfinite(summary.newest_value), summary.newest.coherence, np.nan), nothing, nothing
 
 
-def _draw(axes: Axes, look: Style, summary: Summary, run: Floats, value: Floats, low: Floats, high: Floats) -> None:
+def _draw(
+    axes: Axes, look: Style, summary: Summary, run: Floats, value: Floats, low: Floats, high: Floats, median: bool
+) -> None:
     """One panel: span, median, newest; `run` is (3, lines), the rest (lines,)."""
     f = summary.responses.lines.frequency_hz
     few = len(f) <= FEW_LINES
     run_marker: dict[str, Any] = {"marker": "o", "markersize": 4.5} if few else {}
     if summary.count > 1:
         _band(axes, f, run[0], run[2], look.run, 0.2, gid="span")
+    if summary.count > 1 and median:
         axes.plot(f, run[1], color=look.run, linewidth=1.6, zorder=3, gid="median", **run_marker)
     if few:
         known = np.isfinite(low)
@@ -222,7 +228,7 @@ def _limits(
     return low - margin, high + margin
 
 
-def _legend(figure: Figure, look: Style, summary: Summary, fit: bool) -> None:
+def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -237,14 +243,16 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool) -> None:
     mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
     handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
     texts = [f"median of {words.counted(summary.count, 'valid response')}", "5–95 % of them"][: len(handles) - 1]
+    if mean:
+        handles, texts = handles[len(texts) // 2 :], ["5–95 % of the responses"] * (len(texts) // 2)
     at_s = summary.newest.time_s
     newest = f"newest, at {at_s:.1f} s" if abs(at_s) >= 1e5 else f"newest, at {at_s:.6g} s"
     if np.isfinite(summary.newest_bound).any():
         newest += f", bound: {100 * PROBABILITY:.1f} % (3σ)"
-    texts.append(newest)
+    texts.append(f"average, bound: {100 * MEAN_PROBABILITY:g} %" if mean else newest)
     if fit:
         handles.append(Line2D([], [], color=look.ink, linewidth=1.0, dashes=(4, 2)))
-        texts.append("newest fit")
+        texts.append("its fit" if mean else "newest fit")
     figure.legend(
         handles,
         texts,

@@ -47,7 +47,7 @@ def save_loop_picture(found: Loop, directory: str | PathLike[str], *, title: str
     return save(loop_figure(found, title=title, dark=dark), Path(directory) / "margins.png", style(dark))
 
 
-def loop_figure(found: Loop, *, title: str = "", dark: bool = False) -> Figure:
+def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
     """|L| and its phase over frequency beside the Nyquist plot, as the fit has them with a 95 % band.
 
     Dots are the measured lines, F·G, with 95 % bounds. Open diamonds mark where |L| = 1, squares where L is negative,
@@ -57,19 +57,21 @@ def loop_figure(found: Loop, *, title: str = "", dark: bool = False) -> Figure:
     f = np.geomspace(found.fit.band_hz[0] / 4, found.loop.rate_hz / 2, _POINTS)
     value, low, high = _curves(found, f)
     with drawing(look):
-        figure = new_figure(12.0, 6.4)
+        figure = new_figure(width_in, 6.4 * (0.5 + width_in / 24))
         height = figure.get_size_inches()[1]
         grid = figure.add_gridspec(
-            2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.065, right=0.985, top=1 - 1.15 / height,
-            bottom=0.55 / height, hspace=0.09, wspace=0.17,
+            2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985,
+            top=1 - 1.15 / height, bottom=0.55 / height, hspace=0.09, wspace=0.17,
         )  # fmt: skip
-        heading(figure, look, title or "Loop", _facts(found), 0.065)
+        heading(figure, look, title or "Loop", _facts(found), 0.78 / width_in)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         nyquist = figure.add_subplot(grid[:, 1])
         _bode(magnitude, phase, look, found, f, (value, low, high))
+        for axes in (magnitude, phase):
+            axes.yaxis.set_label_coords(-0.98 / width_in, 0.5)
         _nyquist(nyquist, look, found, f, value)
-        _legend(figure, look)
+        _legend(figure, look, 0.78 / width_in)
     return figure
 
 
@@ -101,7 +103,6 @@ def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, cur
         axes.plot(f, middle, color=look.run, linewidth=1.0, dashes=(4, 2), zorder=3)
         axes.plot(f[inside], middle[inside], color=look.run, linewidth=1.6, zorder=3)
         plain(axes)
-        axes.yaxis.set_label_coords(-0.082, 0.5)
     at, measured, bound = _measured(found)
     size = np.abs(measured)
     error = np.clip(bound / size, 0, 0.999)
@@ -207,7 +208,7 @@ def _facts(found: Loop) -> str:
     return " · ".join(words) or str(found.margins.status[0])
 
 
-def _legend(figure: Figure, look: Style) -> None:
+def _legend(figure: Figure, look: Style, left: float) -> None:
     from matplotlib.lines import Line2D
 
     mark: dict[str, Any] = {"linestyle": "", "markerfacecolor": "none", "markeredgecolor": look.ink, "markersize": 7}
@@ -220,6 +221,6 @@ def _legend(figure: Figure, look: Style) -> None:
     ]
     texts = ["L by the fit, 95 % band", "beyond the lines", "measured lines, 95 %", "|L| = 1", "L negative"]
     figure.legend(
-        handles, texts, loc="upper left", bbox_to_anchor=(0.065, 1 - 0.76 / figure.get_size_inches()[1]), ncols=5,
+        handles, texts, loc="upper left", bbox_to_anchor=(left, 1 - 0.76 / figure.get_size_inches()[1]), ncols=5,
         borderpad=0.0, borderaxespad=0.0, handlelength=1.8, columnspacing=1.8,
     )  # fmt: skip

@@ -101,6 +101,7 @@ def drawing(look: Style) -> Iterator[None]:
         "legend.labelcolor": look.ink,
         "path.simplify": True,
         "text.color": look.ink,
+        "text.parse_math": False,
         "text.usetex": False,
         "xtick.color": look.muted,
         "xtick.labelcolor": look.ink,

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 # The probability of ±3 standard deviations of a normal number, given to the circle around a complex response.
 PROBABILITY = 0.9973
 BOUND_C = sqrt(-log(1 - PROBABILITY))
+MEAN_PROBABILITY = 0.95
+MEAN_C = sqrt(-log(1 - MEAN_PROBABILITY))
 SPAN = (0.05, 0.95)
 # The middle of an unwrapped phase curve lies between −225° and 135°: the cut is as far as can be from the angles at
 # which machines dwell (multiples of 90°, a little late), so that noise does not turn a curve by a whole turn.
@@ -46,14 +48,20 @@ class Summary:
     newest_phase_deg: Floats
 
 
-def summarised(responses: Responses) -> Summary:
-    """Middle, span and newest of a run; never raises, whatever is missing."""
+def summarised(responses: Responses, mean: Response | None = None) -> Summary:
+    """Middle, span and newest of a run; never raises, whatever is missing.
+
+    With a `mean` of the run that stands in place of the newest, with the bound that holds with 95 %.
+    """
     use = usable(responses)
     value = np.where(use, responses.value, np.nan)
     rows = np.flatnonzero(use.any(axis=1))
     newest = responses[int(rows[-1])] if rows.size else None
     newest_value = value[rows[-1]] if rows.size else np.full(len(responses.lines), complex(np.nan))
     bound = responses[int(rows[-1])].bound(BOUND_C) if rows.size else np.full(len(responses.lines), np.nan)
+    if mean is not None:
+        newest, bound = mean, mean.bound(MEAN_C)
+        newest_value = np.where(mean.valid & np.isfinite(mean.value) & (mean.value != 0), mean.value, np.nan)
     magnitude_db = quantiles(decibels(value))
     middle_deg, deviation_deg = _circular(value)
     weak = np.isfinite(bound) & (bound > np.abs(newest_value))

@@ -25,7 +25,9 @@ TRACES_MAX = 10
 _HOLE_STEPS = 2.5
 
 
-def tracking_figure(responses: Responses, *, title: str = "", schedule_name: str = "", dark: bool = False) -> Figure:
+def tracking_figure(
+    responses: Responses, *, title: str = "", schedule_name: str = "", dark: bool = False, width_in: float | None = None
+) -> Figure:
     """Magnitude of every line in dB against time and, where the run has one that varies, the scheduling signal.
 
     Up to ten lines are traces with the bound that holds the truth with a probability of 99.7 % as a light band, each
@@ -43,6 +45,8 @@ def tracking_figure(responses: Responses, *, title: str = "", schedule_name: str
         Name of the scheduling signal with its unit, for the axis.
     dark
         Light on dark.
+    width_in
+        Of the picture; 9.5 inches, or 12 with a schedule, unless said.
     """
     look = style(dark)
     use = usable(responses)
@@ -50,7 +54,7 @@ def tracking_figure(responses: Responses, *, title: str = "", schedule_name: str
     name = shortened(schedule_name, 60) or "scheduling signal"
     mapped = len(responses.lines) > TRACES_MAX
     with drawing(look):
-        figure = new_figure(12.0 if schedule else 9.5, 7.0 if mapped else 5.6)
+        figure = new_figure(width_in or (12.0 if schedule else 9.5), 7.0 if mapped else 5.6)
         left = 0.78 / figure.get_size_inches()[0]
         said = words.facts(responses, int(use.any(axis=1).sum())) + (
             " · grey: nothing valid there" if mapped and use.any() else ""
@@ -93,7 +97,7 @@ def _traces(
         right=1 - 0.75 / width_in,
         top=1 - 1.1 / height_in,
         bottom=0.55 / height_in,
-        wspace=0.04,
+        wspace=0.06,
     )
     values = np.where(use, responses.value, np.nan)
     bounds = bounds_db(values, np.where(use, responses.bound(BOUND_C), np.nan))

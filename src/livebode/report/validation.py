@@ -15,6 +15,7 @@ from livebode.report.style import Style, drawing, heading, new_figure, plain, sh
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpec
 
     from livebode.validation import Correlation, Validation
 
@@ -29,29 +30,41 @@ def save_validation_picture(
     return save(validation_figure(found, title=title, dark=dark), Path(directory) / "validation.png", style(dark))
 
 
-def validation_figure(found: Sequence[Validation], *, title: str = "", dark: bool = False) -> Figure:
+def validation_figure(
+    found: Sequence[Validation], *, title: str = "", dark: bool = False, folded: bool = False
+) -> Figure:
     """A row for each model: the last samples of the output, and the correlations over the lags.
+
+    `folded` puts the correlations below the output, for a page that is not as wide.
 
     The band holds 97 % of what chance makes at a lag, the dashed lines are 2.17/√L. Lags that cannot tell a wrong
     model are thin; a triangle at the edge stands for a correlation that goes on beyond it.
     """
     look = style(dark)
-    columns = 1 + max(len(v.correlations) for v in found)
+    columns = max(len(v.correlations) for v in found)
     with drawing(look):
-        figure = new_figure(3.4 * columns + 1.2, 1.3 + 2.5 * len(found))
-        height = figure.get_size_inches()[1]
-        grid = figure.add_gridspec(
-            len(found), columns, width_ratios=[1.5, *[1.0] * (columns - 1)], left=0.7 / figure.get_size_inches()[0],
-            right=0.985, top=1 - 1.2 / height, bottom=0.55 / height, hspace=0.45, wspace=0.36,
-        )  # fmt: skip
+        if folded:
+            figure, grid = _grid(9.0, 2 * len(found), columns, [1.0] * columns)
+        else:
+            figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(found), columns + 1, [1.5, *[1.0] * columns])
         facts = f"{found[0].samples} samples · band: 97 % of chance at each lag · dashed: 2.17/√L"
         heading(figure, look, title or "Validation", facts, 0.7 / figure.get_size_inches()[0])
         for row, one in enumerate(found):
-            last = row == len(found) - 1
-            _output(figure.add_subplot(grid[row, 0]), look, one, last)
-            for column, c in enumerate(one.correlations, 1):
-                _correlation(figure.add_subplot(grid[row, column]), look, c, c.name in one.judged_by, last)
+            last, below = row == len(found) - 1, 2 * row + 1 if folded else row
+            _output(figure.add_subplot(grid[2 * row, :] if folded else grid[row, 0]), look, one, last or folded)
+            for column, c in enumerate(one.correlations, 0 if folded else 1):
+                _correlation(figure.add_subplot(grid[below, column]), look, c, c.name in one.judged_by, last)
     return figure
+
+
+def _grid(width_in: float, rows: int, columns: int, ratios: list[float]) -> tuple[Figure, GridSpec]:
+    figure = new_figure(width_in, 1.3 + 2.5 * rows)
+    height = figure.get_size_inches()[1]
+    grid = figure.add_gridspec(
+        rows, columns, width_ratios=ratios, left=0.7 / width_in, right=0.985, top=1 - 1.2 / height,
+        bottom=0.55 / height, hspace=0.45, wspace=0.36,
+    )  # fmt: skip
+    return figure, grid
 
 
 def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
-from livebode.nouns import Event, Loop, Parameters, Response, Responses
+from livebode.nouns import Event, Loop, Parameters, Responses
 from livebode.records import Run
+from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import FitSection
 from livebode.session.live_margins import live_margins
 
@@ -18,7 +19,6 @@ _ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "t
 _REMEMBERED = 256  # ε of the newest fits, for what is usual
 _UNUSUAL = 3.0
 _EPSILON_MIN = 0.003  # of |G|: what no fit is reproached with
-_STILL = 0.01  # of the schedule's largest value: a machine that stays where it is
 _POSITIONS = ("rad", "m", "deg", "mm")
 
 
@@ -132,23 +132,18 @@ def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
     Of a run that averages, the newest valid response; of another the mean of all. Where neither configuration nor unit
     say whether the output is a velocity or a position, the one that lacks less of the response is taken.
     """
-    run = Run.open(directory)
-    responses = run.responses()
-    valid = np.flatnonzero(responses.valid.any(axis=1))
-    chosen: Response | Responses = responses
-    words = f"the mean of {valid.size} responses"
-    if valid.size and run.summary.get("configuration", {}).get("tracking", {}).get("average"):
-        chosen = responses[int(valid[-1])]
-        words = f"the average up to {chosen.time_s:.6g} s"
-    at = responses.schedule[valid][np.isfinite(responses.schedule[valid])]
-    if at.size and np.ptp(at) > _STILL * np.max(np.abs(at)):
-        words += f" from {at.min():.4g} to {at.max():.4g} of the schedule, whose change is in the bounds"
-    if not responses.unit:
+    return fit_averaged(averaged(Run.open(directory)), section)
+
+
+def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
+    """The same of what a run averages to."""
+    one, words = of.response, of.words
+    if not one.unit:
         words += "; the run names no units: taken as N m, and rad/s or rad"
     sections = [section]
-    if section.output == "auto" and not responses.unit:
+    if section.output == "auto" and not one.unit:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
-    found = [fit(chosen, chosen_model(s, responses.unit), **_settings(s)) for s in sections]
+    found = [fit(one, chosen_model(s, one.unit), **_settings(s)) for s in sections]
     return min(found, key=lambda f: f.epsilon if f.status == "ok" else np.inf), words
 
 

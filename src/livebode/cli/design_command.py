@@ -1,0 +1,77 @@
+"""`livebode design`: an excitation for a machine, within its limits, and the configuration to track it with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from livebode.cli.options import Json
+from livebode.nouns import InputError
+from livebode.records import to_json
+
+if TYPE_CHECKING:
+    from livebode.design import Design
+
+
+def design_command(
+    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT.toml", help="The machine, its limits, the wish.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory for the excitation and axis.toml.")] = Path(
+        "design"
+    ),
+    to: Annotated[list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h; all unless said.")] = None,
+    name: Annotated[str, typer.Option(help="Of the excitation, in the files and theirs.")] = "excitation",
+    band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Hz, over the file's.")] = None,
+    resolution: Annotated[float | None, typer.Option(metavar="HZ", help="Distance of the lines.")] = None,
+    amplitude: Annotated[float | None, typer.Option(metavar="NM", help="Of each line; chosen unless said.")] = None,
+    accuracy: Annotated[float | None, typer.Option(help="Wanted 95 % bound as a share of |G|.")] = None,
+    seed: Annotated[int | None, typer.Option(help="The same seed, the same excitation.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what an earlier design left.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Choose lines, window, amplitude and hop for a machine, say why, and write the excitation and axis.toml."""
+    from livebode.session.designing import design_experiment  # with the simulation
+    from livebode.session.experiment import Experiment
+
+    over: dict[str, Any] = {
+        "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,
+        "band_hz": None if band is None else _band(band),
+    }  # fmt: skip
+    asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})
+    made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw)
+    if as_json:
+        print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
+        return
+    _show(made.design)
+    print(f"{made.directory}/: {', '.join(made.files)}")
+
+
+def _band(text: str) -> list[float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--band {text!r} cannot be read; write two frequencies in Hz as 20:140") from None
+    return [low, high]
+
+
+def _draw(design: Design, path: Path) -> None:
+    from livebode.report import save_excitation_picture
+
+    save_excitation_picture(design, path)
+
+
+def _show(design: Design) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False)
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("chosen")
+    table.add_column("value")
+    table.add_column("why", overflow="fold")
+    for choice in design.choices:
+        table.add_row(choice.what, choice.value, choice.why)
+    console.print(table)
+    for note in design.machine.notes:
+        console.print(f"note: {note}", soft_wrap=True)

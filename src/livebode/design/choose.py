@@ -1,0 +1,163 @@
+"""From a wish, a machine and its limits to an experiment, with the reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, inf
+from typing import Any
+
+import numpy as np
+
+from livebode.design.accuracy import Accuracy, accuracy_of
+from livebode.design.explain import Choice, explained
+from livebode.design.grid import grid
+from livebode.design.limits import Bearable, check, room
+from livebode.design.machine import UNITS, Machine
+from livebode.design.make import unit_waveform
+from livebode.design.peaks import Peak, peaks, worst
+from livebode.design.waveform import Waveform
+from livebode.design.wish import Wish
+from livebode.estimation.settings import default_hop
+from livebode.nouns import InputError
+
+# Of the room that the limits leave: what the prediction may err by.
+_RESERVE = 0.1
+_WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
+# From rest the position drifts further than in the periodic state; brought in so slowly, by 3 % (studies/design.py).
+_RAMP_S = 0.5
+_STROKES_MIN = 2  # there and back
+_WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """An experiment: the excitation, what it does, and what it will tell.
+
+    Attributes
+    ----------
+    waveform
+        The excitation as it is to be played.
+    amplitude_n_m
+        Of each line, chirp, step or bit; of shaped or listed lines their rms.
+    limits, peaks
+        What is borne, and what is predicted at each place.
+    accuracy, windows
+        What one window tells, and how many bring every line's 95 % bound within `wish.accuracy`.
+    recording_s
+        How long to record for that.
+    hop
+        Samples between responses.
+    ramp_s
+        In how long to bring the excitation in, whole periods: the peaks are those of the periodic state.
+    choices
+        All of it as rows of a table.
+    """
+
+    wish: Wish
+    machine: Machine
+    waveform: Waveform
+    amplitude_n_m: float
+    limits: Bearable
+    peaks: tuple[Peak, ...]
+    accuracy: Accuracy
+    windows: int
+    recording_s: float
+    hop: int
+    ramp_s: float
+    choices: tuple[Choice, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        lines = self.waveform.lines
+        low_high = {name: {"low": p.low, "high": p.high, "unit": UNITS[name], "place": p.place}
+                    for name, p in worst(self.peaks).items()}  # fmt: skip
+        return {
+            "excitation": dict(self.waveform.about),
+            "rate_hz": lines.rate_hz,
+            "window": lines.window,
+            "frequency_hz": lines.frequency_hz.tolist(),
+            "amplitude_n_m": self.waveform.amplitude.tolist(),
+            "peak_n_m": self.waveform.peak,
+            "rms_n_m": self.waveform.rms,
+            "crest_factor": self.waveform.crest_factor,
+            "predicted": low_high,
+            "sigma": self.accuracy.sigma.tolist(),
+            "sigma_relative": self.accuracy.relative.tolist(),
+            "windows": self.windows,
+            "recording_s": self.recording_s,
+            "hop": self.hop,
+            "ramp_s": self.ramp_s,
+            "choices": [vars(choice) for choice in self.choices],
+            "notes": list(self.machine.notes),
+        }
+
+
+def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Design:
+    """The experiment for a wish: lines and window by the resolution, amplitude by accuracy and limits, then the rest.
+
+    Raises
+    ------
+    InputError
+        If a limit would be broken (with the largest amplitude that passes), the grid has no such lines, a crest factor
+        is not reached, or nothing is left of the excitation in the drive's steps.
+    """
+    limits = limits or Bearable()
+    found = grid(wish, machine.rate_hz)
+    unit = unit_waveform(wish, found, machine)
+    listed = wish.amplitude_n_m is not None and np.ndim(wish.amplitude_n_m) == 1
+    per_unit = float(np.sqrt(np.mean(np.square(np.asarray(wish.amplitude_n_m, dtype=float))))) if listed else 1.0
+    factor, why = _factor(wish, unit, machine, limits)
+    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": factor * per_unit})
+    if wish.resolution_n_m is not None:
+        waveform = waveform.quantised(wish.resolution_n_m)
+    predicted = peaks(waveform, machine)
+    check(predicted, limits, factor * per_unit)
+    accuracy = accuracy_of(waveform, machine)
+    windows = accuracy.windows(wish.accuracy)
+    recording_s, recording_why = _recording(waveform, machine, windows)
+    design = Design(
+        wish=wish,
+        machine=machine,
+        waveform=waveform,
+        amplitude_n_m=factor * per_unit,
+        limits=limits,
+        peaks=predicted,
+        accuracy=accuracy,
+        windows=windows,
+        recording_s=recording_s,
+        hop=default_hop(waveform.lines.window),
+        ramp_s=ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz,
+        choices=(),
+    )
+    return replace(design, choices=explained(design, found, why, recording_why))
+
+
+def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> tuple[float, str]:
+    """What the unit waveform is to be multiplied by, and why."""
+    if wish.amplitude_n_m is not None:
+        return (1.0 if np.ndim(wish.amplitude_n_m) else float(np.asarray(wish.amplitude_n_m))), "as given"
+    predicted = peaks(unit, machine)
+    largest, first = room(predicted, limits)
+    if first is not None and largest <= 0:
+        check(predicted, limits, 1.0)
+    needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
+    allowed = largest * (1 - _RESERVE)
+    if needed == 0:
+        if largest == inf:
+            raise InputError("neither noise nor limits are known, so no amplitude can be chosen; give one of the three")
+        return largest * _WITHOUT_NOISE, "a tenth of what the limits leave; nothing says how much noise there is"
+    if needed <= allowed:
+        return needed, f"the least for {100 * wish.accuracy:g} % at every line in one window"
+    assert first is not None
+    return allowed, f"the most that the {first.quantity} bears, less {100 * _RESERVE:g} %"
+
+
+def _recording(waveform: Waveform, machine: Machine, windows: int) -> tuple[float, str]:
+    """How long, and why."""
+    if machine.stroke_s is not None:
+        strokes = max(windows, _STROKES_MIN)
+        return strokes * machine.stroke_s, f"{strokes} strokes: each passes every place once"
+    many = max(windows, _WINDOWS_MIN)
+    why = "averaged" if windows > _WINDOWS_MIN else "to learn sigma from"
+    seconds = (many + 1) * waveform.lines.window / waveform.lines.rate_hz
+    return seconds, f"{many} windows, {why}, and one before the first is whole"

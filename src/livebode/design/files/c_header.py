@@ -1,0 +1,57 @@
+"""A C99 header: the period as a constant table, with the lines for the kernel beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from livebode.design.files.c_names import identifier
+from livebode.design.files.facts import facts
+from livebode.design.waveform import Waveform
+
+_PER_ROW = 4
+
+
+def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
+    """``name[NAME_SAMPLES]`` in N m and ``name_bins[NAME_LINES]``; values in hexadecimal, so exactly the doubles.
+
+    The table's type is double, or what NAME_TYPE is defined to before the header is included (float, for a drive
+    without double precision: the compiler rounds once).
+    """
+    word = identifier(name)
+    big = word.upper()
+    lines = waveform.lines
+    # A comment ends where the facts hold its end.
+    said = "\n".join(f" * {key}: {json.dumps(value)}".replace("*/", "* /") for key, value in facts(waveform).items())
+    values = [float(value).hex() for value in waveform.samples]
+    text = f"""/* One period of an excitation, N m.
+{said}
+ */
+#ifndef {big}_H
+#define {big}_H
+
+#ifndef {big}_TYPE
+#define {big}_TYPE double
+#endif
+
+#define {big}_SAMPLES {lines.window}
+#define {big}_LINES {len(lines)}
+#define {big}_RATE_HZ {lines.rate_hz!r}
+#define {big}_PEAK_N_M {waveform.peak.hex()}
+
+static const {big}_TYPE {word}[{big}_SAMPLES] = {{
+{_rows(values)}
+}};
+
+static const unsigned {word}_bins[{big}_LINES] = {{
+{_rows([f"{k}u" for k in lines.bins])}
+}};
+
+#endif
+"""
+    path.write_text(text, encoding="ascii")
+
+
+def _rows(values: list[str]) -> str:
+    rows = (values[i : i + _PER_ROW] for i in range(0, len(values), _PER_ROW))
+    return ",\n".join("    " + ", ".join(row) for row in rows)

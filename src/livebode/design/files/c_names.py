@@ -1,0 +1,58 @@
+"""Names that C and MATLAB take."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from livebode.nouns import InputError
+
+LETTERS_MAX = {"C": 63, "MATLAB": 31}  # that C99 tells apart; that a MATLAB v5 file holds of a struct's name
+_C = """
+auto break case char const continue default do double else enum extern float for goto if inline int long register
+restrict return short signed sizeof static struct switch typedef union unsigned void volatile while alignas alignof
+bool constexpr false nullptr static_assert thread_local true typeof typeof_unqual asm fortran main
+and and_eq bitand bitor catch class compl const_cast delete dynamic_cast explicit export friend mutable namespace new
+not not_eq operator or or_eq private protected public reinterpret_cast static_cast template this throw try typeid
+typename using virtual wchar_t xor xor_eq
+"""
+_MATLAB = """
+break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd
+switch try while
+"""
+KEYWORDS = {"C": frozenset(_C.split()), "MATLAB": frozenset(_MATLAB.split())}
+
+
+def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
+    """The name, if the language takes it as that of a variable; for C that of a header which C++ may include, too.
+
+    Raises
+    ------
+    InputError
+        If it does not; the sentence has the nearest one that it takes.
+
+    >>> identifier("w_1")
+    'w_1'
+    >>> identifier("double")
+    Traceback (most recent call last):
+    ...
+    livebode.nouns.errors.InputError: the name 'double' is a keyword of C; take for example 'double_w'
+    """
+    most = LETTERS_MAX[language]
+    if name in KEYWORDS[language]:
+        raise InputError(f"the name {name!r} is a keyword of {language}; take for example {f'{name}_w'!r}")
+    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
+        return name
+    raise InputError(
+        f"the name {name!r} is none in {language} (letters, digits and single underscores, a letter first, at most "
+        f"{most}); take for example {_nearest(name, most, KEYWORDS[language])!r}"
+    )
+
+
+def _nearest(name: str, most: int, keywords: frozenset[str]) -> str:
+    plain = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9_]", "_", name)).strip("_")[: most - 2].rstrip("_")
+    if not plain:
+        return "excitation"
+    if not plain[0].isalpha():
+        plain = f"w_{plain}"
+    return plain if plain not in keywords else f"{plain}_w"

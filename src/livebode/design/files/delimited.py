@@ -1,0 +1,23 @@
+"""CSV: one row for each sample, below comments that say what it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from livebode.design.files.facts import facts
+from livebode.design.waveform import Waveform
+from livebode.nouns import InputError
+
+
+def write_csv(path: Path, waveform: Waveform, name: str) -> None:
+    """Columns ``time [s]`` and the name with its unit; every number is the shortest decimal with the same double.
+
+    ``open_log`` reads it back as a recording.
+    """
+    if not name.isprintable() or not name.strip() or set(name) & set(',;"\t[]#%'):
+        raise InputError(f"{name=} cannot head a column of a CSV file; choose letters, digits and underscores")
+    head = [f"# {key}: {json.dumps(value)}" for key, value in facts(waveform).items()]
+    rate_hz = waveform.lines.rate_hz
+    rows = (f"{n / rate_hz!r},{value!r}" for n, value in enumerate(waveform.samples.tolist()))
+    path.write_text("\n".join([*head, f"time [s],{name} [N m]", *rows]) + "\n", encoding="utf-8")

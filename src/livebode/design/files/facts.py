@@ -1,0 +1,25 @@
+"""What every file says of its excitation, so that it can be made again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from livebode.design.waveform import Waveform
+
+
+def facts(waveform: Waveform) -> dict[str, Any]:
+    """Plain data: who made it, rate, window, lines in bins, peak, and what it came from with its seed."""
+    from importlib.metadata import version
+
+    lines = waveform.lines
+    return {
+        "made_by": f"livebode {version('livebode')} design",
+        **waveform.about,
+        "rate_hz": lines.rate_hz,
+        "window": lines.window,
+        "bins": list(lines.bins),
+        "unit": "N m",
+        "peak": waveform.peak,
+        "rms": waveform.rms,
+        "crest_factor": waveform.crest_factor,
+    }

@@ -1,0 +1,37 @@
+"""The formats by suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from os import PathLike
+from pathlib import Path
+
+from livebode.design.files.arrays import write_mat, write_npz
+from livebode.design.files.c_header import write_c_header
+from livebode.design.files.delimited import write_csv
+from livebode.design.files.structured_text import write_st
+from livebode.design.waveform import Waveform
+from livebode.nouns import InputError
+
+FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
+    ".csv": write_csv,
+    ".npz": write_npz,
+    ".mat": write_mat,
+    ".h": write_c_header,
+    ".st": write_st,
+}
+"""What writes an excitation under a name, by the suffix of the file. A further format is a function and a row here."""
+
+
+def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation") -> None:
+    """Write one period in the format of the suffix.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not known, or the format forbids the name.
+    """
+    place = Path(path)
+    if place.suffix not in FORMATS:
+        raise InputError(f"{place.name!r} has no suffix that is known; choose {', '.join(FORMATS)}")
+    FORMATS[place.suffix](place, waveform, name)

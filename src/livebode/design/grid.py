@@ -1,0 +1,152 @@
+"""Which lines, on which grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor, gcd, lcm
+
+import numpy as np
+
+from livebode.design.wish import Wish
+from livebode.excitation import check_band, chirp_lines, odd_lines, stepped_lines
+from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
+from livebode.nouns import GridError, Lines
+from livebode.nouns.lines import WINDOW_MAX, check_window
+
+_QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
+_BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
+_WORTH_FACTORS = 1000  # a window named by lines typed with many digits is no one's wish beyond this many times the rate
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Lines with their window, why they are these, and for a PRBS how it is made."""
+
+    lines: Lines
+    window_why: str
+    lines_why: str
+    order: int = 0
+    held_ticks: int = 1
+    base: Lines | None = None  # of a stepped sine: the grid of one step
+
+
+def grid(wish: Wish, rate_hz: float) -> Grid:
+    """The lines and the window that a wish asks for.
+
+    Raises
+    ------
+    GridError
+        If the band is not below the Nyquist frequency, the lines are closer than any window resolves, or given lines
+        are off the grid of a given window; the sentence has the nearest choice.
+    """
+    if wish.lines is not None:
+        return _stepped(wish, _of_text(wish, wish.lines, rate_hz))
+    assert wish.band_hz is not None
+    low, high = wish.band_hz
+    check_band(low, high, rate_hz)
+    if wish.kind == "prbs":
+        return _prbs(wish, low, high, rate_hz)
+    if wish.window is not None:
+        check_window(wish.window, rate_hz)
+    apart = 1 if wish.kind in ("chirp", "stepped") else _QUIET_BETWEEN
+    window = wish.window or _window(wish.resolution_hz or 0.0, apart, rate_hz)
+    why = f"{apart} × {rate_hz:g} Hz / {wish.resolution_hz:g} Hz" if wish.window is None else "as given"
+    if wish.kind == "odd":
+        found = odd_lines(low, high, rate_hz, window, seed=wish.seed)
+        return Grid(found, why, "odd bins, one in four of them quiet at random: distortion shows there")
+    if wish.kind == "chirp":
+        return Grid(chirp_lines(low, high, rate_hz, window), why, "every bin of the band")
+    first, last = ceil(low * window / rate_hz / apart - 1e-9), floor(high * window / rate_hz / apart + 1e-9)
+    bins = [k * apart for k in range(max(first, 1), last + 1)]
+    if not bins:
+        step_hz = apart * rate_hz / window
+        near = [k * step_hz for k in (last, first) if 0 < 2 * k * apart < window]
+        raise GridError(
+            f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz; the nearest are "
+            f"{' and '.join(f'{f:g}' for f in near)} Hz; widen the band, or ask for a finer resolution"
+        )
+    words = (
+        "every second bin of the band; those between show the noise" if apart == _QUIET_BETWEEN else "the band's bins"
+    )
+    return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, words))
+
+
+def _stepped(wish: Wish, found: Grid) -> Grid:
+    if wish.kind != "stepped":
+        return found
+    whole = stepped_lines(found.lines, periods=wish.periods)
+    why = f"{len(found.lines)} steps of {wish.periods} periods of {found.lines.window} samples"
+    return Grid(whole, why, found.lines_why, base=found.lines)
+
+
+def _window(resolution_hz: float, apart: int, rate_hz: float) -> int:
+    window = round(apart * rate_hz / resolution_hz)
+    if window > WINDOW_MAX:
+        raise GridError(
+            f"lines {resolution_hz:g} Hz apart need a window of {apart * rate_hz / resolution_hz:.0f} samples, more "
+            f"than {WINDOW_MAX}; the finest at {rate_hz:g} Hz is {apart * rate_hz / WINDOW_MAX:.3g} Hz"
+        )
+    if window < 2 * apart + 1:
+        raise GridError(
+            f"lines {resolution_hz:g} Hz apart do not fit below the Nyquist frequency {rate_hz / 2:g} Hz; "
+            f"the coarsest is {apart * rate_hz / (2 * apart + 1):.4g} Hz"
+        )
+    return window
+
+
+def _of_text(wish: Wish, text: str, rate_hz: float) -> Grid:
+    if wish.window is not None:
+        return Grid(Lines.parse(text, rate_hz, wish.window), "as given", "as given")
+    if "k=" in text:
+        raise GridError(f"lines {text!r} count in bins, which need a window; give window")
+    wanted = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
+    return Grid(wanted, "the shortest on whose grid the lines are, two bins apart or more", "as given")
+
+
+def _smallest_window(text: str, rate_hz: float) -> int:
+    """The shortest window with all lines on its grid, none next to another."""
+    wanted = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
+    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in wanted)) if wanted else 1
+    if not wanted or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
+        # Lines.parse says what cannot be read, or which line is off this grid and what would be near.
+        return max(3, round(2 * rate_hz))
+    bins = sorted({int(f * unit / Fraction(rate_hz)) for f in wanted})
+    apart = min(np.diff(bins), default=_QUIET_BETWEEN)
+    return max(3, unit * (_QUIET_BETWEEN if apart < _QUIET_BETWEEN else 1))
+
+
+def _numbers(item: str) -> list[str]:
+    """Start and step of a range, or a lone frequency; nothing that is not a number."""
+    parts = [part.strip() for part in item.split(":")]
+    try:
+        [Fraction(part) for part in parts]
+    except (ValueError, ZeroDivisionError):
+        return []
+    return parts if len(parts) != 3 else [parts[0], parts[2]]
+
+
+def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
+    held = wish.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
+    order = wish.order
+    if order is None:
+        assert wish.resolution_hz is not None or wish.window is not None
+        bits = (wish.window or rate_hz / (wish.resolution_hz or 1.0)) / held
+        order = max(ORDER_MIN, ceil(np.log2(bits + 1) - 1e-9))
+        if order > ORDER_MAX:
+            finest = rate_hz / held / (2**ORDER_MAX - 1)
+            raise GridError(
+                f"lines {wish.resolution_hz or rate_hz / (wish.window or 1):g} Hz apart need a PRBS of order {order}; "
+                f"the highest is {ORDER_MAX}, with lines {finest:.3g} Hz apart"
+            )
+    window = (2**order - 1) * held
+    first, last = max(1, ceil(low * window / rate_hz - 1e-9)), floor(high * window / rate_hz + 1e-9)
+    bins = [k for k in range(first, last + 1) if 2 * k < window and k % (window // gcd(held, window)) != 0]
+    if not bins:
+        near = ceil(np.log2(rate_hz / held / max(high - low, 1e-9) + 1))
+        raise GridError(
+            f"a PRBS of order {order} with {held} ticks a bit has no line in {low:g} … {high:g} Hz; "
+            f"take order {min(max(near, order + 1), ORDER_MAX)}"
+        )
+    why = f"2^{order} − 1 bits of {held} tick{'s' * (held > 1)}"
+    return Grid(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)

@@ -1,0 +1,107 @@
+"""Limits come first: what the machine bears, and the largest excitation that keeps to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isnan
+
+from livebode.design.machine import UNITS, Quantity
+from livebode.design.peaks import Peak
+from livebode.nouns import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bearable:
+    """What motor, mechanics and drive bear; what is left out is not limited.
+
+    Parameters
+    ----------
+    torque_n_m_max, speed_m_per_s_max, following_error_m_max
+        Largest magnitudes.
+    position_m_min, position_m_max
+        Ends of the travel.
+
+    Raises
+    ------
+    InputError
+        If a limit is not above 0, or the travel has no room.
+    """
+
+    torque_n_m_max: float = inf
+    speed_m_per_s_max: float = inf
+    following_error_m_max: float = inf
+    position_m_min: float = -inf
+    position_m_max: float = inf
+
+    def __post_init__(self) -> None:
+        for name in ("torque_n_m_max", "speed_m_per_s_max", "following_error_m_max"):
+            if isnan(value := getattr(self, name)) or value <= 0:
+                raise InputError(f"{name}={value} is not above 0; leave it out for no limit")
+        if not self.position_m_min < self.position_m_max:
+            raise InputError(
+                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; swap them"
+            )
+
+    def of(self, quantity: Quantity) -> tuple[float, float]:
+        """Lowest and highest value that is borne."""
+        if quantity == "travel":
+            return self.position_m_min, self.position_m_max
+        most = {
+            "torque": self.torque_n_m_max,
+            "speed": self.speed_m_per_s_max,
+            "following error": self.following_error_m_max,
+        }[quantity]
+        return -most, most
+
+    @property
+    def none(self) -> bool:
+        """Whether nothing is limited."""
+        return self == Bearable()
+
+
+def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]:
+    """By what factor the excitation may grow until the first limit is met, and which peak meets it.
+
+    0 or less where the motion alone leaves no room; infinite, with None, where nothing is limited.
+    """
+    largest, first = inf, None
+    for peak in found:
+        low, high = limits.of(peak.quantity)
+        for own, excited, limit in ((peak.own[1], peak.excited[1], high), (-peak.own[0], -peak.excited[0], -low)):
+            if limit == inf:
+                continue
+            factor = (limit - own) / excited if excited > 0 else (inf if own <= limit else -inf)
+            if factor < largest:
+                largest, first = factor, peak
+    return largest, first
+
+
+def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float) -> None:
+    """InputError where a limit is broken; the sentence has the largest amplitude that would pass."""
+    factor, peak = room(found, limits)
+    if factor >= 1 or peak is None:
+        return
+    low, high = limits.of(peak.quantity)
+    unit = UNITS[peak.quantity]
+    value, limit = (peak.high, high) if peak.high - high > low - peak.low else (peak.low, low)
+    where = f" ({peak.place})" if peak.place else ""
+    if factor <= 0:
+        own = peak.own[1] if value == peak.high else peak.own[0]
+        raise InputError(
+            f"the motion alone has a {peak.quantity} of {own:.4g} {unit}{where} and leaves no room below the limit of "
+            f"{limit:.4g} {unit}; slow the motion, or correct the limit"
+        )
+    raise InputError(
+        f"an amplitude of {amplitude:.4g} N m brings the {peak.quantity} to {value:.4g} {unit}{where}, beyond the "
+        f"limit of {limit:.4g} {unit}; the largest amplitude that passes is {rounded_down(factor * amplitude)} N m"
+    )
+
+
+def rounded_down(value: float) -> str:
+    """Four digits that are not above the value.
+
+    >>> rounded_down(1.23456), rounded_down(0.0019996)
+    ('1.234', '0.001999')
+    """
+    text = f"{value:.4g}"
+    return text if float(text) <= value else f"{value * (1 - 5e-4):.4g}"

@@ -1,0 +1,97 @@
+"""Machine: what an excitation does to an axis in its loop, place by place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError, Loop, Model
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Quantity = Literal["torque", "speed", "travel", "following error"]
+QUANTITIES: tuple[Quantity, ...] = ("torque", "speed", "travel", "following error")
+UNITS: Mapping[Quantity, str] = {"torque": "N m", "speed": "m/s", "travel": "m", "following error": "m"}
+Extremes = Mapping[Quantity, tuple[float, float]]
+"""Lowest and highest value of each quantity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """The linear machine at one place of its way, sampled behind the hold of its drive.
+
+    Parameters
+    ----------
+    plant
+        From torque to the measured output.
+    speed, travel, angle
+        From torque to the belt's speed at the motor, m/s, the load's position, m, and the motor's position, m.
+    motion
+        What the motion alone does near this place; a quantity that is left out stays at 0.
+    name
+        In words.
+    """
+
+    plant: Model
+    speed: Model
+    travel: Model
+    angle: Model
+    motion: Extremes = field(default_factory=dict)
+    name: str = ""
+
+    def own(self, quantity: Quantity) -> tuple[float, float]:
+        """Lowest and highest value of a quantity without excitation."""
+        return self.motion.get(quantity, (0.0, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """An axis in its loop, as far as an experiment has to know it.
+
+    Parameters
+    ----------
+    places
+        One for an axis that stands, several along the way of one that moves.
+    loop
+        u = E·w − F·y.
+    rate_hz
+        Ticks of the drive per second.
+    noise
+        Standard deviation of white noise on the measured output, in its unit; 0 where it is not known.
+    stroke_s
+        Seconds in which the motion passes each place once; None for an axis that stands.
+    notes
+        What the prediction leaves out, in sentences.
+    """
+
+    places: tuple[Place, ...]
+    loop: Loop
+    rate_hz: float
+    noise: float = 0.0
+    stroke_s: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.places:
+            raise InputError("the machine has no place; describe it at one at least")
+        if not (np.isfinite(self.noise) and self.noise >= 0):
+            raise InputError(f"noise={self.noise} is not a finite number of at least 0; give its standard deviation")
+
+    def torque(self, place: Place, frequency_hz: Floats) -> Complex:
+        """U/W = E/(1 + G·F) at one place."""
+        feedback = self.loop.feedback_at(frequency_hz)
+        return self.loop.entry_at(frequency_hz) / (1 + place.plant.response(frequency_hz) * feedback)
+
+    def responses(self, place: Place, frequency_hz: Floats) -> dict[Quantity, Complex]:
+        """From the excitation to each quantity, per N m; frequencies above 0."""
+        torque = self.torque(place, frequency_hz)
+        return {
+            "torque": torque,
+            "speed": torque * place.speed.response(frequency_hz),
+            "travel": torque * place.travel.response(frequency_hz),
+            "following error": -torque * place.angle.response(frequency_hz),
+        }

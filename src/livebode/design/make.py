@@ -1,0 +1,68 @@
+"""A wish and its grid become a Waveform of amplitude one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.design.grid import Grid
+from livebode.design.machine import Machine
+from livebode.design.waveform import Waveform
+from livebode.design.wish import Wish
+from livebode.excitation import chirp, equal_snr, multisine, prbs, stepped_sine
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+
+_REACHED = 1e-9
+
+
+def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
+    """The excitation with an amplitude of 1 N m (of a list: with those), before limits and accuracy are looked at."""
+    lines = found.lines
+    about: dict[str, Any] = {"kind": wish.kind, "seed": wish.seed}
+    if wish.kind == "prbs":
+        about |= {"order": found.order, "held_ticks": found.held_ticks}
+        samples = prbs(found.order, held_ticks=found.held_ticks)
+    elif wish.kind == "chirp":
+        assert wish.band_hz is not None
+        about |= {"sweep": wish.sweep, "band_hz": list(wish.band_hz)}
+        samples = chirp(*wish.band_hz, lines.rate_hz, lines.window, sweep=wish.sweep)
+    else:
+        each = amplitudes(wish, found.base or lines, machine)
+        about |= {"shape": wish.shape if np.ndim(wish.amplitude_n_m or 0) == 0 else "as given"}
+        if found.base is not None:
+            about |= {"periods": wish.periods, "step_samples": found.base.window}
+            samples = stepped_sine(found.base, each, periods=wish.periods)
+        else:
+            phases = "random" if wish.kind == "odd" else wish.phases
+            about |= {"phases": phases}
+            samples = multisine(lines, each, phases, seed=wish.seed)
+    made = Waveform(lines, samples, about)
+    if wish.crest_factor_max is not None and made.crest_factor > wish.crest_factor_max * (1 + _REACHED):
+        raise InputError(
+            f"a crest factor of {wish.crest_factor_max:g} is not reached: the lowest found is "
+            f"{made.crest_factor:.4f}; ask for {made.crest_factor + 5e-4:.3f}, or take {_lower(wish)}"
+        )
+    return made
+
+
+def _lower(wish: Wish) -> str:
+    return "a PRBS" if wish.phases == "low crest" or wish.kind != "multisine" else "phases = 'low crest'"
+
+
+def amplitudes(wish: Wish, lines: Lines, machine: Machine) -> Floats:
+    """Of each line, shape (lines,): as listed, else of rms 1."""
+    if wish.amplitude_n_m is not None and np.ndim(wish.amplitude_n_m) == 1:
+        listed = np.asarray(wish.amplitude_n_m, dtype=np.float64)
+        if listed.shape != (len(lines),):
+            raise InputError(f"amplitude_n_m lists {listed.size} amplitudes for {len(lines)} lines; give one for each")
+        return listed
+    if wish.shape == "flat":
+        return np.ones(len(lines))
+    f = lines.frequency_hz
+    # A machine that moves is heard least where its response is smallest, relative to what is to be known.
+    heard = [np.abs(machine.torque(p, f) * p.plant.response(f)) for p in machine.places]
+    return equal_snr(np.min(heard, axis=0))

@@ -1,0 +1,133 @@
+"""The Machine of a plant that was measured, or that a model describes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.design.machine import Machine, Place, Quantity
+from livebode.nouns import GridError, InputError, Loop, Responses
+from livebode.nouns.controllers import integral
+from livebode.nouns.model import Algebra, Gain, Model, as_model
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Output = Literal["velocity", "position"]
+
+_EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse(Algebra):
+    """A measured response as a Model: exact at its lines, between them interpolated in log-magnitude and phase.
+
+    Beyond its first and last line nothing is known, and it says so.
+
+    >>> plant = MeasuredResponse(np.array([10.0, 40.0]), np.array([4.0 + 0j, 1.0 + 0j]))
+    >>> float(abs(plant.response(20.0)).round(6))
+    2.0
+    """
+
+    frequency_hz: Floats
+    value: Complex
+
+    @classmethod
+    def of(cls, responses: Responses) -> MeasuredResponse:
+        """Of one response, at the lines where it is valid; InputError where fewer than two are, or it is no plant's."""
+        if responses.quantity != "plant":
+            raise InputError(f"these are responses of the {responses.quantity}; give those of the plant")
+        valid = responses.valid[0] & np.isfinite(responses.value[0])
+        if np.sum(valid) < 2:
+            raise InputError(f"the response is valid at {np.sum(valid)} lines; at least two are needed")
+        return cls(responses.lines.frequency_hz[valid], responses.value[0, valid])
+
+    def response(self, frequency_hz: ArrayLike) -> Complex:
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        low, high = self.frequency_hz[0], self.frequency_hz[-1]
+        outside = (f < low * (1 - _EDGE)) | (f > high * (1 + _EDGE))
+        if np.any(outside):
+            raise GridError(
+                f"the response was measured from {low:g} to {high:g} Hz and is asked for at "
+                f"{float(f[outside].flat[0]):g} Hz; choose lines within, or measure further"
+            )
+        # Over ln f a straight stretch of the Bode plot is met exactly.
+        at, known = np.log(f), np.log(self.frequency_hz)
+        logarithm = np.log(np.abs(self.value)) + 1j * np.unwrap(np.angle(self.value))
+        return np.asarray(np.exp(np.interp(at, known, logarithm)), dtype=np.complex128)
+
+
+@dataclass(frozen=True)
+class _Integrated(Algebra):
+    """The trapezoidal integral of a sampled output."""
+
+    plant: Model
+    rate_hz: float
+
+    def response(self, frequency_hz: ArrayLike) -> Complex:
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        return np.asarray(self.plant.response(f) * integral(f, self.rate_hz, "trapezoidal"))
+
+
+@dataclass(frozen=True)
+class _Differentiated(Algebra):
+    plant: Model
+
+    def response(self, frequency_hz: ArrayLike) -> Complex:
+        f = np.asarray(frequency_hz, dtype=np.float64)
+        return np.asarray(self.plant.response(f) * (2j * np.pi * f))
+
+
+def measured_machine(
+    plant: object,
+    loop: Loop,
+    rate_hz: float,
+    *,
+    output: Output = "velocity",
+    radius_m: float = 1.0,
+    noise: float = 0.0,
+    motion: Mapping[Quantity, tuple[float, float]] | None = None,
+    stroke_s: float | None = None,
+) -> Machine:
+    """The Machine around a plant of which only the response is known, at one place.
+
+    Parameters
+    ----------
+    plant
+        From torque, N m, to the measured output: a Model (a `Fit`, a `MeasuredResponse`) or a python-control system.
+    loop
+        Its loop, with the feedback.
+    rate_hz
+        Ticks of the drive per second.
+    output
+        Whether the output is the motor's velocity, rad/s, or position, rad.
+    radius_m
+        Metres of way per radian; leave it out for a rotary axis, whose metres are then radians.
+    noise
+        Standard deviation of white noise on the output, in its unit.
+    motion
+        Lowest and highest value of each quantity in the motion alone; none for an axis that stands.
+    stroke_s
+        Seconds in which the motion passes each place once.
+
+    The load is taken to go with the motor: above the first antiresonance its travel differs.
+
+    Raises
+    ------
+    InputError
+        If the plant has no response, the loop no feedback, or the output is not known.
+    """
+    given = as_model(plant)
+    if loop.feedback is None:
+        raise InputError("the loop's feedback is not known; describe its controllers")
+    if output not in ("velocity", "position"):
+        raise InputError(f"{output=} is not known; choose 'velocity' or 'position'")
+    if not (np.isfinite(radius_m) and radius_m > 0):
+        raise InputError(f"{radius_m=} is not a finite number above 0; leave it out for a rotary axis")
+    way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
+    speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
+    place = Place(plant=given, speed=speed, travel=way, angle=way, motion=dict(motion or {}), name="as measured")
+    return Machine(places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s)

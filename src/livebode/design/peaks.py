@@ -1,0 +1,91 @@
+"""Peaks of an experiment: the excitation's in the loop's periodic state, on top of the motion's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.design.machine import QUANTITIES, Machine, Place, Quantity
+from livebode.design.waveform import Waveform
+
+Floats = NDArray[np.float64]
+
+_POWERLESS = 1e-12  # of the largest bin: rounding
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The extremes of one quantity at one place.
+
+    Attributes
+    ----------
+    quantity, place
+        Of what, and where.
+    excited
+        Lowest and highest value that the excitation adds.
+    own
+        Lowest and highest value of the motion alone.
+    """
+
+    quantity: Quantity
+    place: str
+    excited: tuple[float, float]
+    own: tuple[float, float]
+
+    @property
+    def low(self) -> float:
+        """Both together, at the worst of all alignments of excitation and motion."""
+        return self.own[0] + self.excited[0]
+
+    @property
+    def high(self) -> float:
+        return self.own[1] + self.excited[1]
+
+    @property
+    def size(self) -> float:
+        return max(self.high, -self.low)
+
+
+def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
+    """Every quantity at every place.
+
+    The excitation's part is the sum of its bins times their closed-loop responses, over one period: exact for a linear
+    machine that has been excited for long. From rest it takes the loop some seconds to get there, and the position may
+    drift further meanwhile: bring the excitation in slowly. Excitation and motion are not synchronous, so their
+    extremes at each place are added.
+    """
+    window, rate_hz = waveform.lines.window, waveform.lines.rate_hz
+    spectrum = np.fft.rfft(waveform.samples)
+    # The integrators of the loop leave nothing of a constant.
+    excited = np.flatnonzero(np.abs(spectrum) > _POWERLESS * np.max(np.abs(spectrum)))
+    excited = excited[excited > 0]
+    return tuple(
+        _peak(quantity, place, response, spectrum, excited, window)
+        for place in machine.places
+        for quantity, response in machine.responses(place, excited * rate_hz / window).items()
+    )
+
+
+def _peak(
+    quantity: Quantity,
+    place: Place,
+    response: NDArray[np.complex128],
+    spectrum: NDArray[np.complex128],
+    excited: NDArray[np.int64],
+    window: int,
+) -> Peak:
+    answered = np.zeros_like(spectrum)
+    answered[excited] = spectrum[excited] * response
+    period = np.fft.irfft(answered, window)
+    return Peak(quantity, place.name, (float(period.min()), float(period.max())), place.own(quantity))
+
+
+def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
+    """Of each quantity the place with the largest extreme; of the travel its two ends."""
+    by = {name: [p for p in found if p.quantity == name] for name in QUANTITIES}
+    largest = {name: max(of, key=lambda p: p.size) for name, of in by.items()}
+    low, high = min(by["travel"], key=lambda p: p.low), max(by["travel"], key=lambda p: p.high)
+    ends = Peak("travel", "", (low.excited[0], high.excited[1]), (low.own[0], high.own[1]))
+    return {**largest, "travel": ends}

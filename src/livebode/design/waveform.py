@@ -1,0 +1,87 @@
+"""Waveform: one period of an excitation with the lines that it is made for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.excitation import quantised
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """One period of an excitation, N m, and what it came from.
+
+    Parameters
+    ----------
+    lines
+        Where the response is to be measured; the period is their window.
+    samples
+        One period, shape (window,).
+    about
+        What reproduces it: kind, seed, amplitude and so on, as plain data.
+
+    Raises
+    ------
+    InputError
+        If the samples are not one finite period of the window, or a line carries no power.
+    """
+
+    lines: Lines
+    samples: Floats
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.samples, dtype=np.float64)
+        samples.flags.writeable = False
+        object.__setattr__(self, "samples", samples)
+        if samples.shape != (self.lines.window,) or not np.all(np.isfinite(samples)):
+            raise InputError(
+                f"the excitation has shape {samples.shape} or is not finite; give one period of {self.lines.window} "
+                "finite samples"
+            )
+        if np.any(np.abs(self.spectrum[list(self.lines.bins)]) <= 1e-9 * np.max(np.abs(samples))):
+            weakest = int(np.argmin(np.abs(self.spectrum[list(self.lines.bins)])))
+            raise InputError(
+                f"the excitation has no power at {self.lines.frequency_hz[weakest]:g} Hz; leave out that line, or give "
+                "it an amplitude above 0"
+            )
+
+    @property
+    def spectrum(self) -> Complex:
+        """Amplitudes of bins 0 … N/2, scaled so that |X_k| is a line's amplitude, shape (N//2 + 1,)."""
+        return np.asarray(np.fft.rfft(self.samples) * (2 / self.lines.window))
+
+    @property
+    def amplitude(self) -> Floats:
+        """Of each line, shape (lines,)."""
+        return np.abs(self.spectrum[list(self.lines.bins)])
+
+    @property
+    def peak(self) -> float:
+        return float(np.max(np.abs(self.samples)))
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.samples**2)))
+
+    @property
+    def crest_factor(self) -> float:
+        """Peak over rms of the samples as the drive holds them."""
+        return self.peak / self.rms
+
+    def scaled(self, factor: float) -> Waveform:
+        """The same excitation `factor` times as large."""
+        return replace(self, samples=self.samples * factor)
+
+    def quantised(self, step: float) -> Waveform:
+        """In steps of the drive; see `livebode.excitation.quantised`."""
+        return replace(self, samples=quantised(self.samples, step), about={**self.about, "resolution_n_m": step})

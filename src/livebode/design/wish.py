@@ -1,0 +1,110 @@
+"""Wish: what a person wants to know of a machine, before anything is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from livebode.excitation import Phases, check_order
+from livebode.excitation.chirp import Sweep
+from livebode.nouns import InputError
+
+Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
+Shape = Literal["flat", "equal snr"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """An experiment as it is asked for; what is None is chosen.
+
+    Parameters
+    ----------
+    band_hz, resolution_hz
+        From where to where, and how far apart the lines may be; or `lines` instead.
+    lines, window
+        Lines as in `Lines.parse`, and the period in samples.
+    kind
+        "multisine"; "odd": odd lines of random phase with quiet ones among them, to tell distortion; "prbs", "chirp",
+        "stepped": one line after the other.
+    phases
+        Of a multisine: "low crest", "schroeder" or "random".
+    shape
+        Amplitudes of the lines: "flat", or for an "equal snr" at the output of the machine.
+    amplitude_n_m
+        Of each line of a multisine (of a shaped one: their rms), of the chirp, of the steps or of the PRBS; a list has
+        one for each line. None: as small as the accuracy allows, and within the limits.
+    accuracy
+        Wanted 95 % bound of each line as a share of |G|.
+    crest_factor_max
+        A crest factor that must be reached; None asks for none.
+    resolution_n_m
+        Step of the drive, to round to.
+    order, held_ticks
+        Of the PRBS: length of its register, and ticks that a bit stands.
+    sweep
+        Of the chirp: "linear" or "logarithmic".
+    periods
+        Windows that each step of a stepped sine takes.
+    seed
+        Of all that is random: the same seed, the same excitation.
+    """
+
+    band_hz: tuple[float, float] | None = None
+    resolution_hz: float | None = None
+    lines: str | None = None
+    window: int | None = None
+    kind: Kind = "multisine"
+    phases: Phases = "low crest"
+    shape: Shape = "flat"
+    amplitude_n_m: float | Sequence[float] | None = None
+    accuracy: float = 0.05
+    crest_factor_max: float | None = None
+    resolution_n_m: float | None = None
+    order: int | None = None
+    held_ticks: int | None = None
+    sweep: Sweep = "linear"
+    periods: int = 4
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("kind", get_args(Kind)),
+            ("phases", get_args(Phases)),
+            ("shape", get_args(Shape)),
+            ("sweep", get_args(Sweep)),
+        ):
+            if (word := getattr(self, name)) not in known:
+                raise InputError(f"{name}={word!r} is not known; choose {', '.join(map(repr, known))}")
+        self._check_numbers()
+        if self.band_hz is not None and np.shape(self.band_hz) != (2,):
+            raise InputError(f"band_hz={self.band_hz} is no band; give two frequencies in Hz, such as [20, 140]")
+        if self.order is not None:
+            check_order(self.order)
+        if self.lines is None and self.band_hz is None:
+            raise InputError("neither band_hz nor lines is given; say what is to be measured, such as [20, 140]")
+        if self.lines is None and self.resolution_hz is None and self.window is None:
+            raise InputError("neither resolution_hz nor window is given; say how far apart the lines may be")
+        if self.lines is not None and self.kind not in ("multisine", "stepped"):
+            raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
+        if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):
+            raise InputError(f"the lines of {self.kind!r} cannot be shaped; leave out shape, or take a multisine")
+
+    def _check_numbers(self) -> None:
+        for name in ("resolution_hz", "accuracy", "crest_factor_max", "resolution_n_m"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InputError(f"{name}={value} is not a finite number above 0")
+        for name in ("window", "held_ticks", "periods"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise InputError(f"{name}={value} is below 1; give a whole number above 0")
+        if self.seed < 0:
+            raise InputError(f"seed={self.seed} is below 0; give a whole number of at least 0")
+        given = np.atleast_1d(np.asarray(0.0 if self.amplitude_n_m is None else self.amplitude_n_m, dtype=np.float64))
+        if not np.all(np.isfinite(given)) or np.any(given < 0) or (self.amplitude_n_m is not None and not given.any()):
+            raise InputError(
+                f"amplitude_n_m={self.amplitude_n_m} is not finite and above 0; leave it out to have it chosen"
+            )

@@ -1,0 +1,126 @@
+"""Phases that keep the peak of a multisine low."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.excitation.descent import PEAK, VALLEY, Stages, descend, descend_together, period, samples_for
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+Bins = NDArray[np.int64]
+
+# Samples for one period of the highest line when a peak is judged: off by 3e-4 at most.
+_OVERSAMPLED = 128
+_LINES_WITH_HESSIAN = 200
+_STARTS_MAX, _STARTS_MIN = 256, 8
+_STARTS_TIMES_LINES = 4848  # 48 starts for 101 lines: some seconds
+_TOGETHER = 1 << 19  # starts·lines² in one step: 8 MB in each array
+_SHAKEN_RAD = 0.5
+_PROMISING = 4  # one in so many is brought on to the peak
+
+
+def low_crest_phases(
+    bins: ArrayLike, amplitude: ArrayLike = 1.0, *, seed: int = 0, starts: int | None = None
+) -> Floats:
+    """Phases of Σ A_i·sin(2πk_i·t + φ_i) for a low peak, radians, shape (lines,).
+
+    The L_2p norm of the period is brought down over the phases with p rising to 512, after Guillaume, Schoukens,
+    Pintelon, Kollár (IEEE Trans. Instrum. Meas. 40(6), 1991). A descent ends in the valley that it began in, so there
+    are many: the first start is Schroeder's phases, half are those shaken, half are random. A quarter of them go on to
+    the highest p, and the lowest crest factor is taken. The same seed gives the same phases. docs/excitation.md has
+    what is reached, and beside what.
+
+    Parameters
+    ----------
+    bins
+        Of the lines, whole numbers above 0, ascending, shape (lines,).
+    amplitude
+        One for all lines, or one for each.
+    seed
+        Of the starts.
+    starts
+        How many; None for as many as take some seconds: 230 for 21 lines, 48 for 101, 8 from 600 on.
+
+    Raises
+    ------
+    InputError
+        If amplitudes are not as many as bins, or `starts` is below 1.
+
+    Examples
+    --------
+    >>> phases = low_crest_phases(range(1, 8), starts=32)
+    >>> round(crest_between_samples(range(1, 8), 1.0, phases), 2)
+    1.41
+    """
+    k, size = _reduced(bins, amplitude)
+    count = int(np.clip(_STARTS_TIMES_LINES // k.size, _STARTS_MIN, _STARTS_MAX)) if starts is None else starts
+    if count < 1:
+        raise InputError(f"{starts=} is below 1; give at least one start")
+    generator = np.random.default_rng(seed)
+    at_once = max(1, _TOGETHER // k.size**2) if k.size <= _LINES_WITH_HESSIAN else 1
+    promising: list[tuple[float, Floats]] = []
+    for first in range(0, count, at_once):
+        begun = _starts(np.arange(first, min(first + at_once, count)), size, generator)
+        promising += _descended(begun, k, size, VALLEY)
+        promising = sorted(promising, key=_first)[: -(-count // _PROMISING)]
+    ended: list[tuple[float, Floats]] = []
+    for first in range(0, len(promising), at_once):
+        ended += _descended(np.array([p for _, p in promising[first : first + at_once]]), k, size, PEAK)
+    return np.asarray((min(ended, key=_first)[1] + np.pi / 2) % (2 * np.pi))  # of sines; the search is in cosines
+
+
+def _first(found: tuple[float, Floats]) -> float:
+    return found[0]
+
+
+def _descended(begun: Floats, k: Bins, size: Floats, stages: Stages) -> list[tuple[float, Floats]]:
+    """Crest factor and phases where each start leads."""
+    if k.size <= _LINES_WITH_HESSIAN:
+        ended = descend_together(begun, k, size, stages)
+    else:
+        ended = np.array([descend(phases, k, size, stages) for phases in begun])
+    return [(_crest(k, size, phases), phases) for phases in ended]
+
+
+def crest_between_samples(bins: ArrayLike, amplitude: ArrayLike, phases: ArrayLike) -> float:
+    """Crest factor of Σ A_i·sin(2πk_i·t + φ_i) in continuous time (128 samples in a period of the highest line).
+
+    >>> round(crest_between_samples([1], 1.0, [0.3]), 3)
+    1.414
+    """
+    k, size = _reduced(bins, amplitude)
+    return _crest(k, size, np.asarray(phases, dtype=np.float64) - np.pi / 2)
+
+
+def _starts(numbers: NDArray[np.int64], amplitude: Floats, generator: np.random.Generator) -> Floats:
+    """Schroeder's phases as they are (number 0) and shaken (even), and random ones (odd)."""
+    shape = (numbers.size, amplitude.size)
+    shaken = _schroeder(amplitude) + generator.normal(0, _SHAKEN_RAD, shape) * (numbers > 0)[:, np.newaxis]
+    anywhere = generator.uniform(0, 2 * np.pi, shape)
+    return np.where((numbers % 2 == 0)[:, np.newaxis], shaken, anywhere)
+
+
+def _schroeder(amplitude: Floats) -> Floats:
+    """−2π·Σ_{j<i} (i − j)·p_j, where p_j is a line's share of the power (Schroeder 1970, for any amplitudes)."""
+    share = amplitude**2 / np.sum(amplitude**2)
+    return np.asarray(-2 * np.pi * np.concatenate(([0.0], np.cumsum(np.cumsum(share))[:-1])))
+
+
+def _reduced(bins: ArrayLike, amplitude: ArrayLike) -> tuple[Bins, Floats]:
+    """Bins without their common divisor, which changes no peak, and as many amplitudes."""
+    k = np.asarray(bins, dtype=np.int64)
+    size = np.asarray(amplitude, dtype=np.float64)
+    if size.shape not in ((), k.shape):
+        raise InputError(f"amplitude has shape {size.shape} for {k.size} lines; give one number, or one for each line")
+    if not k.size or k.min() < 1:
+        raise InputError(f"bins={k.tolist()} are not whole numbers above 0; name at least one line")
+    if not np.all(np.isfinite(size)) or not np.any(size):
+        raise InputError("the amplitudes are not finite, or all zero; give each line one above 0")
+    return k // np.gcd.reduce(k), np.broadcast_to(size, k.shape)
+
+
+def _crest(k: Bins, size: Floats, phases: Floats) -> float:
+    one = period(k, size * np.exp(1j * phases), samples_for(int(k[-1]), _OVERSAMPLED))
+    return float(np.max(np.abs(one)) / np.sqrt(np.sum(size**2) / 2))

@@ -1,0 +1,72 @@
+"""Odd lines with quiet ones among them, which tell distortion from noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.nouns import GridError, Lines
+from livebode.nouns.lines import check_window
+
+_GROUP_MIN = 2
+
+
+def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, group: int = 4, seed: int = 0) -> Lines:
+    """The odd bins of a band, of which one in every `group` neighbours, drawn at random, stays quiet.
+
+    With such lines and random phases, what appears at the even bins is even distortion of the machine, and what appears
+    at the odd bins that were left quiet is odd distortion, each beside the noise (Pintelon, Schoukens, System
+    Identification, 2nd ed., 2012, ch. 4: random odd multisine with a random harmonic grid). The cost: half the
+    resolution of a grid of all bins.
+
+    Parameters
+    ----------
+    low_hz, high_hz
+        The band, ends included.
+    rate_hz, window
+        The tracker's grid.
+    group
+        Odd bins of which one stays quiet.
+    seed
+        Of the draw: the same seed, the same lines.
+
+    Raises
+    ------
+    GridError
+        If the band does not lie between 0 and the Nyquist frequency, or holds fewer odd bins than one group.
+
+    Examples
+    --------
+    >>> odd_lines(20, 140, rate_hz=4000, window=800, seed=1).bins
+    (5, 9, 11, 13, 15, 19, 21, 23, 25)
+    """
+    check_window(window, rate_hz)
+    check_band(low_hz, high_hz, rate_hz)
+    if group < _GROUP_MIN:
+        raise GridError(f"{group=} leaves every line quiet; choose {_GROUP_MIN} or more, such as 4")
+    resolution_hz = rate_hz / window
+    first, last = int(np.ceil(low_hz / resolution_hz - 1e-9)), int(np.floor(high_hz / resolution_hz + 1e-9))
+    odd = np.arange(first + (first + 1) % 2, last + 1, 2)
+    odd = odd[2 * odd < window]
+    if odd.size < group:
+        needed = int(np.ceil(2 * group * rate_hz / (high_hz - low_hz))) if high_hz > low_hz else 2 * window
+        raise GridError(
+            f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {resolution_hz:g} Hz grid, less than one "
+            f"group of {group}; take a window of {max(needed, window + 1)} samples, or a wider band"
+        )
+    generator = np.random.default_rng(seed)
+    groups = [odd[i : i + group] for i in range(0, odd.size, group)]
+    silent = {int(generator.choice(g)) for g in groups if g.size == group}
+    return Lines.of_bins([int(k) for k in odd if int(k) not in silent], window, rate_hz)
+
+
+def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:
+    """GridError where a band is none, or leaves what the rate can carry."""
+    if not 0 < low_hz <= high_hz:
+        raise GridError(
+            f"the band {low_hz:g} … {high_hz:g} Hz is none; give two frequencies above 0, the lower one first"
+        )
+    if not high_hz < rate_hz / 2:
+        raise GridError(
+            f"the band ends at {high_hz:g} Hz, not below the Nyquist frequency {rate_hz / 2:g} Hz of {rate_hz:g} Hz; "
+            f"end it at {0.45 * rate_hz:g} Hz, or sample at {2.5 * high_hz:g} Hz"
+        )

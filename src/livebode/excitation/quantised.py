@@ -1,0 +1,36 @@
+"""An excitation in the steps of a drive."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+
+def quantised(period: Floats, step: float) -> Floats:
+    """The nearest multiples of `step`, shape of `period`; still periodic, with the rounding's own small lines.
+
+    Raises
+    ------
+    InputError
+        If the step is not positive, or so coarse that nothing but zero is left: the sentence has the smallest peak
+        that would be left, and the largest step that would leave this one.
+
+    Examples
+    --------
+    >>> quantised(np.array([0.26, -0.11, 0.04]), 0.1)
+    array([ 0.3, -0.1,  0. ])
+    """
+    if not (np.isfinite(step) and step > 0):
+        raise InputError(f"the resolution {step:g} is not a finite number above 0; give the drive's step")
+    counts = np.rint(period / step)
+    if np.any(period) and not np.any(counts):
+        peak = float(np.max(np.abs(period)))
+        raise InputError(
+            f"an excitation with a peak of {peak:g} is nothing in steps of {step:g}; raise its peak above "
+            f"{step / 2:g}, or take steps below {2 * peak:g}"
+        )
+    return np.asarray(counts * step + 0.0)

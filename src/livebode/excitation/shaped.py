@@ -1,0 +1,41 @@
+"""Amplitudes that make every line as clear as the others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+
+def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
+    """Amplitudes of the lines for the same signal-to-noise ratio at the output, shape (lines,), of rms 1.
+
+    A_k ∝ noise_k/|Y/W|_k. The relative error of a line, sigma/|G|, is then the same for all.
+
+    Parameters
+    ----------
+    response
+        Y/W at the lines, from the excitation to the measured output, shape (lines,); of a machine whose response
+        changes, the smallest magnitude at each line.
+    noise
+        Standard deviation of the output's noise, one for white noise or one for each line, in any unit.
+
+    Raises
+    ------
+    InputError
+        If a response is zero or not finite: no amplitude would make such a line clear.
+
+    Examples
+    --------
+    >>> equal_snr([1.0, 0.5]) * np.sqrt(2.5)
+    array([1., 2.])
+    """
+    size = np.abs(np.asarray(response, dtype=np.complex128))
+    if not size.size or not np.all(np.isfinite(size) & (size > 0)):
+        line = int(np.argmin(np.where(np.isfinite(size), size, 0.0))) if size.size else 0
+        raise InputError(f"the response at line {line} is zero or not finite; leave out that line")
+    wanted = np.asarray(noise, dtype=np.float64) / size
+    return np.asarray(wanted / np.sqrt(np.mean(wanted**2)))

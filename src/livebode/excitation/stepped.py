@@ -1,0 +1,50 @@
+"""One line after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.excitation.multisine import each, multisine
+from livebode.nouns import InputError, Lines
+from livebode.nouns.lines import WINDOW_MAX
+
+Floats = NDArray[np.float64]
+
+
+def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) -> Floats:
+    """Every line alone for `periods` windows, one after the other, shape (lines·periods·window,).
+
+    A step is a whole number of periods that begins and ends at zero, so the signal has no leap. The sequence as a whole
+    repeats too: over the long window of `stepped_lines` each line is on the grid, with 1/lines of its amplitude. All
+    the power stands in one line at a time, at a crest factor of √2 within a step; a machine that changes meanwhile is
+    seen by each line at another moment.
+
+    Raises
+    ------
+    InputError
+        If `periods` is below 1, or the sequence is longer than the longest window.
+
+    Examples
+    --------
+    >>> lines = Lines.parse("20:60:20", rate_hz=4000, window=200)
+    >>> len(stepped_sine(lines, periods=2)), stepped_lines(lines, periods=2).bins
+    (1200, (6, 12, 18))
+    """
+    stepped_lines(lines, periods=periods)
+    sizes = each(amplitude, len(lines), "amplitude")
+    steps = [multisine(Lines((k,), lines.window, lines.rate_hz), a, [0.0]) for k, a in zip(lines.bins, sizes)]
+    return np.concatenate([np.tile(step, periods) for step in steps])
+
+
+def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
+    """The same frequencies on the grid of the whole sequence."""
+    if periods < 1:
+        raise InputError(f"{periods=} is below 1; hold each line for at least one window")
+    times = len(lines) * periods
+    if times * lines.window > WINDOW_MAX:
+        raise InputError(
+            f"{len(lines)} steps of {periods} windows of {lines.window} samples are longer than the longest window "
+            f"{WINDOW_MAX}; take at most {max(1, WINDOW_MAX // (lines.window * len(lines)))} periods or fewer lines"
+        )
+    return Lines(tuple(k * times for k in lines.bins), lines.window * times, lines.rate_hz)

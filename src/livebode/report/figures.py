@@ -1,0 +1,44 @@
+"""The pictures that a document asks for by name, in the size of its page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from livebode.nouns.document import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH_IN = 9.0
+"""Of all pictures of a document: on A4 they are drawn at three quarters, where their letters are of 7 points."""
+
+
+def drawn(picture: Picture) -> Figure:
+    """The picture in the light look."""
+    if picture.what == "bode":
+        from livebode.report.bode import bode_figure
+
+        return bode_figure(**picture.data, title="Average response")
+    if picture.what == "tracking":
+        from livebode.report.tracking import tracking_figure
+
+        return tracking_figure(**picture.data, title="Magnitude over time", width_in=WIDTH_IN)
+    if picture.what == "parameters":
+        from livebode.report.parameters import parameters_figure
+
+        return parameters_figure(**picture.data)
+    if picture.what == "loop":
+        from livebode.report.loop import loop_figure
+
+        return loop_figure(**picture.data, title="Open loop", width_in=WIDTH_IN)
+    if picture.what == "validation":
+        from livebode.report.validation import validation_figure
+
+        return validation_figure(**picture.data, title="Measured and simulated", folded=True)
+    if picture.what == "comparison":
+        from livebode.report.comparison import comparison_figure
+
+        return comparison_figure(**picture.data)
+    from livebode.report.comparison import places_figure
+
+    return places_figure(**picture.data)

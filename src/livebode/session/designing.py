@@ -1,0 +1,101 @@
+"""From the description of an experiment to a directory with the excitation, its picture and its axis.toml."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from livebode.design import FORMATS, Design, axis_text, choose, write
+from livebode.nouns import InputError
+from livebode.records import to_json
+from livebode.session.experiment import Experiment
+from livebode.structured_text import PERIOD_MAX
+
+_MARK = "design.json"
+Picture = Callable[[Design, Path], None]
+
+
+@dataclass(frozen=True)
+class Designed:
+    """What was made.
+
+    Attributes
+    ----------
+    design
+        The experiment.
+    directory, files
+        Where it stands.
+    """
+
+    design: Design
+    directory: Path
+    files: tuple[str, ...]
+
+
+def design_experiment(
+    experiment: Experiment,
+    directory: Path,
+    *,
+    name: str = "excitation",
+    suffixes: Sequence[str] | None = None,
+    force: bool = False,
+    draw: Picture | None = None,
+) -> Designed:
+    """Choose the experiment, and leave its files in a new directory that appears when it is whole.
+
+    Raises
+    ------
+    InputError
+        If nothing can be chosen (see `choose`), a format is not known or forbids the name, something stands in the
+        directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
+    """
+    kinds = None if suffixes is None else tuple(f".{s.lstrip('.')}" for s in suffixes)
+    for kind in kinds or ():
+        if kind not in FORMATS:
+            raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
+    _check_free(directory, force)
+    design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
+    lines = design.waveform.lines
+    try:
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{directory.name[:100]}.partial-", dir=directory.parent) as folder:
+            partial = Path(folder) / "whole"
+            partial.mkdir()
+            for kind in kinds or _all_that_hold(lines.window):
+                write(partial / f"{name}{kind}", design.waveform, name)
+            configuration = axis_text(
+                design,
+                signals=experiment.signal_names(),
+                log=experiment.log,
+                loop=experiment.loop_tables(),
+                motion=experiment.motion_table(lines.window / lines.rate_hz),
+            )
+            (partial / "axis.toml").write_text(configuration, encoding="utf-8")
+            (partial / _MARK).write_text(to_json(design.plain(), indent=1) + "\n", encoding="utf-8")
+            if draw is not None:
+                draw(design, partial / f"{name}.png")
+            files = tuple(sorted(path.name for path in partial.iterdir()))
+            _check_free(directory, force)
+            if directory.exists():
+                shutil.rmtree(directory)
+            partial.rename(directory)
+    except OSError as error:
+        raise InputError(f"{str(directory)!r} could not be written: {error.strerror}; nothing was left there") from None
+    return Designed(design, directory, files)
+
+
+def _all_that_hold(window: int) -> list[str]:
+    """The formats for one that names none: a PLC's compiler takes no period of any length."""
+    return [kind for kind in FORMATS if kind != ".st" or window <= PERIOD_MAX]
+
+
+def _check_free(directory: Path, force: bool) -> None:
+    if not (directory.exists() or directory.is_symlink()):
+        return
+    if not force:
+        raise InputError(f"{str(directory)!r} exists already; take another --out, or --force to replace it")
+    if directory.is_symlink() or not (directory / _MARK).is_file():
+        raise InputError(f"{str(directory)!r} is not what an earlier design left; take another --out")

@@ -1,0 +1,215 @@
+"""Experiment: the file in which a person describes a machine and what is to be measured of it."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from math import inf
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from livebode.design import Bearable, Machine, MeasuredResponse, Wish, belt_machine, measured_machine
+from livebode.design.machine import Quantity
+from livebode.fitting import mean_response
+from livebode.nouns import InputError
+from livebode.records import Run
+from livebode.session.axis import LoopSection
+from livebode.session.said import said
+from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
+
+T = TypeVar("T")
+
+_BELT: dict[str, Any] = {
+    "mechanics": Mechanics,
+    "friction": Friction,
+    "drive": Drive,
+    "sensor": Sensor,
+    "limits": Limits,
+    "strokes": Strokes,
+    "standstill": Standstill,
+}
+_MOTION: dict[Quantity, str] = {
+    "torque": "torque_n_m",
+    "speed": "speed_m_per_s",
+    "travel": "position_m",
+    "following error": "following_error_m",
+}
+_SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
+
+
+class _Measured(BaseModel):
+    """[measured]: a plant that a run measured, and what its motion does alone."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    run: Path
+    output: Literal["velocity", "position"] = "velocity"
+    radius_m: float = 1.0
+    noise: float = 0.0
+    stroke_s: float | None = None
+    torque_n_m: tuple[float, float] | None = None
+    speed_m_per_s: tuple[float, float] | None = None
+    position_m: tuple[float, float] | None = None
+    following_error_m: tuple[float, float] | None = None
+
+
+class Experiment(BaseModel):
+    """A machine, either a belt axis by its constants or one that was measured, and a wish."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    excitation: dict[str, Any]
+    belt: dict[str, dict[str, Any]] | None = None
+    measured: _Measured | None = None
+    limits: dict[str, Any] = {}
+    loop: LoopSection | None = None
+    signals: dict[str, str] = {}
+    log: str = "log.parquet"
+
+    @classmethod
+    def read(cls, path: Path, over: Mapping[str, Any] | None = None) -> Experiment:
+        """The Experiment in a TOML file; `over` goes over its [excitation].
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, is not TOML, or a key or a value cannot be; the message names it.
+        """
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InputError(f"there is no file {path}; check the name") from None
+        except OSError as error:
+            raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise InputError(f"{str(path)!r} is not text; give the description of an experiment in TOML") from None
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{str(path)!r} is not TOML: {error}") from None
+        wanted = data.get("excitation", {})
+        if isinstance(wanted, dict):
+            data["excitation"] = wanted | dict(over or {})
+        found = cls.of(data, str(path))
+        if found.measured is None:
+            return found
+        return found.model_copy(
+            update={"measured": found.measured.model_copy(update={"run": path.parent / found.measured.run})}
+        )
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any], origin: str) -> Experiment:
+        """The Experiment in plain data; `origin` names it in messages."""
+        try:
+            found = cls.model_validate(data)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            if first["type"] == "extra_forbidden":
+                known = _Measured if first["loc"][0] == "measured" else cls
+                raise InputError(
+                    f"{origin}: there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
+                ) from None
+            raise InputError(f"{origin}: {place} = {first['input']!r} is not usable: {first['msg'].lower()}") from None
+        if (found.belt is None) == (found.measured is None):
+            raise InputError(f"{origin}: describe either a [belt] axis by its constants, or one that was [measured]")
+        return found
+
+    def wish(self) -> Wish:
+        """What [excitation] asks for."""
+        given = dict(self.excitation)
+        if isinstance(given.get("band_hz"), list) and len(given["band_hz"]) == 2:
+            given["band_hz"] = tuple(given["band_hz"])
+        return _made(Wish, given, "excitation")
+
+    def bearable(self) -> Bearable:
+        """[limits]; of a belt axis its own where they are not given."""
+        axis = self.axis()
+        own = {} if axis is None else {
+            "torque_n_m_max": axis.drive.torque_n_m_max,
+            "speed_m_per_s_max": axis.limits.speed_m_per_s_max,
+            "position_m_min": axis.limits.position_m_min,
+            "position_m_max": axis.limits.position_m_max,
+        }  # fmt: skip
+        return _made(Bearable, own | self.limits, "limits")
+
+    def axis(self) -> BeltAxis | None:
+        """The belt axis, where it is one."""
+        if self.belt is None:
+            return None
+        if unknown := [name for name in self.belt if name not in _BELT]:
+            raise InputError(f"there is no [belt.{unknown[0]}]; {_near(unknown[0], _BELT)}")
+        parts = {name: _made(_BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
+        if "strokes" in parts and "standstill" in parts:
+            raise InputError("[belt.strokes] and [belt.standstill] exclude each other; leave one out")
+        motion = parts.pop("strokes", None) or parts.pop("standstill", None) or Standstill()
+        return BeltAxis(motion=motion, **parts)
+
+    def machine(self) -> Machine:
+        """The machine that is described; a simulated cycle for a belt axis, a directory read for a measured one."""
+        axis = self.axis()
+        if axis is not None:
+            return belt_machine(axis)
+        assert self.measured is not None
+        told = self.measured
+        run = Run.open(told.run)
+        loop = self.loop or LoopSection.model_validate(said(run.summary).get("loop", {}))
+        rate_hz = run.lines.rate_hz
+        motion = {name: getattr(told, key) for name, key in _MOTION.items() if getattr(told, key) is not None}
+        return measured_machine(
+            MeasuredResponse.of(mean_response(run.responses())), loop.build(rate_hz), rate_hz,
+            output=told.output, radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
+        )  # fmt: skip
+
+    def loop_tables(self) -> dict[str, Any]:
+        """[loop] of the axis.toml, as docs/configuration.md has it."""
+        axis = self.axis()
+        if axis is None:
+            return {} if self.loop is None else _finite(self.loop.model_dump(exclude_unset=True))
+        drive = axis.drive
+        velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
+                    "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
+                    "delay_ticks": drive.delay_ticks}  # fmt: skip
+        position = {"gain": drive.position_gain_per_s, "rate_hz": drive.position_rate_hz,
+                    "held_ticks": drive.position_ticks}  # fmt: skip
+        return {"velocity": velocity, "position": position}
+
+    def motion_table(self, window_s: float) -> dict[str, Any]:
+        """[motion] of the axis.toml, where a belt axis moves: a chunk is a stroke, and two windows at least."""
+        axis = self.axis()
+        if axis is None or (cycle := axis.motion.cycle(axis.drive.rate_hz)[0].size) == 1:
+            return {}
+        stroke_s = cycle / 2 / axis.drive.rate_hz
+        return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
+
+    def signal_names(self) -> dict[str, str]:
+        """[signals] of the axis.toml; those of the simulated axis where nothing is said."""
+        if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
+            raise InputError(f"there is no signals.{unknown[0]}; {_near(unknown[0], (*_SIGNALS, 'schedule'))}")
+        own = {"schedule": "x"} if self.belt is not None and "strokes" in self.belt else {}
+        return _SIGNALS | own | self.signals
+
+
+def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
+    """The dataclass from plain data; InputError for a key it has not, or a value of another type."""
+    known = get_type_hints(kind)
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(f"there is no {section}.{name}; {_near(name, known)}")
+        try:
+            TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
+        except ValidationError as error:
+            why = error.errors()[0]["msg"].lower()
+            raise InputError(f"{section}.{name} = {value!r} is not usable: {why}") from None
+    return kind(**given)
+
+
+def _near(name: str, known: Any) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(known)}"
+
+
+def _finite(table: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {name: _finite(v) if isinstance(v, Mapping) else v for name, v in table.items() if v is not None}
+    return {name: v for name, v in kept.items() if v != inf}

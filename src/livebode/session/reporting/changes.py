@@ -1,0 +1,123 @@
+"""What two runs' models say: parameters and margins before and after, with the change and its bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import hypot, isfinite
+
+import numpy as np
+
+from livebode.fitting import Fit
+from livebode.margins import Margins, OpenLoop, margins
+from livebode.nouns import InputError
+from livebode.session.axis import FitSection, LoopSection
+from livebode.session.fits import fit_averaged
+from livebode.session.reporting.difference import ALPHA, Compared
+from livebode.session.said import said
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number before and after, each with its 95 % bound.
+
+    Attributes
+    ----------
+    bound
+        Of the change; holds with 95 % for all changes of the table together (Bonferroni). What the model lacks is the
+        same in both runs and counts in both bounds, so this one is wide.
+    """
+
+    name: str
+    unit: str
+    before: tuple[float, float]
+    after: tuple[float, float]
+    bound: float
+
+    @property
+    def amount(self) -> float:
+        """After less before."""
+        return self.after[0] - self.before[0]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the bound does not hold zero."""
+        return abs(self.amount) > self.bound
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Parameters and margins of both runs; each empty with the reason in words."""
+
+    parameters: tuple[Change, ...]
+    parameter_words: str
+    margins: tuple[Change, ...]
+    margin_words: str
+
+
+def changes(of: Compared) -> Changes:
+    """Fit the same model to what was compared of each run, and read the margins of the loops described."""
+    own = [said(run.summary) for run in of.runs]
+    section = next((s["fit"] for s in own if "fit" in s), None)
+    if section is None:
+        return Changes((), "No parameters: neither run has a [fit].", (), "No margins: they are read around a fit.")
+    model = FitSection.model_validate(section)
+    try:
+        fits = [
+            fit_averaged(replace(average, response=one, words="what was compared"), model)[0]
+            for average, one in zip(of.averages, (of.overall.before, of.overall.after))
+        ]
+    except InputError as error:
+        return Changes((), f"No parameters: {error}.", (), "No margins: they are read around a fit.")
+    for run, fit in zip(of.runs, fits):
+        if fit.status != "ok":
+            words = f"No parameters: no model holds for {run.path.name}: {fit.sentence}."
+            return Changes((), words, (), "No margins: they are read around a fit.")
+    rows = [{name: (value, bound, unit) for name, value, bound, unit in fit.rows()} for fit in fits]
+    found = _table(rows)
+    words = f"The {fits[0].model.name} model, fitted to what was compared, at {fits[0].lines} lines."
+    loops = [LoopSection.model_validate(s.get("loop", {})) for s in own]
+    try:
+        read = [_margins(fit, loop) for fit, loop in zip(fits, loops)]
+    except InputError as error:
+        return Changes(found, words, (), f"No margins: {error}.")
+    known = [m for m in read if m is not None and m.ok[0]]
+    if len(known) < len(read):
+        return Changes(found, words, (), "No margins: not both runs describe a loop that the fit makes stable.")
+    return Changes(found, words, _table([_rows(m) for m in known]), "")
+
+
+def _margins(fit: Fit, loop: LoopSection) -> Margins | None:
+    built = loop.build(fit.rate_hz)
+    if built.feedback is None:
+        return None
+    return margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
+
+
+def _rows(found: Margins) -> dict[str, tuple[float, float, str]]:
+    bound = found.bound()[0]
+    values = zip(found.names, found.value[0], bound, found.units)
+    return {name.replace("_", " "): (float(v), float(b), unit) for name, v, b, unit in values if isfinite(v)}
+
+
+def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...]:
+    from scipy.special import ndtri
+
+    before, after = rows
+    names = [name for name in before if name in after]
+    # The bounds of each are 1.96 sigma.
+    wider = float(ndtri(1 - ALPHA / (2 * max(len(names), 1))) / ndtri(1 - ALPHA / 2))
+    return tuple(
+        Change(
+            name,
+            before[name][2],
+            before[name][:2],
+            after[name][:2],
+            wider * hypot(before[name][1], after[name][1]),
+        )
+        for name in names
+    )
+
+
+def percent(change: Change) -> float:
+    """The change as a share of what was before; NaN of zero."""
+    return 100 * change.amount / abs(change.before[0]) if change.before[0] else float(np.nan)

@@ -1,0 +1,288 @@
+"""The report of two runs: before and after."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.nouns.document import Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.records import Run
+from livebode.session.reporting.changes import Change, Changes, changes, percent
+from livebode.session.reporting.difference import ALPHA, Compared, Difference, compare
+from livebode.session.reporting.material import written
+from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, to_toml, with_bound
+from livebode.session.said import said
+
+_TEST = (
+    "A line differs where |G₂ − G₁|² over the variance of both means is larger than chance makes it with a probability "
+    "of {alpha:.2g}: 5 % for all {m} together (Bonferroni). Two runs of the same machine are told apart at any line no "
+    "more often than that. The variance is of the scatter between windows, its degrees of freedom are Welch's and "
+    "Satterthwaite's."
+)
+_TONES = {"good": "same", "look": "look at it", "bad": "differs", "open": "not known"}
+_LINES_SHOWN, _PLACES_SHOWN = 80, 40
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two runs held against each other, and how to say it."""
+
+    found: Compared
+    changes: Changes
+
+    @classmethod
+    def of(cls, before: Path, after: Path) -> Comparison:
+        """Read and compare; errors as `compare`."""
+        found = compare(Run.open(before), Run.open(after))
+        return cls(found, changes(found))
+
+    @property
+    def sentences(self) -> tuple[Finding, ...]:
+        """The verdict."""
+        overall, places = self.found.overall, self.found.places
+        f = overall.before.lines.frequency_hz
+        findings = [Finding("look", text) for text in self.found.warnings]
+        if overall.differs.any():
+            worst = int(np.nanargmin(overall.p))
+            verb = "differs" if overall.differs.sum() == 1 else "differ"
+            db, around, deg, turned = polar(complex(overall.ratio[worst]), float(overall.bound[worst]))
+            words = f"{many(int(overall.differs.sum()), 'line')} of {overall.m} {verb}: {_hz(f[overall.differs])}. "
+            words += f"Surest at {f[worst]:g} Hz: {_signed(db)} ± {around} dB, {_signed(deg)} ± {turned}°."
+            findings.append(Finding("bad", words))
+        elif not np.isfinite(overall.p).any():
+            findings.append(Finding("open", "At no line both runs have a valid mean with a known sigma."))
+        else:
+            findings.append(
+                Finding("good", f"No line differs more than chance makes it ({overall.m} tested together).")
+            )
+        if places:
+            there = [p for p in places if p.difference.differs.any()]
+            count = sum(int(p.difference.differs.sum()) for p in there)
+            words = (
+                f"Place by place {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
+            )
+            words += f"of {many(len(places), 'place')} (each way counts for itself)."
+            findings.append(Finding("bad" if there else "good", words))
+        for what, table in (("parameter", self.changes.parameters), ("margin", self.changes.margins)):
+            moved = [c for c in table if c.significant]
+            listed = "; ".join(f"{_name(c)} {percent(c):+.2g} % ± {_share(c)} %" for c in moved[:6])
+            words = f"{many(len(moved), what)} of {len(table)} changed: {listed}." if moved else f"No {what} changed."
+            if table:
+                findings.append(Finding("bad" if moved else "good", words))
+        return tuple(sorted(findings, key=lambda finding: ("bad", "look", "open", "good").index(finding.tone)))
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Ratio at each line, and changes of parameters and margins, for a terminal."""
+        d = self.found.overall
+        rows = [
+            f"{f:>10g} Hz {_signed(db):>9} ± {around:<8} dB {_signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
+            for f, (db, around, deg, turned), on in zip(
+                d.before.lines.frequency_hz, map(polar, d.ratio.tolist(), d.bound.tolist()), d.differs
+            )
+        ]
+        more = len(rows) - _LINES_SHOWN
+        lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} lines more; --json has all"] * (more > 0))
+        changed = [
+            f"  {_name(c):22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
+            + "  changed" * c.significant
+            for c in (*self.changes.parameters, *self.changes.margins)
+        ]
+        return tuple(filter(None, (lines, "\n".join(changed))))
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        places = [{"from": p.low, "to": p.high, "back": p.back} | _lines(p.difference) for p in self.found.places]
+        return {
+            "before": str(self.found.runs[0].path),
+            "after": str(self.found.runs[1].path),
+            "quantity": self.found.overall.before.quantity,
+            "unit": self.found.overall.before.unit,
+            "alpha": ALPHA,
+            "tested_together": self.found.overall.m,
+            "lines": _lines(self.found.overall)["lines"],
+            "places": places,
+            "parameters": [_plain_change(c) for c in self.changes.parameters],
+            "margins": [_plain_change(c) for c in self.changes.margins],
+            "warnings": list(self.found.warnings),
+            "sentences": [finding.text for finding in self.sentences],
+        }
+
+    def document(self, made: datetime) -> Document:
+        """The report."""
+        one, other = self.found.runs
+        title = f"{one.path.resolve().name} and {other.path.resolve().name}"
+        rows = (
+            ("before", str(one.path)), ("after", str(other.path)),
+            ("before written", written(one.path / "run.json")), ("after written", written(other.path / "run.json")),
+            ("responses", " and ".join(f"{a.count:,}" for a in self.found.averages)),
+            ("compared at", _span(self.found)), ("report made", f"{made.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
+        )  # fmt: skip
+        sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
+        there = tuple(section for section in sections if section is not None)
+        return Document(
+            "Before and after", title, rows, self.sentences, there, f"{title} · livebode",
+            "What changed, and what did not", _TONES,
+        )  # fmt: skip
+
+    def _response(self) -> Section:
+        d = self.found.overall
+        how = "means over the common places, each place counted alike" if self.found.places else "means of the runs"
+        caption = (
+            f"Before and after: {how}, with 95 % bounds. Below: after over before, with the bound that holds with "
+        )
+        caption += f"95 % at all {d.m} lines together; full marks differ."
+        picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
+                                         "differs": d.differs}, caption)  # fmt: skip
+        radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
+        rows = [
+            (
+                f"{f:g}", *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],
+                *polar(complex(d.after.value[i]), float(radius[1][i]))[:2],
+                *polar(complex(d.ratio[i]), float(d.bound[i])), _p(d.p[i]), "yes" if d.differs[i] else "no",
+            )
+            for i, f in enumerate(d.before.lines.frequency_hz)
+        ]  # fmt: skip
+        step = -(-len(rows) // _LINES_SHOWN)
+        shown = [row for i, row in enumerate(rows) if i % step == 0 or d.differs[i]]
+        note = f"Every {step}. line, and those that differ. " if step > 1 else ""
+        headings = ("Hz", "before dB", "±", "after dB", "±", "ratio dB", "±", "ratio °", "±", "p", "differs")
+        table = Table(headings, tuple(shown), tuple(range(10)), note + "± of the ratio: 95 % at all lines together.")
+        return Section("Frequency response", (picture, Paragraph(_TEST.format(alpha=ALPHA / d.m, m=d.m)), table))
+
+    def _places(self) -> Section | None:
+        places = self.found.places
+        if not places:
+            return None
+        caption = (
+            "Change of the magnitude at each place and line, going forth and going back; dots mark those that differ."
+        )
+        data = {
+            "frequency_hz": self.found.overall.before.lines.frequency_hz,
+            "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
+        }
+        found = [
+            (
+                f"{p.low:.3g} … {p.high:.3g}", "back" if p.back else "forth", f"{f:g}",
+                *polar(complex(p.difference.ratio[i]), float(p.difference.bound[i])), _p(p.difference.p[i]),
+            )
+            for p in places
+            for i, f in enumerate(p.difference.before.lines.frequency_hz)
+            if p.difference.differs[i]
+        ]  # fmt: skip
+        parts: list[Part] = [Picture("places", data, caption)]
+        if found:
+            left_out = len(found) - _PLACES_SHOWN
+            note = f"{left_out} more left out; --json has all." if left_out > 0 else ""
+            headings = ("place", "way", "Hz", "ratio dB", "±", "ratio °", "±", "p")
+            parts.append(Table(headings, tuple(found[:_PLACES_SHOWN]), tuple(range(2, 8)), note))
+        return Section("Place by place", tuple(parts))
+
+    def _parameters(self) -> Section:
+        parts: list[Part] = []
+        for words, table in (
+            (self.changes.parameter_words, self.changes.parameters),
+            (self.changes.margin_words, self.changes.margins),
+        ):
+            parts += [Paragraph(words)] if words else []
+            if table:
+                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "sure")
+                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), _NOTE))
+        return Section("Parameters and margins", tuple(parts))
+
+    def _events(self) -> Section:
+        counts = [Counter(event.kind for event in run.each_event()) for run in self.found.runs]
+        kinds = sorted(counts[0].keys() | counts[1].keys())
+        rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
+        parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []
+        for run, when in zip(self.found.runs, ("Before", "After")):
+            message = run.summary.get("monitoring", {}).get("message", "nothing is said of changes.")
+            parts.append(Paragraph(f"{when}: {message}"))
+        return Section("Events", tuple(parts))
+
+
+_NOTE = "± of before and after holds 95 % each, ± of the change for the whole table together (Bonferroni)."
+
+
+def _settings(before: Run, after: Run) -> Section:
+    """What differs in the configurations."""
+    one, other = (set(_flat(said(run.summary))) for run in (before, after))
+    rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
+    if not rows:
+        return Section("Settings", (Paragraph("Both runs were made with the same settings."),))
+    return Section("Settings that differ", (Table(("setting", "before", "after"), rows),))
+
+
+def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
+    found = []
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found += _flat(value, f"{path}{name}.")
+        else:
+            found.append((path + name, to_toml({"x": value}).removeprefix("x = ")))
+    return found
+
+
+def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
+    return next((value for name, value in lines if (name,) == key), "—")
+
+
+def _row(c: Change) -> tuple[str, ...]:
+    changed = with_bound(c.amount, c.bound)
+    return (
+        _name(c), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed, f"{percent(c):+.2g}",
+        "yes" if c.significant else "no",
+    )  # fmt: skip
+
+
+def _name(c: Change) -> str:
+    return c.name.replace("_", " ")
+
+
+def _share(c: Change) -> str:
+    return f"{100 * c.bound / abs(c.before[0]):.2g}" if c.before[0] else "—"
+
+
+def _plain_change(c: Change) -> dict[str, Any]:
+    return {
+        "name": c.name, "unit": c.unit, "before": c.before[0], "before_bound_95": c.before[1], "after": c.after[0],
+        "after_bound_95": c.after[1], "change": c.amount, "change_bound": c.bound, "significant": c.significant,
+    }  # fmt: skip
+
+
+def _lines(d: Difference) -> dict[str, Any]:
+    f = d.before.lines.frequency_hz
+    lines = [
+        {
+            "frequency_hz": float(f[i]), "ratio_db": decibels(abs(d.ratio[i])),
+            "ratio_deg": float(np.degrees(np.angle(d.ratio[i]))), "ratio_bound": float(d.bound[i]),
+            "p": float(d.p[i]), "differs": bool(d.differs[i]),
+        }
+        for i in range(len(f))
+    ]  # fmt: skip
+    return {"lines": lines}
+
+
+def _p(p: float) -> str:
+    return f"{p:.2g}" if isfinite(p) else "—"
+
+
+def _signed(number: str) -> str:
+    return number if number.startswith(("-", "—")) else f"+{number}"
+
+
+def _hz(frequency_hz: np.ndarray) -> str:
+    shown = ", ".join(f"{f:g}" for f in frequency_hz[:12])
+    return f"{shown}{' …' if len(frequency_hz) > 12 else ''} Hz"
+
+
+def _span(of: Compared) -> str:
+    f = of.overall.before.lines.frequency_hz
+    where = f"; {many(len(of.places), 'place')} of the schedule, each way counted" if of.places else ""
+    return f"{many(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz{where}"

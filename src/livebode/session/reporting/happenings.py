@@ -1,0 +1,75 @@
+"""The events of a run, grouped by kind, however many there are."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from livebode.nouns import Event
+from livebode.nouns.document import Paragraph, Part, Table
+from livebode.session.reporting.wording import many, seconds
+
+ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
+"""Kinds that are told in full; so are those of the record itself."""
+_IN_FULL = 20  # of the first and of the newest
+_LETTERS = 600
+
+
+@dataclass
+class Kind:
+    """How often something happened, the first and the newest time."""
+
+    first: Event
+    newest: Event
+    count: int = 0
+
+
+@dataclass
+class Happenings:
+    """Events by kind, and those to tell in full: the first and the newest of them."""
+
+    kinds: dict[str, Kind] = field(default_factory=dict)
+    early: list[Event] = field(default_factory=list)
+    late: deque[Event] = field(default_factory=lambda: deque(maxlen=_IN_FULL))
+    told: int = 0
+
+    @classmethod
+    def of(cls, events: Iterable[Event]) -> Happenings:
+        found = cls()
+        for event in events:
+            found._add(event)
+        return found
+
+    def _add(self, event: Event) -> None:
+        kind = self.kinds.setdefault(event.kind, Kind(event, event))
+        kind.newest, kind.count = event, kind.count + 1
+        if event.kind not in ALARMS and not event.kind.startswith("record-"):
+            return
+        self.told += 1
+        (self.early if len(self.early) < _IN_FULL else self.late).append(event)
+
+    def count(self, kind: str) -> int:
+        """How often it happened."""
+        return self.kinds[kind].count if kind in self.kinds else 0
+
+    @property
+    def left_out(self) -> int:
+        """How many between the first and the newest are not kept."""
+        return self.told - len(self.early) - len(self.late)
+
+    def parts(self) -> tuple[Part, ...]:
+        """A table of the kinds, and the alarms in full."""
+        if not self.kinds:
+            return (Paragraph("Nothing happened: the run has no event."),)
+        rows = tuple(
+            (name, f"{k.count:,}", seconds(k.first.time_s), seconds(k.newest.time_s), k.newest.message[:_LETTERS])
+            for name, k in self.kinds.items()
+        )
+        grouped = Table(("kind", "count", "first", "newest", "what the newest says"), rows, (1,))
+        told = [*self.early, *self.late]
+        if not told:
+            return (grouped,)
+        note = f"{many(self.left_out, 'event')} between them left out; events.jsonl has all." if self.left_out else ""
+        in_full = tuple((seconds(e.time_s), e.kind, e.message[:_LETTERS]) for e in told)
+        return grouped, Table(("when", "kind", "message"), in_full, note=note)

@@ -1,0 +1,145 @@
+"""All that a report draws on, read from a run's directory once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from livebode.fitting import Fit
+from livebode.nouns import InputError, Responses
+from livebode.records import Run
+from livebode.session.averaged import Averaged, averaged
+from livebode.session.axis import FitSection, LoopSection
+from livebode.session.fits import fit_averaged
+from livebode.session.loop_report import LoopReport, loop_report
+from livebode.session.reporting.happenings import Happenings
+from livebode.session.reporting.parameter_track import Track, tracks
+from livebode.session.said import said
+
+if TYPE_CHECKING:
+    from livebode.validation import Validation
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What fresh data said of the run's model: the recording's name, the verdicts, and what else is to be said."""
+
+    on: str
+    found: tuple[Validation, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A run as a report needs it.
+
+    Attributes
+    ----------
+    run, configuration
+        The run, and what it was asked to do.
+    of
+        What it averages to.
+    fit, fit_words
+        The model fitted to that, or None, and to what or why not.
+    loop, loop_words
+        Margins of the described loop, or None, and why not.
+    tracks
+        Parameters and margins over the run, by model.
+    happenings
+        Its events.
+    judged
+        The validation, where one was asked for.
+    """
+
+    run: Run
+    configuration: dict[str, Any]
+    of: Averaged
+    fit: Fit | None
+    fit_words: str
+    loop: LoopReport | None
+    loop_words: str
+    tracks: dict[str, Track]
+    happenings: Happenings
+    judged: Judged | None = None
+
+    @property
+    def title(self) -> str:
+        """What was measured, as pictures call it."""
+        source = self.configuration.get("source", {})
+        name = Path(source["log"]).name if "log" in source else source.get("url", "")
+        if "demo" in self.configuration:
+            name = "simulated belt axis"
+        return str(name or self.run.path.name)
+
+    @property
+    def described(self) -> bool:
+        """Whether the configuration says what feeds back."""
+        return any(name in self.configuration.get("loop", {}) for name in ("velocity", "position", "position_pd"))
+
+    @property
+    def samples(self) -> int:
+        """How many samples were tracked; of a run that is not finished, as far as its responses go."""
+        return int(self.run.summary.get("counts", {}).get("samples", self.of.response.sample + 1))
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Channel names by their role."""
+        return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
+
+
+def read(directory: Path, judged: Judged | None = None) -> Material:
+    """Read the run.
+
+    Raises
+    ------
+    InputError
+        If it is not a run, cannot be read, or has no valid response.
+    """
+    run = Run.open(directory)
+    configuration, of = said(run.summary), averaged(run)
+    fit, fit_words = _fit(configuration, of)
+    loop, loop_words = _loop(configuration, of, fit)
+    over = tracks(run, of.overview.sample, of.overview.time_s)
+    happenings = Happenings.of(run.each_event())
+    return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
+
+
+def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
+    if "fit" not in configuration:
+        return None, "No model was fitted: the run has no [fit]. `livebode fit RUN` fits one afterwards."
+    try:
+        found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
+    except InputError as error:
+        return None, f"No model was fitted: {error}."
+    return (found, words) if found.status == "ok" else (None, f"No model holds for {words}: {found.sentence}.")
+
+
+def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple[LoopReport | None, str]:
+    described = LoopSection.model_validate(configuration.get("loop", {})).build(of.overview.lines.rate_hz)
+    if described.feedback is None:
+        return None, "No margins: the run's configuration does not describe the loop ([loop])."
+    if fit is None:
+        return None, "No margins: they are read around a fitted model, and there is none."
+    section = FitSection.model_validate(configuration["fit"])
+    try:
+        found = loop_report(fit, "the mean", of.overview, described, section)
+    except InputError as error:
+        return None, f"No margins: {error}."
+    return replace(found, responses=Responses.of(of.response)), ""
+
+
+def written(path: Path) -> str:
+    """The date of a file, in UTC; nothing where it is not there."""
+    try:
+        return f"{datetime.fromtimestamp(path.stat().st_mtime, UTC):%Y-%m-%d %H:%M} UTC"
+    except OSError:
+        return ""
+
+
+def by_schedule(of: Averaged) -> bool:
+    """Whether the response can be drawn over the schedule."""
+    return of.moved and bool(np.isfinite(of.overview.schedule).any())

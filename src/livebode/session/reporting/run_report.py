@@ -1,0 +1,72 @@
+"""The report of a run."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from livebode.nouns.document import Document, Paragraph, Section
+from livebode.session.reporting import sections
+from livebode.session.reporting.material import Judged, Material, read, written
+from livebode.session.reporting.measured import how
+from livebode.session.reporting.verdict import verdict
+from livebode.session.reporting.wording import duration, seconds
+
+_SECTIONS = (
+    how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
+    sections.quality, sections.validation, sections.settings, sections.versions,
+)  # fmt: skip
+
+
+def run_report(directory: Path, judged: Judged | None = None, *, made: datetime) -> Document:
+    """What a run measured, how, and what it comes to.
+
+    The run is read once, in parts; curves are thinned to 2048 responses, tables and means are of all.
+
+    Parameters
+    ----------
+    directory
+        That a run left: in one piece or in segments, finished or not.
+    judged
+        What fresh data said of its model.
+    made
+        When the report is made, for the title block.
+
+    Raises
+    ------
+    InputError
+        If it is not a run, cannot be read, or has no valid response.
+    """
+    of = read(directory, judged)
+    found = [make(of) for make in _SECTIONS]
+    absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
+    there = [section for section in found if isinstance(section, Section)]
+    version = of.run.summary.get("versions", {}).get("livebode", "")
+    return Document(
+        kind="Report of a run",
+        title=of.title,
+        facts=facts(of, made),
+        verdict=verdict(of),
+        sections=(*there, Section("Not in this report", absent)) if absent else tuple(there),
+        foot=f"{of.title} · {of.run.path.resolve().name} · livebode {version}".strip(),
+    )
+
+
+def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
+    """The title block."""
+    source = of.configuration.get("source", {})
+    log, first_s, last_s = source.get("log"), *of.of.spans_s
+    begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
+    rows = (
+        ("machine", of.title),
+        ("sent by", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
+        ("run", of.run.path.resolve().name),
+        ("run's clock", f"{seconds(first_s)} … {seconds(last_s)}"),
+        ("begun", seconds(float(begun)) if begun is not None else ""),
+        ("duration", duration(of.samples / of.run.lines.rate_hz)),
+        ("recording's file", written(Path(log)) if log else ""),
+        ("run written", written(of.run.path / "run.json")),
+        ("report made", f"{made.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
+        ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
+    )
+    return tuple((name, value) for name, value in rows if value)

@@ -1,0 +1,142 @@
+"""Numbers, moments and settings as a reader of a report expects them."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import UTC, datetime
+from math import floor, isfinite, log10
+from typing import Any
+
+import numpy as np
+
+from livebode.nouns import Response
+from livebode.nouns.document import Table
+
+_CLOCK_FROM_S = 1e8  # seconds since 1970, rather than since the start
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+BOUND_95 = float(np.sqrt(np.log(20.0)))
+"""`Response.bound` of this holds with 95 %."""
+
+
+def many(number: int, noun: str) -> str:
+    """
+    >>> many(1, "gap"), many(1234, "response")
+    ('1 gap', '1,234 responses')
+    """
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
+def share(part: float, whole: float) -> str:
+    """
+    >>> share(1, 300), share(0, 3)
+    ('0.33 %', '0 %')
+    """
+    percent = 100 * part / whole if whole else 0.0
+    return f"{percent:.2g} %" if percent < 10 else f"{percent:.0f} %"
+
+
+def seconds(time_s: float) -> str:
+    """A moment of a run: seconds of its clock, or the date where its clock counts from 1970.
+
+    >>> seconds(12.345678), seconds(1.7e9), seconds(float("nan"))
+    ('12.35 s', '2023-11-14 22:13:20 UTC', '—')
+    """
+    if not isfinite(time_s):
+        return "—"
+    if _CLOCK_FROM_S < time_s < 1e11:
+        return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    return f"{time_s:.2f} s"
+
+
+def duration(of_s: float) -> str:
+    """
+    >>> duration(22.6), duration(7325)
+    ('22.6 s', '2 h 2 min 5 s')
+    """
+    if of_s < 120:
+        return f"{of_s:.3g} s"
+    minutes, rest = divmod(round(of_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min {rest} s" if hours else f"{minutes} min {rest} s"
+
+
+def with_bound(value: float, bound: float) -> tuple[str, str]:
+    """Value and bound with as many digits as the bound's second one.
+
+    >>> with_bound(501234.5, 1234.5), with_bound(0.0028, 1.2e-5), with_bound(3.0, float("nan"))
+    (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
+    """
+    if not isfinite(value):
+        return "—", "—"
+    if not isfinite(bound) or bound <= 0:
+        return f"{value:.5g}", "held" if bound == 0 else "not known"
+    digits = 1 - floor(log10(bound))
+    if abs(value) >= 1e7 or digits > 9:
+        return f"{value:.5g}", f"{bound:.2g}"
+    return f"{round(value, digits):.{max(digits, 0)}f}", f"{round(bound, digits):.{max(digits, 0)}f}"
+
+
+def decibels(size: float) -> float:
+    """20·log10, −inf of zero."""
+    return 20 * log10(size) if size > 0 else -float("inf")
+
+
+def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
+    """Magnitude in dB, its bound, degrees, their bound, of a value that is known within a circle.
+
+    The bound in dB is the wider side, towards zero; where zero is within, neither has one.
+    """
+    size = abs(value)
+    if not isfinite(size) or size == 0:
+        return "—", "—", "—", "—"
+    db, deg = f"{decibels(size):.2f}", f"{np.degrees(np.angle(value)):.2f}"
+    if not isfinite(radius):
+        return db, "not known", deg, "not known"
+    if radius >= size:
+        return db, "any", deg, "any"
+    return db, f"{-decibels(1 - radius / size):.2g}", deg, f"{np.degrees(np.arcsin(radius / size)):.2g}"
+
+
+def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:
+    """`polar` of each line with `Response.bound(c)`."""
+    return [polar(complex(v), float(r)) for v, r in zip(one.value, one.bound(c))]
+
+
+def pairs(rows: list[tuple[str, str]]) -> Table:
+    """Names and values, without those that have none."""
+    return Table(("", ""), tuple((name, value) for name, value in rows if value))
+
+
+def to_toml(values: dict[str, Any]) -> str:
+    """Plain data as TOML; what is None is left out.
+
+    >>> print(to_toml({"lines": {"window": 400, "frequencies": "20:140:20"}, "fit": None}))
+    [lines]
+    window = 400
+    frequencies = "20:140:20"
+    """
+    return "\n".join(_section(values, ())).strip("\n")
+
+
+def _section(values: dict[str, Any], path: tuple[str, ...]) -> list[str]:
+    inner = {name: value for name, value in values.items() if isinstance(value, dict)}
+    own = [f"{_key(n)} = {_value(v)}" for n, v in values.items() if n not in inner and v is not None]
+    # An empty section says that what it names is wanted; within another one it says nothing.
+    head = [f"\n[{'.'.join(map(_key, path))}]"] if path and (own or (not inner and len(path) == 1)) else []
+    return head + own + [line for name, value in inner.items() for line in _section(value, (*path, name))]
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_value(item) for item in value if item is not None)}]"
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for this one character that JSON leaves as it is.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return json.dumps(value)

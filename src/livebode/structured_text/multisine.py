@@ -1,0 +1,214 @@
+"""FB_Multisine: one exact period of an excitation, again and again, ramped in and out at the period's borders."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.nouns import InputError
+from livebode.structured_text.names import check_name
+from livebode.structured_text.text import array, comment, real, section
+
+PERIOD_MAX = 16384
+"""Longest period, samples: each is a line of text that the PLC's compiler reads."""
+RAMP_PERIODS_MAX = 1000
+_LOADED_AT_ONCE = 32  # samples a cycle while the table fills, so that the first cycle is as short as the others
+
+_BODY = """\
+IF loaded < {chunks} THEN
+    CASE loaded OF
+{table}
+    END_CASE
+    loaded := loaded + 1;
+END_IF
+
+IF index = 0 THEN
+    IF level > 0 THEN
+        rising := enable;
+    ELSE
+        allowed := w_max / {peak};
+        refused := enable AND NOT (ABS(scale) * {peak} <= w_max);
+        rising := enable AND NOT refused AND (loaded = {chunks});
+        IF rising THEN
+            applied := scale;
+            limited := FALSE;
+        END_IF
+    END_IF
+END_IF
+IF stop THEN
+    rising := FALSE;
+    level := 0;
+END_IF
+
+steady := rising AND (level = {ramp});
+IF steady THEN
+    w := table[index] * applied;
+ELSIF level > 0 THEN
+    w := table[index] * (applied * UDINT_TO_LREAL(level) / {ramp}.0);
+ELSE
+    w := 0.0;
+END_IF
+IF NOT (ABS(w) <= w_max) THEN
+    limited := TRUE;
+    IF NOT (w_max > 0.0) THEN
+        w := 0.0;
+    ELSIF w > 0.0 THEN
+        w := w_max;
+    ELSE
+        w := -w_max;
+    END_IF
+END_IF
+
+IF rising AND (level < {ramp}) THEN
+    level := level + 1;
+ELSIF NOT rising AND (level > 0) THEN
+    level := level - 1;
+END_IF
+sample := counted;
+counted := counted + 1;
+index := index + 1;
+IF index = {window} THEN
+    index := 0;
+END_IF
+"""
+
+
+def multisine(
+    period: ArrayLike,
+    *,
+    rate_hz: float,
+    limit: float,
+    name: str = "FB_Multisine",
+    ramp_periods: int = 1,
+    note: str = "",
+) -> str:
+    """Text of a function block that plays one period for ever, one sample each time it is called.
+
+    The period may be any (`livebode.excitation.multisine` makes one from lines, amplitudes and phases). The sample at
+    place n of every period has the same bits, and n counts calls since the program's start, also while the block is
+    silent: sample numbers that are multiples of the period are its borders. Between enable and the first border the
+    block waits; then it ramps linearly over `ramp_periods` periods, and out again from the border after enable ends.
+
+    Parameters
+    ----------
+    period
+        One period, shape (samples,), in the drive's unit.
+    rate_hz
+        Calls per second.
+    limit
+        What |w| never exceeds, unit of `period`: the block's input w_max where the program does not give another. A
+        scale that would break it is refused at the start; a w_max lowered later clamps, and `limited` says so.
+    name
+        Of the function block.
+    ramp_periods
+        Periods of a ramp.
+    note
+        Lines for the top of the file: the seed, who made it.
+
+    Raises
+    ------
+    InputError
+        If the period is not one of 2 to 16384 finite samples, is zero or exceeds the limit, or the name is none that
+        Structured Text takes.
+
+    Examples
+    --------
+    >>> print(multisine([0.0, 1.0, 0.0, -1.0], rate_hz=1000, limit=1.5).splitlines()[0])
+    // 4 samples at 1000 Hz are a period of 0.004 s; peak 1, crest factor 1.414
+    """
+    check_name(name, "function block")
+    samples = _checked(period)
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not above 0; give the calls per second")
+    if not 1 <= ramp_periods <= RAMP_PERIODS_MAX:
+        raise InputError(f"{ramp_periods=} is not between 1 and {RAMP_PERIODS_MAX} periods; 1 is enough for most axes")
+    peak = float(np.max(np.abs(samples)))
+    if not (np.isfinite(limit) and peak <= limit):
+        raise InputError(
+            f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}; scale it by at most {limit / peak:.4g}, "
+            "or raise the limit"
+            if limit > 0 and np.isfinite(limit)
+            else f"{limit=} is no finite number above 0; the peak is {peak:.6g}, take at least that"
+        )
+    chunks = [samples[i : i + _LOADED_AT_ONCE] for i in range(0, len(samples), _LOADED_AT_ONCE)]
+    return (
+        _heading(samples, rate_hz, note)
+        + f"FUNCTION_BLOCK {name}\n"
+        + _declarations(len(samples), limit)
+        + "\n"
+        + _BODY.format(
+            table="\n".join(_case(i, chunk) for i, chunk in enumerate(chunks)),
+            chunks=len(chunks),
+            peak=real(peak),
+            ramp=ramp_periods * len(samples),
+            window=len(samples),
+        )
+        + "END_FUNCTION_BLOCK\n"
+    )
+
+
+def _checked(period: ArrayLike) -> NDArray[np.float64]:
+    samples = np.asarray(period, dtype=np.float64)
+    if samples.ndim != 1 or not 2 <= len(samples) <= PERIOD_MAX:
+        raise InputError(
+            f"a period of shape {samples.shape} is not one of 2 to {PERIOD_MAX} samples; "
+            "give one period, at a lower rate or with lines further apart"
+        )
+    if not np.all(np.isfinite(samples)):
+        bad = int(np.flatnonzero(~np.isfinite(samples))[0])
+        raise InputError(f"sample {bad} of the period is {samples[bad]}; give finite numbers")
+    if not np.any(samples):
+        raise InputError("the period is zero everywhere; give an excitation")
+    return samples
+
+
+def _heading(samples: NDArray[np.float64], rate_hz: float, note: str) -> str:
+    peak = float(np.max(np.abs(samples)))
+    crest = 1 / float(np.sqrt(np.mean((samples / peak) ** 2)))
+    return comment(
+        f"{len(samples)} samples at {rate_hz:g} Hz are a period of {len(samples) / rate_hz:.6g} s; "
+        f"peak {peak:.6g}, crest factor {crest:.4g}\n{note}"
+    )
+
+
+def _declarations(window: int, limit: float) -> str:
+    return (
+        section(
+            "VAR_INPUT",
+            [
+                ("enable", "BOOL", "begin at the next border of a period; end at the next border after it falls"),
+                ("stop", "BOOL", "silent at once, without a ramp"),
+                ("scale", "LREAL := 1.0", "taken over where a ramp in begins"),
+                ("w_max", f"LREAL := {real(limit)}", "what the size of w never exceeds"),
+            ],
+        )
+        + section(
+            "VAR_OUTPUT",
+            [
+                ("w", "LREAL", "the excitation"),
+                ("sample", "ULINT", "number of this sample: calls before this one"),
+                ("steady", "BOOL", "w is exactly periodic: no ramp"),
+                ("refused", "BOOL", "this scale would break the limit; not begun"),
+                ("allowed", "LREAL", "the largest scale within the limit"),
+                ("limited", "BOOL", "w was clamped since the ramp in began"),
+            ],
+        )
+        + section(
+            "VAR",
+            [
+                ("table", array(window), "one period"),
+                ("loaded", "UDINT", "parts of the table that are there"),
+                ("index", "UDINT", "place in the period"),
+                ("level", "UDINT", "of the ramp, in samples"),
+                ("rising", "BOOL", "ramping in, or there"),
+                ("applied", "LREAL", "scale since the ramp in began"),
+                ("counted", "ULINT", "calls"),
+            ],
+        )
+    )
+
+
+def _case(number: int, chunk: NDArray[np.float64]) -> str:
+    first = number * _LOADED_AT_ONCE
+    stores = "\n".join(f"            table[{first + i}] := {real(value)};" for i, value in enumerate(chunk))
+    return f"        {number}:\n{stores}"

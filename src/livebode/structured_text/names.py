@@ -1,0 +1,98 @@
+"""Names that Structured Text takes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from livebode.nouns import InputError
+
+NAME_LENGTH_MAX = 32
+"""Characters that every controller tells apart."""
+
+_KEYWORDS = """
+abs abstract acos action adr and and_then any any_bit any_date any_derived any_elementary any_int any_magnitude any_num
+any_real any_string array as asin at atan atan2 begin bit bitadr body bool by byte cal calc calcn case char class concat
+configuration constant continue cos ctd ctu ctud date date_and_time delete dint div do dt dword else elsif end_action
+end_case end_class end_configuration end_for end_function end_function_block end_if end_implementation end_interface
+end_method end_namespace end_program end_property end_repeat end_resource end_step end_struct end_transition end_type
+end_union end_var end_while eq exit exp expt extends f_edge f_trig false final find for from function function_block ge
+get goto gt if implementation implements in indexof ini initial_step insert int interface internal interval jmp jmpc
+jmpcn ld ldate ldate_and_time ldn ldt le left len limit lint ln log lower_bound lreal lt ltime ltime_of_day ltod lword
+max method mid min mod move mul mux namespace ne non_retain not null of on or or_else override overlap package
+params parallel persistent pointer priority private program property protected public pvoid r_edge r_trig read_only
+read_write real ref ref_to reference repeat replace resource ret retain retc retcn return right rol ror rs sel
+semaphore set shl shr sin single sint sizeof sqrt sr st step string struct stn sub super tan task
+then this time time_of_day to tod tof ton tp transition true trunc type udint uint ulint union until usint using uxint
+var var_access var_config var_external var_global var_in_out var_inst var_input var_output var_stat var_temp
+varinfo wchar while with word wstring xint xor xsizeof xword
+__catch __endtry __finally __try __new __delete __queryinterface __querypointer __isvalidref
+"""
+KEYWORDS = frozenset(_KEYWORDS.split())
+"""Words of IEC 61131-3 and of TwinCAT 3 and CODESYS, types, operators, standard functions and blocks, lower case."""
+
+_NAME = re.compile(r"(?a:_?[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*)")
+_CONVERSION = re.compile(r"(?:[a-z]+_)?to_[a-z]+")
+
+
+def as_name(text: str, taken: Iterable[str] = ()) -> str:
+    """The nearest name to `text` that Structured Text takes, and that is none of `taken`.
+
+    >>> as_name("2nd motor [rad/s]"), as_name("limit"), as_name("u", taken=["U"])
+    ('x2nd_motor_rad_s', 'limit_1', 'u_1')
+    """
+    name = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", text)).strip("_") or "x"
+    name = f"x{name}" if name[0].isdigit() else name
+    names = {other.lower() for other in taken}
+    number, free = 0, name[:NAME_LENGTH_MAX].rstrip("_")
+    while _reserved(free) or free.lower() in names:
+        number += 1
+        free = f"{name[: NAME_LENGTH_MAX - 1 - len(str(number))].rstrip('_')}_{number}"
+    return free
+
+
+def check_name(name: str, what: str) -> None:
+    """That Structured Text takes `name`; `what` says in the message whose name it is.
+
+    Raises
+    ------
+    InputError
+        For a keyword, a character that is no ASCII letter, digit or underscore, a digit in front, two underscores in a
+        row or one at the end, or more than 32 characters; with the nearest name that would do.
+    """
+    if problem := _problem(name):
+        raise InputError(f"{what} {name!r} {problem} in Structured Text; {as_name(name)} would do")
+
+
+def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> None:
+    """The same for names that stand beside each other and beside `taken`, where case makes no difference."""
+    own = {name.lower() for name in taken}
+    before: dict[str, str] = {}
+    for name in names:
+        check_name(name, what)
+        low = name.lower()
+        if low in own or low in before:
+            other = f"the same as {before[low]!r}" if low in before else "a variable of the block itself"
+            raise InputError(
+                f"{what} {name!r} is {other} in Structured Text, which knows no case; "
+                f"{as_name(name, [*own, *names])} would do"
+            )
+        before[low] = name
+
+
+def _reserved(name: str) -> bool:
+    return name.lower() in KEYWORDS or _CONVERSION.fullmatch(name.lower()) is not None
+
+
+def _problem(name: str) -> str | None:
+    if _reserved(name):
+        return "is a keyword"
+    if not name.isascii() or not name.replace("_", "a").isalnum():
+        return "has a character that is not allowed"
+    if name[0].isdigit():
+        return "begins with a digit, which is not allowed"
+    if _NAME.fullmatch(name) is None:
+        return "has two underscores in a row, one at its end, or a digit behind one in front, which is not allowed"
+    if len(name) > NAME_LENGTH_MAX:
+        return f"has {len(name)} characters, more than {NAME_LENGTH_MAX},"
+    return None

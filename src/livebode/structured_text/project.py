@@ -1,0 +1,116 @@
+"""All files of a PLC project: excitation, sliding DFT, ring, and the program that wires them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from livebode.nouns import InputError, Lines
+from livebode.structured_text.multisine import multisine
+from livebode.structured_text.names import check_names
+from livebode.structured_text.ring import LENGTH, ring_block, ring_type
+from livebode.structured_text.sliding_dft import sliding_dft
+from livebode.structured_text.text import comment, section
+
+_OWN = ("livebode", "fbMultisine", "fbSlidingDft", "fbRing", "enable", "stop", "scale")
+
+
+@dataclass(frozen=True)
+class Project:
+    """What a PLC that excites an axis, follows it and hands its samples to livebode is made of.
+
+    Parameters
+    ----------
+    period
+        One period of the excitation, shape (samples,).
+    limit
+        What the size of the excitation never exceeds.
+    lines
+        Bins and window of the sliding DFT, and the rate of the task.
+    channels
+        Names of the recorded signals, in the ring's order.
+    excitation
+        Which of them the block makes; the program takes the others from the drive.
+    tracked
+        Those that the sliding DFT follows.
+    ring_length
+        Samples that the ring keeps.
+    counter
+        Name of one more channel: the excitation's sample counter, whose multiples of the window are borders of periods.
+    note
+        Lines for the top of the excitation's file.
+    """
+
+    period: ArrayLike
+    limit: float
+    lines: Lines
+    channels: Sequence[str]
+    excitation: str
+    tracked: Sequence[str]
+    ring_length: int = LENGTH
+    counter: str = "sample"
+    note: str = ""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The ring's columns: the channels, and the counter behind them unless it is one of them."""
+        return (*self.channels, *([] if self.counter in self.channels else [self.counter]))
+
+    def files(self) -> dict[str, str]:
+        """Text of each file by its name.
+
+        Raises
+        ------
+        InputError
+            As `multisine`, `sliding_dft`, `ring_type` and `ring_block` do; or where the excitation or a tracked signal
+            is no channel.
+        """
+        for name in (self.excitation, *self.tracked):
+            if name not in self.channels:
+                raise InputError(f"there is no channel {name!r}; known here: {', '.join(self.channels)}")
+        check_names(self.columns, "channel", _OWN)
+        rate_hz = self.lines.rate_hz
+        return {
+            "FB_Multisine.st": multisine(self.period, rate_hz=rate_hz, limit=self.limit, note=self.note),
+            "FB_SlidingDft.st": sliding_dft(self.lines, self.tracked),
+            "ST_LivebodeRing.st": ring_type(len(self.columns), rate_hz, length=self.ring_length),
+            "FB_LivebodeRing.st": ring_block(self.columns, length=self.ring_length),
+            "MAIN.st": self._program(),
+        }
+
+    def _program(self) -> str:
+        made = {self.excitation: "the excitation", self.counter: "its sample counter"}
+        wired = "\n".join(f"// {name} := ...;" for name in self.columns if name not in made)
+        return (
+            comment(f"The task that controls the drive calls this once a cycle, at {self.lines.rate_hz:g} Hz.")
+            + "PROGRAM MAIN\n"
+            + section(
+                "VAR",
+                [
+                    ("livebode", "ST_LivebodeRing", "what livebode reads"),
+                    ("fbMultisine", "FB_Multisine", ""),
+                    ("fbSlidingDft", "FB_SlidingDft", ""),
+                    ("fbRing", "FB_LivebodeRing", ""),
+                    ("enable", "BOOL", "excite"),
+                    ("stop", "BOOL", "silence at once: wire the drive's fault to it"),
+                    ("scale", "LREAL := 1.0", "of the excitation"),
+                    *((name, "LREAL", made.get(name, "")) for name in self.columns),
+                ],
+            )
+            + f"\n// 1. From the drive, of this cycle:\n{wired}\n\n"
+            + "// 2. The excitation\n"
+            + "fbMultisine(enable := enable, stop := stop, scale := scale);\n"
+            + f"{self.excitation} := fbMultisine.w;\n"
+            + f"{self.counter} := ULINT_TO_LREAL(fbMultisine.sample);\n\n"
+            + f"// 3. To the drive: add {self.excitation} to the torque reference\n\n"
+            + "// 4. Spectra in fbSlidingDft.re and .im, [channel, bin]; samples to livebode\n"
+            + f"fbSlidingDft({_arguments(self.tracked)});\n"
+            + f"fbRing(ring := livebode, stamp := F_GetSystemTime(), {_arguments(self.columns)});\n"
+            + "END_PROGRAM\n"
+        )
+
+
+def _arguments(names: Sequence[str]) -> str:
+    return ", ".join(f"{name} := {name}" for name in names)

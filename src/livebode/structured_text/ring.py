@@ -1,0 +1,128 @@
+"""The ring buffer that livebode's ADS source reads: its type, and the block that fills it (docs/live.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from livebode.nouns import InputError
+from livebode.structured_text.names import check_name, check_names
+from livebode.structured_text.text import array, check_bytes, comment, real, section
+
+LENGTH = 8192
+CHANNELS_MAX = 64
+_HEADER_BYTES = 40
+_OWN = ("stamp", "ring", "slot", "started")
+
+_BODY = """\
+IF NOT started THEN
+    IF stamp > 0 THEN
+        ring.epoch := ULINT_TO_UDINT((stamp / 10000) MOD ULINT#4294967295) + 1;
+    END_IF
+    started := TRUE;
+END_IF
+slot := ULINT_TO_UDINT(ring.count MOD {length});
+{stores}
+ring.stamp := stamp;
+ring.count := ring.count + 1;   // only now the sample counts
+"""
+
+
+def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str = "ST_LivebodeRing") -> str:
+    """Text of the structure that livebode finds by its symbol and reads in batches.
+
+    Every member lies at a multiple of its size and no gap is left, so that all ways of packing give the same bytes.
+
+    Parameters
+    ----------
+    channels
+        How many, 1 to 64.
+    rate_hz
+        Calls of the block per second.
+    length
+        Samples that the ring keeps: livebode must come by once in that time.
+    name
+        Of the type.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range, the ring needs more than 8 MiB, or the name is none that Structured Text takes.
+    """
+    check_name(name, "type")
+    _check_size(channels, length)
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not above 0; give the samples per second")
+    members = [
+        ("magic", "UDINT := 16#474E524C", "byte 0"),
+        ("version", "UINT := 1", "4"),
+        ("channels", f"UINT := {channels}", "6"),
+        ("length", f"UDINT := {length}", "8, samples in the ring"),
+        ("epoch", "UDINT", "12, another one at each start; 0 for none"),
+        ("rate_hz", f"LREAL := {real(rate_hz)}", "16"),
+        ("stamp", "ULINT", "24, of the last sample: 100 ns since 1601 UTC; 0 without"),
+        ("count", "ULINT", "32, samples written; last of all"),
+        ("data", array(length, channels), "40"),
+    ]
+    declared = section("STRUCT", members).replace("END_VAR", "END_STRUCT")
+    return (
+        comment(f"What livebode reads: {length} samples of {channels} channels, {length / rate_hz:.4g} s")
+        + f"TYPE {name} :\n{declared}END_TYPE\n"
+    )
+
+
+def ring_block(
+    channels: Sequence[str],
+    *,
+    length: int = LENGTH,
+    name: str = "FB_LivebodeRing",
+    type_name: str = "ST_LivebodeRing",
+) -> str:
+    """Text of the function block that writes a sample of each channel into the ring each time it is called.
+
+    Its epoch, by which livebode tells a restart, comes from the clock at the first call; without a clock (stamp 0) a
+    restart is told by sample numbers that go back.
+
+    Parameters
+    ----------
+    channels
+        Names of the inputs in the order of the ring's columns: at most 64 that Structured Text takes.
+    length
+        As of the type.
+    name, type_name
+        Of the function block, and of the ring's type.
+
+    Raises
+    ------
+    InputError
+        If a name is none that Structured Text takes, or the ring is too large.
+    """
+    check_name(name, "function block")
+    check_name(type_name, "type")
+    _check_size(len(channels), length)
+    check_names(channels, "channel", _OWN)
+    return (
+        comment(f"A sample of each channel into the ring, once a cycle: {', '.join(channels)}")
+        + f"FUNCTION_BLOCK {name}\n"
+        + section(
+            "VAR_INPUT",
+            [*((channel, "LREAL", "") for channel in channels), ("stamp", "ULINT", "100 ns since 1601 UTC; 0 without")],
+        )
+        + section("VAR_IN_OUT", [("ring", type_name, "")])
+        + section("VAR", [("slot", "UDINT", ""), ("started", "BOOL", "")])
+        + "\n"
+        + _BODY.format(
+            length=length,
+            stores="\n".join(f"ring.data[slot, {i}] := {channel};" for i, channel in enumerate(channels)),
+        )
+        + "END_FUNCTION_BLOCK\n"
+    )
+
+
+def _check_size(channels: int, length: int) -> None:
+    if not 1 <= channels <= CHANNELS_MAX:
+        raise InputError(f"a ring of {channels} channels is not one of 1 to {CHANNELS_MAX}; take a ring for each few")
+    if length < 2:
+        raise InputError(f"a ring of {length=} samples is too short; take at least 2, better {LENGTH}")
+    check_bytes(_HEADER_BYTES, 8 * channels, length, f"a ring of {channels} channels")

@@ -1,0 +1,58 @@
+"""Pieces of Structured Text: numbers, comments, declarations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from livebode.nouns import InputError
+
+BYTES_MAX = 8 << 20
+"""Most memory of one block or ring: what livebode reads from a PLC, and more than most PLCs leave free."""
+
+
+Declared = tuple[str, str, str]
+"""A variable, or several with commas between: name, type with its initial value, comment."""
+
+
+def real(value: float) -> str:
+    """The number as an LREAL literal, whose digits lead back to the same bits.
+
+    >>> real(0.1), real(1e-17), real(-3)
+    ('0.1', '1.0E-17', '-3.0')
+    """
+    digits, _, exponent = repr(float(value)).partition("e")
+    return (digits if "." in digits else f"{digits}.0") + (f"E{int(exponent)}" if exponent else "")
+
+
+def comment(text: str) -> str:
+    """Lines of `//` in ASCII, for not every programming system knows other letters; nothing for no text."""
+    lines = text.encode("ascii", "replace").decode().splitlines()
+    return "".join(f"// {''.join(c if c.isprintable() else ' ' for c in line)}".rstrip() + "\n" for line in lines)
+
+
+def section(kind: str, declared: Iterable[Declared]) -> str:
+    """VAR_... to END_VAR, aligned."""
+    rows = list(declared)
+    width = min(max(len(name) for name, _, _ in rows), 14)
+    types = max(len(of) for _, of, _ in rows) + 1
+    lines = [f"    {name:<{width}} : {f'{of};':<{types}}  // {said}".rstrip(" /") for name, of, said in rows]
+    return "\n".join([kind, *lines, "END_VAR", ""])
+
+
+def array(*lengths: int, of: str = "LREAL") -> str:
+    """The type of an array that counts from 0.
+
+    >>> array(2, 7)
+    'ARRAY [0..1, 0..6] OF LREAL'
+    """
+    return f"ARRAY [{', '.join(f'0..{length - 1}' for length in lengths)}] OF {of}"
+
+
+def check_bytes(fixed: int, each: int, count: int, what: str) -> None:
+    """InputError where `fixed` + `each`·`count` bytes are more than a PLC has; `what` names that which is counted."""
+    needed = fixed + each * count
+    if needed > BYTES_MAX:
+        raise InputError(
+            f"{what} of {count} samples takes {needed} bytes of the PLC, more than {BYTES_MAX}; "
+            f"take at most {(BYTES_MAX - fixed) // each} samples"
+        )

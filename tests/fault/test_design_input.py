@@ -1,0 +1,326 @@
+"""What cannot be designed is refused in one sentence with the value and the nearest choice that can."""
+
+import json
+import re
+import subprocess
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from livebode.design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
+from livebode.design.files.c_names import KEYWORDS, identifier
+from livebode.excitation import chirp, low_crest_phases, odd_lines, prbs, quantised, stepped_sine
+from livebode.nouns import GridError, InputError, Lines
+from livebode.session.experiment import Experiment
+from livebode.simulation import BeltAxis, Sensor, Strokes
+from tests.command import livebode
+
+FILES = 40
+MACHINE = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.05)))
+MOVING = belt_machine(BeltAxis(motion=Strokes()))
+LINES = Lines.parse("20:140:20", 4000, 400)
+PLAIN = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
+
+
+def refused(make, kind=InputError):
+    with pytest.raises(kind) as caught:
+        make()
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    return sentence
+
+
+def sentence_of(make):
+    """The refusal, or None where there is none."""
+    try:
+        make()
+    except InputError as error:
+        return str(error)
+    return None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    amplitude=st.floats(1e-3, 1e3),
+    torque=st.floats(1.7, 50),
+    speed=st.floats(0.45, 5),
+    error_m=st.floats(0.013, 0.1),
+    moves=st.booleans(),
+)
+def test_the_largest_amplitude_that_a_refusal_names_passes_and_a_little_more_does_not(
+    amplitude, torque, speed, error_m, moves
+):
+    limits = Bearable(torque_n_m_max=torque, speed_m_per_s_max=speed, following_error_m_max=error_m)
+    machine = MOVING if moves else MACHINE
+
+    def design(size):
+        return choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=size), machine, limits)
+
+    sentence = sentence_of(lambda: design(amplitude))
+    if sentence is not None:
+        largest = float(re.search(r"largest amplitude that passes is (\S+) N m", sentence).group(1))
+        assert largest < amplitude
+        assert f"{amplitude:.4g} N m" in sentence
+        design(largest)
+        refused(lambda: design(largest * 1.01))
+
+
+def test_a_motion_that_leaves_no_room_is_named_and_not_the_excitation():
+    sentence = refused(lambda: choose(PLAIN, MOVING, Bearable(torque_n_m_max=0.5)))
+    assert "the motion alone" in sentence
+    assert "0.5 N m" in sentence
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    low=st.floats(0.1, 5000),
+    width=st.floats(0, 5000),
+    kind=st.sampled_from(["multisine", "odd", "prbs", "chirp", "stepped"]),
+)
+def test_a_band_that_does_not_end_below_the_nyquist_frequency_is_refused(low, width, kind):
+    assume(low + width >= 2000)
+    wish = Wish(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0, periods=1)
+    sentence = refused(lambda: choose(wish, MACHINE), GridError)
+    assert "Nyquist frequency 2000 Hz" in sentence
+    assert f"{low + width:g}" in sentence
+    assert "1800 Hz" in sentence
+
+
+@pytest.mark.parametrize("band", [(0.0, 100.0), (-5.0, 100.0), (100.0, 20.0), (float("nan"), 100.0)])
+def test_a_band_that_is_none_is_refused(band):
+    assert "the lower one first" in refused(lambda: choose(Wish(band_hz=band, resolution_hz=10), MACHINE), GridError)
+
+
+def test_lines_off_or_closer_than_the_grid_are_refused_with_the_nearest_choice():
+    off = refused(lambda: choose(Wish(lines="20, 25", window=400), MACHINE), GridError)
+    assert "nearest lines are 20 and 30 Hz" in off
+    assert "320 or 480 samples would fit" in off or "samples would fit" in off
+    fine = refused(lambda: choose(Wish(band_hz=(20, 21), resolution_hz=1e-5), MACHINE), GridError)
+    finest = float(re.search(r"the finest at 4000 Hz is (\S+) Hz", fine).group(1))
+    assert finest == pytest.approx(2 * 4000 / 2**24, rel=1e-2)
+    coarse = refused(lambda: choose(Wish(band_hz=(20, 1999), resolution_hz=3000), MACHINE), GridError)
+    assert "the coarsest is 1600 Hz" in coarse
+    between = refused(lambda: choose(Wish(band_hz=(21, 39), resolution_hz=20), MACHINE), GridError)
+    assert "nearest are 20 and 40 Hz" in between
+    twice = refused(lambda: choose(Wish(lines="20, 20", window=400), MACHINE), GridError)
+    assert "more than once" in twice
+
+
+def test_typed_lines_that_no_window_fits_are_refused():
+    wild = "20.0001234567, 31.41592653589"
+    assert "grid" in refused(lambda: choose(Wish(lines=wild, amplitude_n_m=1.0), MACHINE), GridError)
+
+
+@settings(deadline=None, max_examples=40)
+@given(order=st.one_of(st.integers(-5, 1), st.integers(21, 99), st.floats(0, 30), st.booleans()))
+def test_a_prbs_order_out_of_range_is_refused_with_the_nearest(order):
+    sentence = refused(lambda: prbs(order))
+    assert repr(order) in sentence
+    nearest = int(re.search(r"the nearest is (\d+)", sentence).group(1))
+    assert len(prbs(nearest)) == 2**nearest - 1
+    assert nearest == min(range(2, 21), key=lambda n: (abs(n - int(order)), n))
+
+
+def test_lines_too_close_for_any_prbs_are_refused():
+    sentence = refused(lambda: choose(Wish(kind="prbs", band_hz=(20, 140), resolution_hz=1e-4), MACHINE), GridError)
+    assert "the highest is 20" in sentence
+
+
+@settings(max_examples=60, deadline=None)
+@given(peak=st.floats(1e-9, 10), times=st.floats(2.001, 1e6))
+def test_an_amplitude_that_quantises_to_zero_is_refused_and_the_named_step_leaves_it(peak, times):
+    period = np.array([0.0, peak, -peak / 2])
+    sentence = refused(lambda: quantised(period, peak * times))
+    largest = float(re.search(r"take steps below (\S+)$", sentence).group(1))
+    assert np.any(quantised(period, 0.999 * largest))
+
+
+def test_an_experiment_that_the_drive_cannot_resolve_is_refused():
+    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1e-4, resolution_n_m=0.1)
+    assert "nothing in steps of 0.1" in refused(lambda: choose(wish, MACHINE))
+
+
+def test_a_crest_factor_that_is_not_reached_is_refused_with_the_one_that_is():
+    wish = {"lines": "20:140:20", "window": 400, "amplitude_n_m": 1.0}
+    sentence = refused(lambda: choose(Wish(**wish, crest_factor_max=1.2), MACHINE))
+    assert "1.2 is not reached" in sentence
+    reached = float(re.search(r"ask for (\S+),", sentence).group(1))
+    assert choose(Wish(**wish, crest_factor_max=reached), MACHINE).waveform.crest_factor <= reached
+    other = refused(lambda: choose(Wish(**wish, phases="schroeder", crest_factor_max=1.5), MACHINE))
+    assert "phases = 'low crest'" in other
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.one_of(
+        st.text(max_size=80),
+        st.sampled_from(sorted(KEYWORDS["C"])),
+        st.from_regex(r"[0-9_]*[a-z_-]{0,70}", fullmatch=True),
+    )
+)
+def test_a_name_that_c_forbids_is_refused_with_one_that_it_takes(name):
+    sentence = sentence_of(lambda: identifier(name))
+    if sentence is None:
+        assert identifier(name) == name
+        return
+    assert repr(name) in sentence
+    nearest = re.search(r"take for example '([^']*)'$", sentence).group(1)
+    assert identifier(nearest) == nearest
+    assert nearest not in KEYWORDS["C"]
+
+
+def test_names_that_pass_compile(tmp_path):
+    waveform = Waveform(LINES, np.sin(2 * np.pi * np.outer(np.arange(400), LINES.bins) / 400).sum(axis=1))
+    for name in ("w", "Belt_2_axis", "int_w", "x" * 60):
+        write(tmp_path / "a.h", waveform, name)
+        (tmp_path / "a.c").write_text('#include "a.h"\nint main(void) { return 0; }\n')
+        subprocess.run(["gcc", "-std=c99", "-Wall", "-Werror", "-c", "a.c"], cwd=tmp_path, check=True)
+    for name in ("int", "2w", "w w", "", "_w"):
+        refused(lambda name=name: write(tmp_path / "b.h", waveform, name))
+        assert not (tmp_path / "b.h").exists()
+    assert "suffix" in refused(lambda: write(tmp_path / "a.xyz", waveform))
+
+
+WRONG = [
+    ({"kind": "multisin"}, "should be 'multisine', 'odd'"),
+    ({"bands_hz": [20, 140]}, "did you mean 'band_hz'?"),
+    ({"accuracy": -1}, "accuracy=-1"),
+    ({"accuracy": "good"}, "should be a valid number"),
+    ({"seed": 1.5}, "should be a valid integer"),
+    ({"seed": -1}, "seed=-1"),
+    ({"amplitude_n_m": 0}, "amplitude_n_m=0"),
+    ({"amplitude_n_m": [1, 2]}, "2 amplitudes for 7 lines"),
+    ({"amplitude_n_m": [1, 1, 1, 0, 1, 1, 1]}, "no power at 80 Hz"),
+    ({"window": 0}, "window=0"),
+    ({"window": 2}, "window=2"),
+    ({"kind": "chirp", "lines": "20:140:20"}, "has lines of its own"),
+    ({"shape": "equal snr", "kind": "prbs"}, "cannot be shaped"),
+    ({"resolution_n_m": float("inf")}, "resolution_n_m=inf"),
+]
+
+
+@pytest.mark.parametrize(("excitation", "words"), WRONG)
+def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
+    data = {"band_hz": [20, 140], "resolution_hz": 20, "phases": "schroeder"} | excitation
+    if "lines" in excitation:
+        del data["band_hz"]
+    asked = Experiment.of({"excitation": data, "belt": {}}, "here")
+    assert words in refused(lambda: choose(asked.wish(), MACHINE))
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"excitation": {}}, "either a [belt]"),
+        ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}, "belt": {"mechanic": {}}}, "did you mean 'mechanics'?"),
+        ({"excitation": {}, "belt": {"mechanics": {"load": 3}}}, "did you mean 'load_kg'?"),
+        ({"excitation": {}, "belt": {"mechanics": {"load_kg": "much"}}}, "should be a valid number"),
+        ({"excitation": {}, "belt": {"mechanics": {"load_kg": -1.0}}}, "load_kg=-1.0"),
+        ({"excitation": {}, "belt": {"strokes": {}, "standstill": {}}}, "exclude each other"),
+        ({"excitation": {}, "belt": {}, "limit": {}}, "did you mean 'limits'?"),
+        ({"excitation": {}, "belt": {}, "limits": {"torque_n_m_max": 0}}, "not above 0"),
+        ({"excitation": {}, "belt": {}, "signals": {"exitation": "w"}}, "did you mean 'excitation'?"),
+        ({"excitation": {}, "measured": {"run": "nowhere"}}, "not the directory of a run"),
+    ],
+)
+def test_a_machine_that_makes_no_sense_is_refused(data, words):
+    def read():
+        asked = Experiment.of(data, "here")
+        asked.machine(), asked.bearable(), asked.signal_names()
+
+    assert words in refused(read)
+
+
+def test_nothing_known_but_the_lines_is_refused():
+    silent = belt_machine(BeltAxis())
+    wish = Wish(lines="20:140:20", window=400, phases="schroeder")
+    assert "give one of the three" in refused(lambda: choose(wish, silent))
+    chosen = choose(wish, silent, Bearable(torque_n_m_max=10))
+    assert 0.5 < max(-p.low for p in chosen.peaks if p.quantity == "torque") < 1.1
+    assert "feedback is not known" in refused(lambda: measured_machine(1.0, type(silent.loop)(), 4000.0))
+
+
+def test_small_settings_of_the_excitations_are_checked():
+    assert "starts=0" in refused(lambda: low_crest_phases([1, 2], starts=0))
+    assert "2 lines" in refused(lambda: low_crest_phases([1, 2], [1.0]))
+    assert "held_ticks=0" in refused(lambda: prbs(3, held_ticks=0))
+    assert "periods=0" in refused(lambda: stepped_sine(LINES, periods=0))
+    assert "longest window" in refused(lambda: stepped_sine(LINES, periods=10**6))
+    assert "sweep='up'" in refused(lambda: chirp(20, 140, 4000, 400, sweep="up"))
+    assert "not wider than two bins" in refused(lambda: chirp(20, 25, 4000, 400))
+    narrow = refused(lambda: odd_lines(20, 60, 4000, 400))
+    needed = int(re.search(r"take a window of (\d+) samples", narrow).group(1))
+    assert len(odd_lines(20, 60, 4000, needed)) >= 3
+
+
+@pytest.fixture
+def experiment(tmp_path):
+    path = tmp_path / "experiment.toml"
+    path.write_text(
+        '[excitation]\nlines = "20:140:20"\nwindow = 400\nphases = "schroeder"\namplitude_n_m = 1.0\n[belt]\n'
+    )
+    return path
+
+
+def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
+    out = tmp_path / "design"
+    for options, words in (
+        (["--amplitude", "-1"], "amplitude_n_m=-1"),
+        (["--band", "20-140"], "--band '20-140'"),
+        (["--to", "xlsx"], "'.xlsx' is not known"),
+        (["--name", "int"], "keyword of C"),
+        (["--name", "a,b", "--to", "csv"], "cannot head a column"),
+    ):
+        done = livebode("design", experiment, "--out", out, *options)
+        assert done.code == 2, done.err
+        assert words in done.err
+        assert done.err.count("\n") == 1
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["experiment.toml"]
+    assert livebode("design", tmp_path / "none.toml").code == 2
+    broken = tmp_path / "broken.toml"
+    broken.write_text("excitation = [")
+    assert "is not TOML" in livebode("design", broken).err
+
+
+def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experiment, tmp_path):
+    out = tmp_path / "design"
+    assert livebode("design", experiment, "--out", out).code == 0
+    assert "--force" in livebode("design", experiment, "--out", out).err
+    assert livebode("design", experiment, "--out", out, "--amplitude", "0.5", "--force").code == 0
+    assert json.loads((out / "design.json").read_text())["excitation"]["amplitude_n_m"] == 0.5
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "thesis.txt").write_text("years")
+    assert "not what an earlier design left" in livebode("design", experiment, "--out", mine, "--force").err
+    assert (mine / "thesis.txt").read_text() == "years"
+
+
+def test_a_disk_that_refuses_leaves_nothing(experiment, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    done = livebode("design", experiment, "--out", blocked / "design")
+    assert done.code == 2
+    assert "could not be written" in done.err
+
+
+@settings(max_examples=FILES, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.dictionaries(
+        st.sampled_from(["band_hz", "resolution_hz", "window", "kind", "amplitude_n_m", "seed", "order", "periods"]),
+        st.one_of(st.integers(-3, 50), st.floats(allow_nan=True), st.text(max_size=5), st.booleans(),
+                  st.lists(st.integers(1, 300), max_size=3)),
+        max_size=5,
+    )
+)  # fmt: skip
+def test_anything_in_a_file_ends_in_a_design_or_a_sentence(excitation):
+    data = {"band_hz": [20, 140], "resolution_hz": 20, "phases": "schroeder"} | excitation
+
+    def design():
+        asked = Experiment.of({"excitation": data, "belt": {}}, "here")
+        choose(asked.wish(), MACHINE, asked.bearable())
+
+    sentence = sentence_of(design)
+    assert sentence is None or "\n" not in sentence
