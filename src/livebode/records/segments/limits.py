@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
+JOURNALS = 3
+"""What may stand beside closed segments, each a journal's size: the one that is turned, what becomes of it, the next."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """How a record is cut.
@@ -30,5 +34,5 @@ class Limits:
 
     @property
     def journal_bytes_max(self) -> int:
-        """An eighth of the budget at most, so that a journal and its segment stand side by side within it."""
+        """An eighth of the budget at most, so that journals and what becomes of them stand side by side within it."""
         return self.journal_bytes if self.budget_bytes is None else min(self.journal_bytes, self.budget_bytes // 8)

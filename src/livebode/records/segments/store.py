@@ -14,10 +14,11 @@ import pyarrow as pa
 from livebode.nouns import Event, InputError
 from livebode.records.plain_json import to_json
 from livebode.records.segments import journal
+from livebode.records.segments.closing import Closing
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
-from livebode.records.segments.limits import Limits
+from livebode.records.segments.limits import JOURNALS, Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
@@ -132,6 +133,8 @@ class Store:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
             with contextlib.suppress(OSError):
                 self._close_segment()
+        elif self._closing.done:
+            self._closed()
         return True
 
     def finish(self, summary: dict[str, Any], *, finished: bool) -> None:
@@ -147,6 +150,8 @@ class Store:
             self._not_paused()
             self._sync()
             self._close_segment()
+            if (error := self._closed()) is not None:
+                raise error
             self.commit(self.last.sample, self.last.time_s, self.last.states)  # with what closing had to say
             self._not_paused()
             self._write_summary(summary, finished=finished)
@@ -181,6 +186,8 @@ class Store:
     def _open_files(self, found: Manifest, sealed: list[int], events_bytes: int) -> None:
         self._shelf = Shelf(self.path, self._tables, found, sealed)
         self._files.callback(self._shelf.close)
+        self._closing = Closing(self._shelf)
+        self._files.callback(self._closing.wait)
         self._events = AppendFile(self.path / EVENTS, events_bytes)
         self._files.callback(self._events.close)
 
@@ -201,20 +208,20 @@ class Store:
         self._waiting.safe()
 
     def _close_segment(self) -> None:
-        """Go on in a new journal, and turn the one before into segments."""
+        """Go on in a new journal, and begin to turn the one before into segments."""
         assert self.last is not None
+        self._closed()  # a journal that is full before the one before it is turned waits for that
         before, number = self._journal, self._number
         self._open_journal(number + 1, self.last)
         before.close()
         self._shelf.seal(number)
-        self._keep_budget()
-        self._shelf.close_journals()
+        budget = self.limits.budget_bytes
+        used = self._events.length + JOURNALS * self.limits.journal_bytes_max
+        self._closing.begin(None if budget is None else budget - used)
 
-    def _keep_budget(self) -> None:
-        if self.limits.budget_bytes is None:
-            return
-        room = self.limits.budget_bytes - self._events.length - 2 * self.limits.journal_bytes_max
-        gone = self._shelf.make_room(room)
+    def _closed(self) -> OSError | None:
+        """Wait until the journal before is turned, and say what was removed; what the disk said where it refused."""
+        gone, error = self._closing.result()
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
@@ -225,6 +232,7 @@ class Store:
                 f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
                 removed=[segment.name for segment in gone],
             )
+        return error
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
         self._journal.back_to(self._safe_bytes)
