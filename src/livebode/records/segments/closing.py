@@ -29,7 +29,7 @@ class Closing:
         return self._thread is not None and not self._thread.is_alive()
 
     def begin(self, bytes_max: int | None) -> None:
-        """Remove the oldest segments above `bytes_max`, then turn all sealed journals; `result` says what came of it."""
+        """Remove the oldest segments above `bytes_max`, then turn all sealed journals; see `result`."""
         assert self._thread is None
         self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
         self._thread.start()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-
 JOURNALS = 3
-"""What may stand beside closed segments, each a journal's size: the one that is turned, what becomes of it, the next."""
+"""What stands beside closed segments, each of a journal's size: one that is turned, what becomes of it, the next."""
 
 
 @dataclass(frozen=True)
