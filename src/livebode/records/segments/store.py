@@ -23,6 +23,7 @@ from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
 from livebode.records.segments.shelf import Shelf
+from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import Waiting
 from livebode.records.table import Table
 
@@ -64,6 +65,7 @@ class Store:
         self._log = EventLog()
         self._pause: Event | None = None
         self._committed_s = self._synced_s = 0.0
+        self._syncing = Syncing()
 
     def __enter__(self) -> Store:
         with _refusing(self.path, "cannot be recorded in"), contextlib.ExitStack() as files:
@@ -86,7 +88,7 @@ class Store:
             os.mkdir(self.path / journal.FOLDER)
             self._open_files(Manifest(), [], 0)
             self._open_journal(1, commit)
-            self._files.callback(lambda: self._journal.close())
+            self._files.callback(self._close_open_journal)
             self._write_summary(summary, finished=False)
             sync_directory(self.path.parent)
             self.last = commit
@@ -117,13 +119,17 @@ class Store:
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
         try:
+            self._settle(self._syncing.done())
             self._log.write(self._events)
             commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
-            self._waiting.written()
+            parts = self._waiting.written()
             full = self._full(sample)
-            if full or self._committed_s - self._synced_s >= self.limits.interval_s:
+            if full:
                 self._sync()
+            elif self._committed_s - self._synced_s >= self.limits.interval_s:
+                self._synced_s = self._committed_s
+                self._syncing.begin(self._journal, parts)
             self.last = commit
         except OSError as error:
             self._failed(error, sample, time_s)
@@ -170,7 +176,7 @@ class Store:
         self.last, self._number = found.commit, found.number
         self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
         self._journal = AppendFile(journal.path_of(self.path, found.number), found.length)
-        self._files.callback(lambda: self._journal.close())
+        self._files.callback(self._close_open_journal)
         self._safe_bytes = found.length
         self._began = self._committed = found.commit.sample
         away_s = max(0.0, time.time() - found.commit.unix_s)
@@ -203,9 +209,20 @@ class Store:
         self._began = self._committed = commit.sample
 
     def _sync(self) -> None:
-        self._journal.sync()
-        self._synced_s, self._safe_bytes = time.monotonic(), self._journal.length
-        self._waiting.safe()
+        """Wait until all that was written is safe."""
+        self._settle(self._syncing.done(wait=True))
+        self._syncing.begin(self._journal, self._waiting.written())
+        self._settle(self._syncing.done(wait=True))
+        self._synced_s = time.monotonic()
+
+    def _settle(self, safe: tuple[int, int] | None) -> None:
+        if safe is not None:
+            self._safe_bytes, parts = safe
+            self._waiting.safe(parts)
+
+    def _close_open_journal(self) -> None:
+        self._syncing.close()
+        self._journal.close()
 
     def _close_segment(self) -> None:
         """Go on in a new journal, and begin to turn the one before into segments."""
@@ -235,6 +252,8 @@ class Store:
         return error
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
+        with contextlib.suppress(OSError):  # what was being synced may be safe all the same
+            self._settle(self._syncing.done(wait=True))
         self._journal.back_to(self._safe_bytes)
         self._waiting.failed(self.limits.held_bytes)
         if self._pause is None:
