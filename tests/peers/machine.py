@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 
@@ -24,7 +25,10 @@ def data(samples: int) -> np.ndarray:
 
 
 class Machine(TcpPeer):
-    """Sends from the first connection on, `times` as fast as its samples would come, until it is left."""
+    """Sends from the first connection on, `times` as fast as its samples would come, until it is left.
+
+    What would have been sent while nobody is connected is lost.
+    """
 
     layout = encode_layout(CHANNELS, float(RATE_HZ), epoch=9)
 
@@ -58,9 +62,7 @@ class Machine(TcpPeer):
             due = int((time.monotonic() - began) * RATE_HZ * self._times)
             for start in range(self.sent, min(due, every.shape[1]) - BATCH, BATCH):
                 batch = Batch(start, every[:, start : start + BATCH].copy(), CHANNELS, float(RATE_HZ), 9)
-                try:
+                with contextlib.suppress(OSError):  # livebode has ended
                     self._link.sendall(encode_samples(batch, double=True))
-                except OSError:  # livebode has ended
-                    return
                 self.sent = start + BATCH
             time.sleep(0.005)
