@@ -49,8 +49,9 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
-fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
+fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources and the configuration
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
+	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments

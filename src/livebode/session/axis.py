@@ -11,10 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
 from livebode.session.toml_file import one_line, read_table, shortened
-from livebode.sources.live import SourceSettings
+from livebode.sources.live import SourceSettings, checked_address
 
 _SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
+_MAY_BE_SECRET = {"url", "username", "password_env", "password_file"}
 Ticks = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -207,6 +208,8 @@ class Axis(_Section):
             raise InputError(f"{origin}: {_sentence(error)}") from None
         if (axis.source.log is None) == (axis.source.url is None):
             raise InputError(f"{origin}: [source] needs either a log or a url; 'source.log' is a recording")
+        if axis.source.url is not None:
+            checked_address(axis.source.url, axis.source)
         return axis
 
     def beside(self, folder: Path) -> Axis:
@@ -228,7 +231,8 @@ def _sentence(error: ValidationError) -> str:
         return f"there is no setting {place!r}; {_nearest(first['loc'])}"
     if first["type"] == "missing":
         return f"{place!r} is missing; add it"
-    return f"{place} = {shortened(first['input'])} is not usable: {first['msg'].lower()}"
+    value = "what it holds" if _MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
+    return f"{place} = {value} is not usable: {first['msg'].lower()}"
 
 
 def _nearest(loc: tuple[int | str, ...]) -> str:

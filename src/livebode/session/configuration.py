@@ -72,7 +72,7 @@ def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]
         return {"": dict(data)}
     axes = data["axes"]
     if not isinstance(axes, dict) or not axes or not all(isinstance(axis, dict) for axis in axes.values()):
-        raise InputError(f"{origin}: axes = {shortened(axes)} is no table of axes; write [axes.NAME.source] and so on")
+        raise InputError(f"{origin}: 'axes' is no table of axes; write [axes.NAME.source] and so on")
     if len(axes) > AXES_MAX:
         raise InputError(f"{origin} has {len(axes)} axes, more than {AXES_MAX}; take several files")
     shared = {key: value for key, value in data.items() if key != "axes"}

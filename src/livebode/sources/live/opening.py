@@ -41,7 +41,13 @@ def make_source(settings: SourceSettings) -> LiveSource:
         if settings.log is None or not settings.follow:
             raise InputError("source names no machine; give url, such as udp://0.0.0.0:5000, or log with follow = true")
         return FollowSource(settings, Address("follow", path=str(settings.log)))
-    address = parse_address(settings.url)
-    check_keys(settings, address.scheme)
+    address = checked_address(settings.url, settings)
     kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
     return kind(settings, address)
+
+
+def checked_address(url: str, settings: SourceSettings) -> Address:
+    """The address in the url of these settings; InputError where it is none, or a key means nothing for its kind."""
+    address = parse_address(url)
+    check_keys(settings, address.scheme)
+    return address
