@@ -15,6 +15,7 @@ from livebode.nouns.errors import GridError, InputError
 # whole number of periods to a millionth, and the leakage is below every other error.
 _ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
+_DIGITS_MAX = 40
 WINDOW_MAX = 1 << 24
 """Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 
@@ -145,10 +146,18 @@ def check_window(window: int, rate_hz: float) -> None:
         raise InputError(f"{rate_hz=} is not a positive number of samples per second")
 
 
+def _number(text: str) -> Fraction:
+    """Exact; ValueError for what is no number, or one so large or small that it would take for ever."""
+    exponent = text.lower().partition("e")[2]
+    if len(text) > _DIGITS_MAX or abs(int(exponent or 0)) > _DIGITS_MAX:
+        raise ValueError(text)
+    return Fraction(text)
+
+
 def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Fraction]:
     unit = Fraction(rate_hz) / window if item.startswith("k=") else Fraction(1)
     try:
-        parts = [Fraction(part.strip()) for part in item.removeprefix("k=").split(":")]
+        parts = [_number(part.strip()) for part in item.removeprefix("k=").split(":")]
     except (ValueError, ZeroDivisionError):
         parts = []
     if len(parts) == 2 and item.startswith("k="):
