@@ -103,13 +103,13 @@ def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
     assert told["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
     assert "Learned from" in learned.out
     assert "in 1 cell of the schedule. No model" in learned.out
-    assert "Lines and fitted parameters are watched" in learned.out
-    _not_fitted(toml, base, tmp_path)
     live = told_live(toml, base, tmp_path / "live")
     changes_told = [event for event in events(changed_run) if str(event["kind"]).startswith("change")]
     assert [(e["kind"], e["sample"], e["message"]) for e in live] == [
         (e["kind"], e["sample"], e["message"]) for e in changes_told
     ]
+    assert "Lines and fitted parameters are watched" in learned.out
+    _not_fitted(toml, base, tmp_path)
 
 
 def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
