@@ -39,6 +39,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.fits
+	$(BIN)/python -m bench.live
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
 	$(BIN)/python -m studies.peers

@@ -21,7 +21,7 @@ from livebode.session.fits import chosen_model, fitter_of
 from livebode.session.plan import live_follower
 from livebode.session.toml_file import FILE_BYTES_MAX
 
-CASES = int(os.environ.get("LIVEBODE_CONFIGURATION_FUZZ", "2500"))
+CASES = int(os.environ.get("LIVEBODE_CONFIGURATION_FUZZ", "2000"))
 RSS_BYTES_MAX = 500 << 20
 RATE_HZ = 4000.0
 WHOLE = """

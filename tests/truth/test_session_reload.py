@@ -116,7 +116,7 @@ def test_what_cannot_be_applied_is_refused_once_and_nothing_stops(
 def test_axes_come_and_go(tmp_path: Path) -> None:
     with Machine(tmp_path) as a, Machine(tmp_path) as b:
         second = f"[axes.y]\n{source(b)}"
-        with Running(tmp_path, one(a)) as running:
+        with Running(tmp_path, one(a), "--force") as running:
             running.tracked("x", 300)
             running.edit(one(a) + second)
             running.tracked("y", 300)
@@ -124,13 +124,17 @@ def test_axes_come_and_go(tmp_path: Path) -> None:
             until(lambda: (running.out / "x" / "bode.png").exists(), "the end of x")
             at = numbers(running.out / "y").size
             running.tracked("y", at + 500)
+            left = numbers(running.out / "x")
+            running.edit(one(a) + second)
+            running.tracked("x", left.size + 300)
             code, out, err = running.end()
     assert code == 0, err
     found = json.loads(out)["axes"]
     assert found.keys() == {"x", "y"}
-    for name in "xy":
+    for name, gaps in (("x", 1), ("y", 0)):
         number = numbers(running.out / name)
-        assert np.array_equal(number, np.arange(number.size))
+        assert np.array_equal(number[: left.size], np.arange(left.size))
+        assert np.count_nonzero(np.diff(number) != 1) == gaps
         assert found[name]["counts"]["samples"] == number.size
 
 

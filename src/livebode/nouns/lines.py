@@ -164,8 +164,8 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
         parts.append(Fraction(1))
     if len(parts) not in (1, 3):
         raise InputError(
-            f"{item[:_SHOWN]!r} in lines {text[:_SHOWN]!r} cannot be read; write frequencies in Hz as 20:140:20 (start:stop:step, "
-            "inclusive) or 35, joined by commas"
+            f"{item[:_SHOWN]!r} in lines {text[:_SHOWN]!r} cannot be read; write frequencies in Hz as "
+            "20:140:20 (start:stop:step, inclusive) or 35, joined by commas"
         )
     if len(parts) == 1:
         return [parts[0] * unit]

@@ -4,11 +4,11 @@ from livebode.session.audience import Audience
 from livebode.session.axis import Axis
 from livebode.session.configuration import Axes, ConfigurationFile
 from livebode.session.destination import Destination, Draw
+from livebode.session.following import Outcome
 from livebode.session.live import run_live
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.recording import run
 from livebode.session.session import Session
-from livebode.session.tracking import Outcome
 
 __all__ = [
     "Audience",

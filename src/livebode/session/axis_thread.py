@@ -6,11 +6,11 @@ import threading
 
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
+from livebode.session.following import Outcome
 from livebode.session.live import run_live
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.recording import run
 from livebode.session.status import Status
-from livebode.session.tracking import Outcome
 
 
 class AxisThread:

@@ -12,7 +12,8 @@ from livebode.nouns import InputError, Lines, Responses
 from livebode.records import Run
 from livebode.session.audience import Audience
 from livebode.session.destination import Draw, Progress
-from livebode.session.tracking import Outcome, record
+from livebode.session.following import Outcome
+from livebode.session.tracking import record
 from livebode.simulation import BeltAxis, BeltResponse, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
 RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 400, 40, 0.1

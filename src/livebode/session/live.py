@@ -13,9 +13,9 @@ from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.continuing import Before, Numbering
 from livebode.session.destination import Destination
+from livebode.session.following import Outcome, Tracking
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline
-from livebode.session.tracking import Outcome, Tracking
 from livebode.sources.live import LiveSource, make_source
 
 

@@ -6,10 +6,11 @@ import time
 
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
+from livebode.session.following import Outcome, Tracking
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline
 from livebode.session.plan import make_follower
-from livebode.session.tracking import Outcome, Tracking, whole
+from livebode.session.tracking import whole
 from livebode.sources import open_log
 
 

@@ -88,10 +88,11 @@ class Session:
         for thread in self.all:
             thread.end()
 
-    def _add(self, name: str, axis: Axis) -> AxisThread:
+    def _add(self, name: str, axis: Axis, *, anew: bool = True) -> AxisThread:
+        """An axis that may replace what was recorded before this session, and nothing of what was recorded in it."""
         to = self._to(name, axis)
         status = Status(to.audience)
-        to = replace(to, audience=status, tell=lambda event: self._tell(name, event))
+        to = replace(to, force=to.force and anew, audience=status, tell=lambda event: self._tell(name, event))
         self.threads[name] = AxisThread(name, axis, to, status)
         return self.threads[name]
 
@@ -105,11 +106,11 @@ class Session:
         try:
             axes = file.read()
             changes = self._checked(axes)
-        except InputError as error:
-            message = f"the configuration is refused, and the one before it stays: {error}"
-            self._say("configuration-refused", message)
+        except (InputError, MemoryError) as error:
+            why = str(error) or "there is not enough memory for it"
+            self._say("configuration-refused", f"the configuration is refused, and the one before it stays: {why}")
             return
-        if not any(changes.values()) and axes.keys() == self.threads.keys():
+        if axes == {name: thread.axis for name, thread in self.threads.items()}:
             if asked:
                 self._say("configuration-applied", "the configuration is the same", record=False)
             return
@@ -146,7 +147,7 @@ class Session:
             old = self.threads.get(name)
             if old is None or (not old.alive and old.axis != axis):
                 self._tell(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
-                self._add(name, axis).start()
+                self._add(name, axis, anew=False).start()
 
     def _say(self, kind: str, message: str, *, record: bool = True) -> None:
         self._tell("", Event(kind, 0, 0.0, message))
