@@ -190,9 +190,12 @@ def report(scenario: Scenario, found: dict[str, float]) -> None:
     print(scenario.name)
     for label, value in found.items():
         print(f"  {label:38}{value:10.4g}")
-    reached = found["p99, ms"] <= 1e3 * TARGET_S and not found["samples lost"] and found["cores used"] <= CORES
-    verdict = "reached" if reached else "SHORT"
-    print(f"  target p99 ≤ {1e3 * TARGET_S:g} ms, nothing lost, at most {CORES} cores: {verdict}", flush=True)
+    whole = not found["samples lost"] and found["cores used"] <= CORES
+    for target, reached in (
+        (f"p99 ≤ {1e3 * TARGET_S:g} ms", found["p99, ms"] <= 1e3 * TARGET_S),
+        (f"nothing lost, at most {CORES} cores", whole),
+    ):
+        print(f"  target {target}: {'reached' if reached else 'SHORT'}", flush=True)
 
 
 def _free_ports(count: int) -> list[int]:
