@@ -40,6 +40,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
+	$(BIN)/python -m bench.live
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
 	$(BIN)/python -m studies.peers
@@ -50,8 +51,9 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
-fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
+fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources and the configuration
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
+	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 

@@ -17,7 +17,7 @@ import pytest
 
 from livebode.estimation import Tracker
 from livebode.nouns import Block, Event, InputError
-from livebode.records import Run
+from livebode.records import Run, RunDirectory
 from livebode.session.axis import RecordSection
 from livebode.session.tracking import record
 from tests.command import RATE_HZ, livebode, signals, write_parquet
@@ -154,6 +154,8 @@ def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
         if done > 2000:
             with pytest.raises(InputError, match="another process records"):
                 record_machine(machine(SAMPLES), tmp_path / "run")
+            with pytest.raises(InputError, match="another process records"), RunDirectory(tmp_path / "run", force=True):
+                raise AssertionError("a run that is being written is not replaced by one in one piece")
             raise StopError
 
     with pytest.raises(StopError):

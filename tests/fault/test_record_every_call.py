@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,8 @@ from livebode.nouns import InputError
 from tests.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
 
 SAMPLES = 2000
+BESIDE = 20
+"""Calls that may change places: segments are closed and journals synced in threads of their own."""
 CALLS = ("open", "write", "fdatasync", "fsync", "ftruncate", "replace", "unlink", "mkdir")
 
 
@@ -27,13 +30,16 @@ class Disk:
 
     def __init__(self, at: int, wrong: Callable[[Disk], None]) -> None:
         self.at, self.wrong, self.count, self.dead = at, wrong, 0, False
+        self.counting = threading.Lock()
 
     def around(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
         def called(*args: Any, **kwargs: Any) -> Any:
             if self.dead:
                 raise PowerCut
-            self.count += 1
-            if self.count == self.at:
+            with self.counting:
+                self.count += 1
+                mine = self.count == self.at
+            if mine:
                 if name == "write":  # half of it reaches the disk
                     call(args[0], memoryview(args[1])[: len(args[1]) // 2])
                 self.wrong(self)
@@ -81,7 +87,7 @@ def test_a_call_that_fails_once_costs_nothing(tmp_path: Path) -> None:
     for at in range(1, calls + 1):
         out, said = tmp_path / str(at), []
         with disk_that(full, at):
-            if begun < at <= ended:
+            if begun < at <= ended - BESIDE:
                 record_machine(machine(SAMPLES), out, tell=said.append)
             else:  # at its very beginning or end the user may be told
                 with suppress(InputError):
@@ -97,17 +103,17 @@ def test_a_call_that_fails_once_costs_nothing(tmp_path: Path) -> None:
 
 
 def test_power_may_go_at_any_call(tmp_path: Path) -> None:
-    for at in range(1, calls_of_a_run(tmp_path / "whole")[2] + 1):
+    for at in range(1, calls_of_a_run(tmp_path / "whole")[2] + BESIDE):
         out, done = tmp_path / str(at), 0
 
         def progress(samples: int, _: int | None) -> None:
             nonlocal done
             done = samples
 
-        with disk_that(cut, at) as disk, pytest.raises(PowerCut):
+        with disk_that(cut, at) as disk, suppress(PowerCut):
             record_machine(machine(SAMPLES), out, progress=progress)
-        assert disk.dead
         if (out / "run.json").exists() and unfinished(out):
+            assert disk.dead
             check_beginning(out, SAMPLES, done - RATE_HZ)
             with disk_that(cut, 1 + at % 25), suppress(PowerCut):  # once more, while it goes on
                 record_machine(machine(SAMPLES), out)
@@ -115,3 +121,7 @@ def test_power_may_go_at_any_call(tmp_path: Path) -> None:
         if unfinished(out):
             record_machine(machine(SAMPLES), out)
         check_whole(out, SAMPLES)
+        if not disk.dead:  # it was done before the call came
+            break
+    else:
+        raise AssertionError("no run was short enough to be done")

@@ -61,7 +61,9 @@ class TcpPeer(Peer):
             except OSError:
                 return
             link.sendall(self.layout)
-            self._link = link
+            before, self._link = self._link, link
+            if before is not None:
+                before.close()
 
     def __exit__(self, *_: object) -> None:
         self._server.shutdown(socket.SHUT_RDWR)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Machine, Rows, learn_table
 from livebode.monitoring.accuracy import Accuracy
 from livebode.motion import Curve, MovingModel
-from livebode.nouns import Block, InputError, Lines
+from livebode.nouns import Block, Channel, InputError, Lines
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
+from livebode.sources.live import Batch
+from livebode.sources.live.ndjson import encode_line
 from tests.command import Result, livebode, write_parquet
 from tests.monitored import recorded
 
@@ -98,8 +103,30 @@ def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
     assert told["parameters"]["details"]["since_s"] == pytest.approx(20, abs=1)
     assert "Learned from" in learned.out
     assert "in 1 cell of the schedule. No model" in learned.out
+    live = told_live(toml, base, tmp_path / "live")
+    changes_told = [event for event in events(changed_run) if str(event["kind"]).startswith("change")]
+    assert [(e["kind"], e["sample"], e["message"]) for e in live] == [
+        (e["kind"], e["sample"], e["message"]) for e in changes_told
+    ]
     assert "Lines and fitted parameters are watched" in learned.out
     _not_fitted(toml, base, tmp_path)
+
+
+def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
+    """The changes that a machine on standard input is told to have, which sends what is in the recording."""
+    columns = pq.read_table(toml.with_suffix(".parquet"))
+    data = np.array([columns[name].to_numpy() for name in ("w", "u", "velocity")])
+    channels = (Channel("w"), Channel("u"), Channel("velocity"))
+    lines = [
+        encode_line(Batch(start, data[:, start : start + 1000].copy(), channels, 4000.0))
+        for start in range(0, data.shape[1], 1000)
+    ]
+    axis = toml.with_name("live.toml")
+    axis.write_text(toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"'))
+    command = [Path(sys.executable).with_name("livebode"), "run", axis, "--baseline", base, "--out", out]
+    done = subprocess.run([*map(str, command)], input=b"".join(lines), capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [event for event in events(out) if str(event["kind"]).startswith("change")]
 
 
 def _not_fitted(toml: Path, base: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
@@ -14,6 +15,7 @@ from livebode.nouns import Model, Responses
 from livebode.session import Draw, Outcome
 
 _ALARMS_SHOWN = 8
+_ONE_AT_A_TIME = threading.Lock()  # Matplotlib's settings belong to the whole process
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:
@@ -22,7 +24,8 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
     def draw(responses: Responses, into: Path, schedule: str, fitted: Model | None) -> None:
         from livebode.report import save_pictures  # with Matplotlib half a second to import
 
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
+        with _ONE_AT_A_TIME:
+            save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
 
     return draw
 
@@ -41,14 +44,8 @@ def show(outcome: Outcome) -> None:
             unicode="utf" in (sys.stdout.encoding or "").lower(),
         )
     )
-    counts, speed, found = (outcome.summary[part] for part in ("counts", "speed", "found"))
-    invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
-    gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
-    print(
-        f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
-        f"from {counts['samples']} samples{gaps}: "
-        f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s\n{outcome.directory}/"
-    )
+    print(f"{counted(outcome.summary)}\n{outcome.directory}/")
+    found = outcome.summary["found"]
     if (moving := found.get("motion", {}).get("model")) is not None:
         _show_moving(moving)
     if "fit" in outcome.summary:
@@ -59,6 +56,18 @@ def show(outcome: Outcome) -> None:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
         _show_monitoring(outcome.summary["monitoring"])
+
+
+def counted(summary: dict[str, Any]) -> str:
+    """How much was tracked, in a line."""
+    counts, speed, found = (summary[part] for part in ("counts", "speed", "found"))
+    invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
+    gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
+    return (
+        f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
+        f"from {counts['samples']} samples{gaps}: "
+        f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s"
+    )
 
 
 def _show_moving(model: dict[str, Any]) -> None:

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
-from livebode.cli.pictures import drawing, show
+from livebode.cli.pictures import counted, drawing, show
 from livebode.nouns import Event, InputError
 from livebode.records import to_json
-from livebode.session import Axis, Outcome, run, run_live
+from livebode.session import (
+    Axes,
+    Axis,
+    ConfigurationFile,
+    Destination,
+    Draw,
+    Outcome,
+    Session,
+    StoppedError,
+    run,
+)
 
 
 def run_command(
@@ -82,27 +93,22 @@ def run_command(
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
-    axis = _axis(target, given, go_on)
-    outcome = _run(axis, out or Path("runs") / target.stem, force, quiet=as_json)
-    if as_json:
-        print(to_json({"directory": str(outcome.directory)} | outcome.summary))
-    else:
-        show(outcome)
-
-
-def _axis(target: Path, given: dict[str, dict[str, Any]], go_on: bool) -> Axis:
-    """The configuration in the file, or of the recording, with the options given over it."""
     said = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
-    if go_on:
-        said["record"] = {}
-    if target.suffix.lower() == ".toml":
-        base = Axis.read(target).model_dump(exclude_unset=True)
-        data = {section: base.get(section, {}) | said.get(section, {}) for section in base.keys() | said.keys()}
-        return Axis.of(data, str(target))
-    if "output" not in said["signals"]:
+    over = {section: values for section, values in said.items() if values} | ({"record": {}} if go_on else {})
+    file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
+    axes = {"": _axis(target, over)} if file is None else file.read()
+    directory = out or Path("runs") / target.stem
+    if list(axes) == [""] and not axes[""].source.live:
+        _show(_run(axes[""], directory, force, quiet=as_json), as_json)
+    else:
+        _run_axes(axes, directory, force, as_json, file)
+
+
+def _axis(target: Path, said: dict[str, dict[str, Any]]) -> Axis:
+    """The configuration of a recording from the options."""
+    if "output" not in said.get("signals", {}):
         raise InputError("no output is named; give --output CHANNEL (livebode inspect lists the channels)")
-    said["source"]["log"] = target
-    return Axis.of(said, "the options")
+    return Axis.of(said | {"source": said.get("source", {}) | {"log": target}}, "the options")
 
 
 def _window(text: str | None) -> int | str | None:
@@ -115,11 +121,10 @@ def _window(text: str | None) -> int | str | None:
 
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
+    """One recording, with a bar."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-    draw = drawing(f"{axis.source.title}: {axis.signals.output}", names)
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -136,5 +141,41 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
         def tell(event: Event) -> None:
             bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
 
-        job = run_live if axis.source.live else run
-        return job(axis, directory, force=force, progress=progress, draw=draw, tell=tell)
+        return run(axis, Destination(directory, _drawing(axis), force, progress, tell))
+
+
+def _run_axes(axes: Axes, directory: Path, force: bool, as_json: bool, file: ConfigurationFile | None) -> None:
+    """Machines that send, or several axes, until all have ended."""
+    from livebode.cli.axes_terminal import AxesTerminal, plain
+
+    def to(name: str, axis: Axis) -> Destination:
+        return Destination(directory / name, _drawing(axis), force)
+
+    terminal = AxesTerminal(quiet=as_json)
+    session = Session(axes, to, tell=terminal.tell, leave=terminal.leave, file=file)
+    terminal.run(session)
+    if session.ended_by and all(thread.ended_early for thread in session.all):
+        raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)
+    if "" in session.threads:
+        _show(session.threads[""].result(), as_json)
+        return
+    if as_json:
+        print(to_json({"axes": plain(session)}))
+    for thread in session.all:
+        if thread.outcome is not None and not as_json:
+            print(f"{thread.name}: {counted(thread.outcome.summary)}\n{thread.outcome.directory}/")
+    errors = [thread.error for thread in session.all if thread.error is not None]
+    if errors:
+        raise typer.Exit(2 if all(isinstance(error, (InputError, StoppedError)) for error in errors) else 1)
+
+
+def _drawing(axis: Axis) -> Draw:
+    names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
+    return drawing(f"{axis.source.title}: {axis.signals.output}", names)
+
+
+def _show(outcome: Outcome, as_json: bool) -> None:
+    if as_json:
+        print(to_json({"directory": str(outcome.directory)} | outcome.summary))
+    else:
+        show(outcome)

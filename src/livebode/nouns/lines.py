@@ -15,6 +15,7 @@ from livebode.nouns.errors import GridError, InputError
 # whole number of periods to a millionth, and the leakage is below every other error.
 _ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
+_DIGITS_MAX, _SHOWN = 40, 120
 WINDOW_MAX = 1 << 24
 """Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 
@@ -145,18 +146,26 @@ def check_window(window: int, rate_hz: float) -> None:
         raise InputError(f"{rate_hz=} is not a positive number of samples per second")
 
 
+def _number(text: str) -> Fraction:
+    """Exact; ValueError for what is no number, or one so large or small that it would take for ever."""
+    exponent = text.lower().partition("e")[2]
+    if len(text) > _DIGITS_MAX or abs(int(exponent or 0)) > _DIGITS_MAX:
+        raise ValueError(text)
+    return Fraction(text)
+
+
 def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Fraction]:
     unit = Fraction(rate_hz) / window if item.startswith("k=") else Fraction(1)
     try:
-        parts = [Fraction(part.strip()) for part in item.removeprefix("k=").split(":")]
+        parts = [_number(part.strip()) for part in item.removeprefix("k=").split(":")]
     except (ValueError, ZeroDivisionError):
         parts = []
     if len(parts) == 2 and item.startswith("k="):
         parts.append(Fraction(1))
     if len(parts) not in (1, 3):
         raise InputError(
-            f"{item!r} in lines {text!r} cannot be read; write frequencies in Hz as 20:140:20 (start:stop:step, "
-            "inclusive) or 35, joined by commas"
+            f"{item[:_SHOWN]!r} in lines {text[:_SHOWN]!r} cannot be read; write frequencies in Hz as "
+            "20:140:20 (start:stop:step, inclusive) or 35, joined by commas"
         )
     if len(parts) == 1:
         return [parts[0] * unit]
@@ -165,10 +174,12 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
         swapped = (
             f"; did you mean {float(start):g}:{float(step):g}:{float(stop):g}?" if stop > 0 and start <= step else ""
         )
-        raise InputError(f"the range {item!r} is no start:stop:step with start ≤ stop and 0 < step ≤ stop{swapped}")
+        raise InputError(
+            f"the range {item[:_SHOWN]!r} is no start:stop:step with start ≤ stop and 0 < step ≤ stop{swapped}"
+        )
     count = floor((stop - start) / step) + 1
     if count > _LINES_MAX:
-        raise InputError(f"the range {item!r} has {count} lines, more than {_LINES_MAX}; take a larger step")
+        raise InputError(f"the range {item[:_SHOWN]!r} has {count} lines, more than {_LINES_MAX}; take a larger step")
     return [(start + i * step) * unit for i in range(count)]
 
 

@@ -102,7 +102,8 @@ class RunDirectory:
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():
             return
-        if not self._force and (self.path / "open").is_dir():
+        segments = (self.path / "open").is_dir()
+        if not self._force and segments:
             raise InputError(f"{str(self.path)!r} is kept in segments; --continue goes on with it, --force replaces it")
         if not self._force:
             raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
@@ -110,6 +111,10 @@ class RunDirectory:
             raise InputError(
                 f"{str(self.path)!r} is not the directory of a run, so --force leaves it; take another --out"
             )
+        if segments:
+            from livebode.records.segments.lock import Lock  # needs a POSIX system, as what left them did
+
+            Lock(self.path).release()
 
     def _put_in_place(self) -> None:
         old = None

@@ -2,7 +2,25 @@
 
 from livebode.session.audience import Audience
 from livebode.session.axis import Axis
+from livebode.session.configuration import Axes, ConfigurationFile
+from livebode.session.destination import Destination, Draw
+from livebode.session.following import Outcome
 from livebode.session.live import run_live
-from livebode.session.tracking import Draw, Outcome, run
+from livebode.session.orders import Orders, StoppedError
+from livebode.session.recording import run
+from livebode.session.session import Session
 
-__all__ = ["Audience", "Axis", "Draw", "Outcome", "run", "run_live"]
+__all__ = [
+    "Audience",
+    "Axes",
+    "Axis",
+    "ConfigurationFile",
+    "Destination",
+    "Draw",
+    "Orders",
+    "Outcome",
+    "Session",
+    "StoppedError",
+    "run",
+    "run_live",
+]

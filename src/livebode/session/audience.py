@@ -22,7 +22,10 @@ class Audience:
     """
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
-        """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time."""
+        """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time.
+
+        It comes again behind a `finish` where an edited configuration makes another run go on with the next sample.
+        """
 
     def write(self, responses: Responses) -> None:
         """New responses; of a run that is gone on with first the newest from before."""

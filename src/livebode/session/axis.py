@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,10 +10,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
-from livebode.sources.live import SourceSettings
+from livebode.session.toml_file import one_line, read_table, shortened
+from livebode.sources.live import SourceSettings, checked_address
 
 _SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
+_MAY_BE_SECRET = {"url", "username", "password_env", "password_file"}
 Ticks = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -196,23 +197,7 @@ class Axis(_Section):
             If the file cannot be read, is not TOML, or has an unknown key or a value out of range; the message names
             the key, the value and what is allowed.
         """
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise InputError(f"there is no file {path}; check the name") from None
-        except OSError as error:
-            raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise InputError(f"{str(path)!r} is not text; give a configuration in TOML, or a recording") from None
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{str(path)!r} is not TOML: {error}") from None
-        axis = cls.of(data, str(path))
-        axis = axis.model_copy(update={"source": axis.source.beside(path.parent)})
-        baseline = axis.monitoring.baseline
-        if baseline is None:
-            return axis
-        monitoring = axis.monitoring.model_copy(update={"baseline": path.parent / baseline})
-        return axis.model_copy(update={"monitoring": monitoring})
+        return cls.of(read_table(path), str(path)).beside(path.parent)
 
     @classmethod
     def of(cls, data: dict[str, Any], origin: str) -> Axis:
@@ -223,19 +208,31 @@ class Axis(_Section):
             raise InputError(f"{origin}: {_sentence(error)}") from None
         if (axis.source.log is None) == (axis.source.url is None):
             raise InputError(f"{origin}: [source] needs either a log or a url; 'source.log' is a recording")
+        if axis.source.url is not None:
+            checked_address(axis.source.url, axis.source)
         return axis
+
+    def beside(self, folder: Path) -> Axis:
+        """The same with relative paths from `folder`."""
+        axis = self.model_copy(update={"source": self.source.beside(folder)})
+        baseline = axis.monitoring.baseline
+        if baseline is None:
+            return axis
+        monitoring = axis.monitoring.model_copy(update={"baseline": folder / baseline})
+        return axis.model_copy(update={"monitoring": monitoring})
 
 
 def _sentence(error: ValidationError) -> str:
     """The first thing that is wrong, with its place and value."""
-    first = error.errors()[0]
+    first = error.errors(include_url=False)[0]
     # Behind a choice of types pydantic puts the name of the type that it tried.
-    place = ".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part))
+    place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
         return f"there is no setting {place!r}; {_nearest(first['loc'])}"
     if first["type"] == "missing":
         return f"{place!r} is missing; add it"
-    return f"{place} = {first['input']!r} is not usable: {first['msg'].lower()}"
+    value = "what it holds" if _MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
+    return f"{place} = {value} is not usable: {first['msg'].lower()}"
 
 
 def _nearest(loc: tuple[int | str, ...]) -> str:

@@ -11,7 +11,9 @@ from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, Responses
 from livebode.records import Run
 from livebode.session.audience import Audience
-from livebode.session.tracking import Draw, Outcome, Progress, record
+from livebode.session.destination import Draw, Progress
+from livebode.session.following import Outcome
+from livebode.session.tracking import record
 from livebode.simulation import BeltAxis, BeltResponse, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
 RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 400, 40, 0.1

@@ -1,87 +1,117 @@
-"""One run on a live source: until the source ends, or somebody ends it."""
+"""One axis on a live source: until the source ends or somebody ends it, over all changes of its configuration."""
 
 from __future__ import annotations
 
-import signal
+import contextlib
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
-from livebode.session.audience import Audience
+from livebode.nouns import Event, InputError
+from livebode.records.table import prepare
+from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
-from livebode.session.fits import Fits
-from livebode.session.plan import live_follower
-from livebode.session.tracking import Draw, Outcome, Progress, Tell, record
-from livebode.session.watching import make_watching
-from livebode.sources.live import LiveSource, open_source
+from livebode.session.continuing import Before, Numbering
+from livebode.session.destination import Destination
+from livebode.session.following import Outcome, Tracking
+from livebode.session.orders import Orders
+from livebode.session.pipeline import Pipeline
+from livebode.sources.live import LiveSource, make_source
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
+def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
+    """Track a machine while it works and leave a run directory in segments.
 
-def run_live(
-    axis: Axis,
-    directory: Path,
-    *,
-    force: bool = False,
-    progress: Progress,
-    draw: Draw,
-    tell: Tell = lambda _: None,
-    audience: Audience | None = None,
-) -> Outcome:
-    """Track a machine while it works and leave a run directory in segments; parameters as in `run`.
-
-    Ends where the source ends, and whole, with what has come, on the first Ctrl-C (SIGINT or SIGTERM); a second one
-    leaves what was recorded. The same axis in the same directory goes on with the run, behind a gap.
+    Ends where the source ends, and whole, with what has come, when `orders` end it. The same axis in the same directory
+    goes on with the run, behind a gap. A change by `orders` finishes the run, and another one beside it, NAME-2 and so
+    on, goes on with the very next sample of the same source; the outcome is that of the last.
 
     Raises
     ------
     InputError
         Where the configuration cannot be, or no samples come.
     """
-    with open_source(axis.source) as source, ended_by_signals(source):
-        tracker = live_follower(axis, source)
+    orders = orders or Orders()
+    prepare()
+    source = make_source(axis.source)
+    orders.of(source)
+    with source.open(), contextlib.ExitStack() as finishing:
+        pipeline = Pipeline.live(axis, source)
+        return _Succession(source, to, orders, finishing).run(pipeline)
+
+
+class _Succession:
+    """The runs of one open source, each going on with the next sample of the one before."""
+
+    def __init__(self, source: LiveSource, to: Destination, orders: Orders, finishing: contextlib.ExitStack) -> None:
+        self._source, self._to, self._orders, self._finishing = source, to, orders, finishing
+        self._numbering = Numbering()
+
+    def run(self, pipeline: Pipeline) -> Outcome:
+        from livebode.session.segmented import make_way  # needs a POSIX system
+
+        directory, before, force = self._to.directory, None, self._to.force
+        if force:
+            for later in successors.all_of(directory)[:0:-1]:
+                make_way(later)  # the newest first, so that what a kill leaves is still in a row
+        else:
+            directory = successors.newest(directory)
+        while True:
+            to = replace(self._to, directory=directory, force=force)
+            tracking = self._tracking(pipeline, to, before)
+            with contextlib.ExitStack() as leaving:
+                leaving.enter_context(tracking)
+                tracking.follow()
+                following = None if self._orders.ended else self._orders.take_next()
+                if following is None:
+                    tracking.end()
+                    outcome = tracking.finish()
+                    break
+                directory, force = successors.free(self._to.directory), False
+                before = self._handed_over(tracking, following, directory)
+                self._finish_beside(tracking, leaving.pop_all())
+                pipeline = following
+        to.audience.finish(outcome.summary)
+        return outcome
+
+    def _tracking(self, pipeline: Pipeline, to: Destination, before: Before | None) -> Tracking:
+        axis = pipeline.axis
+        assert axis is not None
         about = {
             "configuration": axis.model_dump(mode="json", exclude_defaults=True),
-            "found": {"format": source.format, "rate_from": "the sender"},
+            "found": {"format": self._source.format, "rate_from": "the sender"},
         }
-        fits = Fits.of(axis.fit, tracker.settings.loop)
-        return record(
-            source,
-            tracker,
-            directory,
+        return Tracking(
+            self._source,
+            pipeline,
+            to,
             about=about,
-            force=force,
-            progress=progress,
-            draw=draw,
-            fits=fits,
-            watching=make_watching(axis, tracker.settings, samples=source.spectra is None),
             kept=axis.record or RecordSection(),
             again=False,
-            tell=tell,
-            audience=audience,
+            orders=self._orders,
+            numbering=self._numbering,
+            before=before,
+            until=self._orders.changing,
         )
 
+    def _handed_over(self, tracking: Tracking, following: Pipeline, directory: Path) -> Before:
+        """End a run, and let the next one go on with its state as far as it can."""
+        goes_on = following.take_over(tracking.pipeline)
+        tracking.end(directory.name, handed_over=goes_on)
+        tracking.to.audience.finish(tracking.summary)
+        counts = dict(following.follower.counts) if goes_on else {}
+        return Before(tracking.to.directory.name, *tracking.position, counts)
 
-@contextmanager
-def ended_by_signals(source: LiveSource) -> Iterator[None]:
-    """The first signal ends the source; the second does what it did before."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    def _finish_beside(self, tracking: Tracking, leaving: contextlib.ExitStack) -> None:
+        """Draw its pictures and close it while the next one goes on."""
 
-    def end(_number: int, _frame: object) -> None:
-        source.stop()
-        restore()
+        def finish() -> None:
+            try:
+                with leaving:
+                    tracking.finish()
+            except InputError as error:
+                self._to.tell(Event("record-unfinished", *tracking.position, str(error)))
 
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-    for number in _SIGNALS:
-        signal.signal(number, end)
-    try:
-        yield
-    finally:
-        restore()
+        thread = threading.Thread(target=finish, name="livebode finishing")
+        thread.start()
+        self._finishing.callback(thread.join)

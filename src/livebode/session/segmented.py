@@ -9,7 +9,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
@@ -19,16 +19,13 @@ from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
 from livebode.session.axis import RecordSection
-from livebode.session.continuing import begun_anew, in_pieces, offered_again
+from livebode.session.continuing import Before, Numbering, in_pieces, offered_again
+from livebode.session.orders import StoppedError
+from livebode.session.stateful import Stateful
 
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval three quarters of a second: what a kill costs at most
 _SEEN_AGAIN_BYTES = 256 << 20  # what a picture of a run that goes on is drawn from, beside what comes
-
-
-class Stateful(Protocol):
-    def snapshot(self) -> bytes: ...
-    def restore(self, snapshot: bytes) -> None: ...
 
 
 class SegmentedRun:
@@ -57,6 +54,10 @@ class SegmentedRun:
         Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
     tell
         Called with what the record itself has to say, at once.
+    numbering
+        Of the source, where it is one that cannot go back.
+    before
+        The run that this one goes on from with the next sample.
     """
 
     def __init__(
@@ -72,30 +73,29 @@ class SegmentedRun:
         again: bool,
         ends: bool,
         tell: Callable[[Event], None],
+        numbering: Numbering,
+        before: Before | None = None,
     ) -> None:
         self.path = path
+        self._numbering = numbering
+        self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
+        self._continues = None if before is None else before.name
         self._summary, self._rate_hz, self._parts = dict(summary), rate_hz, parts
         self._force, self._again, self._ends, self._tell = force, again, ends, tell
         self._samples = samples_of(channels) if kept.samples else None
-        limits = Limits(
-            interval_samples=max(1, round(_INTERVAL_S * rate_hz)),
-            segment_samples=max(1, round(kept.segment_s * rate_hz)),
-            interval_s=_INTERVAL_S,
-            budget_bytes=kept.budget_bytes,
-        )
         tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
             {"samples": self._samples} if self._samples else {}
         )
-        self._store = Store(path, tables, limits)
+        self._store = Store(path, tables, self._limits(kept))
         self.partial = path / ".pictures.partial"
 
     def __enter__(self) -> SegmentedRun:
         if self._force:
-            _make_way(self.path)
+            make_way(self.path)
         with contextlib.ExitStack() as undo:
             undo.enter_context(self._store)
             if self._store.last is None:
-                self._store.begin(self._summary, 0, 0.0, self._states())
+                self._store.begin(self._named(self._summary), *self._first, self._states())
                 self._continued = False
             else:
                 self._restore(self._store.last.states)
@@ -106,14 +106,31 @@ class SegmentedRun:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._undo.close()
-        if kind in (KeyboardInterrupt, SystemExit) and self._store.last is not None:
-            last = self._store.last
-            message = f"stopped at sample {last.sample}; the same command goes on with the run in {str(self.path)!r}"
-            self._tell(Event("record-stopped", last.sample, last.time_s, message))
+        if kind in (KeyboardInterrupt, SystemExit, StoppedError) and self._store.last is not None:
+            self._tell(self.stopped())
+
+    def stopped(self) -> Event:
+        """What is to be said of a run that ends here, before it is finished."""
+        last = self._store.last
+        assert last is not None
+        message = f"stopped at sample {last.sample}; the same command goes on with the run in {str(self.path)!r}"
+        return Event("record-stopped", last.sample, last.time_s, message)
+
+    def keep(self, kept: RecordSection) -> None:
+        """Cut the record otherwise from here on; which samples are kept stays."""
+        self._store.limits = self._limits(kept)
+
+    def _limits(self, kept: RecordSection) -> Limits:
+        return Limits(
+            interval_samples=max(1, round(_INTERVAL_S * self._rate_hz)),
+            segment_samples=max(1, round(kept.segment_s * self._rate_hz)),
+            interval_s=_INTERVAL_S,
+            budget_bytes=kept.budget_bytes,
+        )
 
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
-        if self._continued:
+        if self._continued or self._continues:
             run = Run.open(self.path)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # none are told from no run by their lines
@@ -152,8 +169,8 @@ class SegmentedRun:
         """Append an event."""
         self._store.write_event(event)
 
-    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
-        """Draw the pictures, close what is open and write run.json."""
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
+        """Draw the pictures, close what is open and write run.json; `ends` says that another run goes on instead."""
         try:
             shutil.rmtree(self.partial, ignore_errors=True)
             os.mkdir(self.partial)
@@ -168,16 +185,16 @@ class SegmentedRun:
         assert last is not None
         # What was held back at the end was written since the last commit, and belongs to the states as they are now.
         self._store.commit(last.sample, last.time_s, self._states())
-        self._store.finish(summary, finished=self._ends)
+        self._store.finish(self._named(summary), finished=self._ends or ends)
 
     def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
         last = self._store.last
-        if last is None or not self._continued:
-            return iter(blocks)
-        if self._again:
+        if last is not None and self._continued and self._again:
             return offered_again(blocks, last.sample)
-        away_s = max(0.0, time.time() - last.unix_s)
-        return begun_anew(blocks, last.sample, last.time_s - last.sample / self._rate_hz, away_s)
+        if last is not None and self._continued:
+            away_s = max(0.0, time.time() - last.unix_s)
+            self._numbering.go_on(last.sample, last.time_s - last.sample / self._rate_hz, away_s)
+        return self._numbering.over(blocks)
 
     def _commit(self, block: Block) -> None:
         self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states())
@@ -200,6 +217,10 @@ class SegmentedRun:
             )
         for name, part in self._parts.items():
             part.restore(states[name])
+        self._continues = before.get("continues")
+
+    def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
+        return summary if self._continues is None else {"continues": self._continues} | summary
 
 
 def _identity(summary: Mapping[str, Any]) -> list[Any]:
@@ -210,7 +231,7 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
     return [configuration, found, kept.get("samples")]
 
 
-def _make_way(path: Path) -> None:
+def make_way(path: Path) -> None:
     """Remove the run that stands there; InputError where something else stands there."""
     if not path.exists():
         return

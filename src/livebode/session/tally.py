@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
 from livebode.nouns import Responses
 from livebode.session.checks import ChannelCheck
+from livebode.session.continuing import Before
 
 
 class Tally:
@@ -20,6 +22,8 @@ class Tally:
         What looks at the signals.
     started
         `time.perf_counter()` at the beginning.
+    before
+        The run that this one goes on from.
 
     Attributes
     ----------
@@ -29,9 +33,11 @@ class Tally:
         The `stop` at which what was held back had been handed out.
     """
 
-    def __init__(self, check: ChannelCheck, started: float) -> None:
+    def __init__(self, check: ChannelCheck, started: float, before: Before | None = None) -> None:
         self.check = check
-        self.responses = self.invalid = self.valid_lines = self.stop = self.handed_out = 0
+        self._before = {} if before is None else before.counts
+        self.responses = self.invalid = self.valid_lines = 0
+        self.stop = self.handed_out = 0 if before is None else before.sample
         self.tracked_s = 0.0
         self._started = started
 
@@ -46,12 +52,16 @@ class Tally:
         self.valid_lines += int(np.count_nonzero(responses.valid))
         self.tracked_s += tracked_s
 
+    def counts(self, tracker: Mapping[str, int]) -> dict[str, int]:
+        """What the tracker has counted in this run."""
+        return {name: count - self._before.get(name, 0) for name, count in tracker.items()}
+
     _STATE = ("responses", "invalid", "valid_lines", "stop", "handed_out", "tracked_s")
 
     def snapshot(self) -> bytes:
         """All of it as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
-        return json.dumps(numbers | {"run_s": self.run_s, "check": self.check.state()}).encode()
+        return json.dumps(numbers | {"run_s": self.run_s, "before": self._before, "check": self.check.state()}).encode()
 
     def restore(self, snapshot: bytes) -> None:
         """Go on from a snapshot."""
@@ -59,4 +69,5 @@ class Tally:
         for name in self._STATE:
             setattr(self, name, state[name])
         self._started -= state["run_s"]
+        self._before = state["before"]
         self.check.load(state["check"])

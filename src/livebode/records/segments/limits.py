@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+JOURNALS = 3
+"""What stands beside closed segments, each of a journal's size: one that is turned, what becomes of it, the next."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -30,5 +33,5 @@ class Limits:
 
     @property
     def journal_bytes_max(self) -> int:
-        """An eighth of the budget at most, so that a journal and its segment stand side by side within it."""
+        """An eighth of the budget at most, so that journals and what becomes of them stand side by side within it."""
         return self.journal_bytes if self.budget_bytes is None else min(self.journal_bytes, self.budget_bytes // 8)

@@ -14,14 +14,16 @@ import pyarrow as pa
 from livebode.nouns import Event, InputError
 from livebode.records.plain_json import to_json
 from livebode.records.segments import journal
+from livebode.records.segments.closing import Closing
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
-from livebode.records.segments.limits import Limits
+from livebode.records.segments.limits import JOURNALS, Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
 from livebode.records.segments.shelf import Shelf
+from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import Waiting
 from livebode.records.table import Table
 
@@ -63,6 +65,7 @@ class Store:
         self._log = EventLog()
         self._pause: Event | None = None
         self._committed_s = self._synced_s = 0.0
+        self._syncing = Syncing()
 
     def __enter__(self) -> Store:
         with _refusing(self.path, "cannot be recorded in"), contextlib.ExitStack() as files:
@@ -85,7 +88,7 @@ class Store:
             os.mkdir(self.path / journal.FOLDER)
             self._open_files(Manifest(), [], 0)
             self._open_journal(1, commit)
-            self._files.callback(lambda: self._journal.close())
+            self._files.callback(self._close_open_journal)
             self._write_summary(summary, finished=False)
             sync_directory(self.path.parent)
             self.last = commit
@@ -116,13 +119,17 @@ class Store:
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
         try:
+            self._settle(self._syncing.done())
             self._log.write(self._events)
             commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
-            self._waiting.written()
+            parts = self._waiting.written()
             full = self._full(sample)
-            if full or self._committed_s - self._synced_s >= self.limits.interval_s:
+            if full:
                 self._sync()
+            elif self._committed_s - self._synced_s >= self.limits.interval_s:
+                self._synced_s = self._committed_s
+                self._syncing.begin(self._journal, parts)
             self.last = commit
         except OSError as error:
             self._failed(error, sample, time_s)
@@ -132,6 +139,8 @@ class Store:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
             with contextlib.suppress(OSError):
                 self._close_segment()
+        elif self._closing.done:
+            self._closed()
         return True
 
     def finish(self, summary: dict[str, Any], *, finished: bool) -> None:
@@ -147,6 +156,8 @@ class Store:
             self._not_paused()
             self._sync()
             self._close_segment()
+            if (error := self._closed()) is not None:
+                raise error
             self.commit(self.last.sample, self.last.time_s, self.last.states)  # with what closing had to say
             self._not_paused()
             self._write_summary(summary, finished=finished)
@@ -165,7 +176,7 @@ class Store:
         self.last, self._number = found.commit, found.number
         self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
         self._journal = AppendFile(journal.path_of(self.path, found.number), found.length)
-        self._files.callback(lambda: self._journal.close())
+        self._files.callback(self._close_open_journal)
         self._safe_bytes = found.length
         self._began = self._committed = found.commit.sample
         away_s = max(0.0, time.time() - found.commit.unix_s)
@@ -181,6 +192,8 @@ class Store:
     def _open_files(self, found: Manifest, sealed: list[int], events_bytes: int) -> None:
         self._shelf = Shelf(self.path, self._tables, found, sealed)
         self._files.callback(self._shelf.close)
+        self._closing = Closing(self._shelf)
+        self._files.callback(self._closing.wait)
         self._events = AppendFile(self.path / EVENTS, events_bytes)
         self._files.callback(self._events.close)
 
@@ -196,25 +209,36 @@ class Store:
         self._began = self._committed = commit.sample
 
     def _sync(self) -> None:
-        self._journal.sync()
-        self._synced_s, self._safe_bytes = time.monotonic(), self._journal.length
-        self._waiting.safe()
+        """Wait until all that was written is safe."""
+        self._settle(self._syncing.done(wait=True))
+        self._syncing.begin(self._journal, self._waiting.written())
+        self._settle(self._syncing.done(wait=True))
+        self._synced_s = time.monotonic()
+
+    def _settle(self, safe: tuple[int, int] | None) -> None:
+        if safe is not None:
+            self._safe_bytes, parts = safe
+            self._waiting.safe(parts)
+
+    def _close_open_journal(self) -> None:
+        self._syncing.close()
+        self._journal.close()
 
     def _close_segment(self) -> None:
-        """Go on in a new journal, and turn the one before into segments."""
+        """Go on in a new journal, and begin to turn the one before into segments."""
         assert self.last is not None
+        self._closed()  # a journal that is full before the one before it is turned waits for that
         before, number = self._journal, self._number
         self._open_journal(number + 1, self.last)
         before.close()
         self._shelf.seal(number)
-        self._keep_budget()
-        self._shelf.close_journals()
+        budget = self.limits.budget_bytes
+        used = self._events.length + JOURNALS * self.limits.journal_bytes_max
+        self._closing.begin(None if budget is None else budget - used)
 
-    def _keep_budget(self) -> None:
-        if self.limits.budget_bytes is None:
-            return
-        room = self.limits.budget_bytes - self._events.length - 2 * self.limits.journal_bytes_max
-        gone = self._shelf.make_room(room)
+    def _closed(self) -> OSError | None:
+        """Wait until the journal before is turned, and say what was removed; what the disk said where it refused."""
+        gone, error = self._closing.result()
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
@@ -225,8 +249,11 @@ class Store:
                 f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
                 removed=[segment.name for segment in gone],
             )
+        return error
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
+        with contextlib.suppress(OSError):  # what was being synced may be safe all the same
+            self._settle(self._syncing.done(wait=True))
         self._journal.back_to(self._safe_bytes)
         self._waiting.failed(self.limits.held_bytes)
         if self._pause is None:

@@ -57,14 +57,15 @@ class Waiting:
         """Frames that are not in the journal."""
         return [part.frame for part in self._parts[self._written :]]
 
-    def written(self) -> None:
-        """They are in the journal now."""
+    def written(self) -> int:
+        """They are in the journal now: so many that are not known to be safe."""
         self._written = len(self._parts)
+        return self._written
 
-    def safe(self) -> None:
-        """The journal was synced."""
-        del self._parts[: self._written]
-        self._written = 0
+    def safe(self, parts: int) -> None:
+        """The journal was synced with so many of them in it."""
+        del self._parts[:parts]
+        self._written -= parts
 
     def failed(self, bytes_max: int) -> None:
         """Nothing since the last sync counts as written; give all of it up where it is more than this."""

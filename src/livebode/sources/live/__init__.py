@@ -3,7 +3,7 @@
 from livebode.sources.live.batch import Batch, LiveBlock
 from livebode.sources.live.frame import FrameDecoder, encode_layout, encode_samples
 from livebode.sources.live.health import Health
-from livebode.sources.live.opening import open_source
+from livebode.sources.live.opening import checked_address, make_source, open_source
 from livebode.sources.live.said import KINDS
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
@@ -21,9 +21,11 @@ __all__ = [
     "Sequencer",
     "SourceSettings",
     "SpectraBatch",
+    "checked_address",
     "encode_layout",
     "encode_samples",
     "encode_spectra",
     "encode_spectra_layout",
+    "make_source",
     "open_source",
 ]

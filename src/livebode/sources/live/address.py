@@ -49,17 +49,18 @@ def parse_address(url: str) -> Address:
         raise InputError("a user or password has no place in source.url; give username, and password_env or _file")
     if not url.isprintable() or len(url) > 2000:
         raise InputError("source.url is longer than 2000 letters or has one that is not printable")
+    shown = url.split("?")[0].split("#")[0]  # what stands behind may be a secret
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
     except ValueError as error:
-        raise InputError(f"source.url = {url!r} is no address: {error}") from None
+        raise InputError(f"source.url = {shown!r} is no address: {error}") from None
     if parts.scheme not in PORTS:
-        raise InputError(f"source.url = {url!r} is of no known kind; give one of {', '.join(PORTS)} or stdin:")
+        raise InputError(f"source.url = {shown!r} is of no known kind; give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
-        raise InputError(f"source.url = {url!r} is no address; give {parts.scheme}://host:port")
+        raise InputError(f"source.url = {shown!r} is no address; give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):
-        raise InputError(f"source.url = {url!r} has a path, which {parts.scheme} does not take; leave out /{path}")
+        raise InputError(f"source.url = {shown!r} has a path, which {parts.scheme} does not take; leave out /{path}")
     return Address(parts.scheme, host, port, path)

@@ -64,7 +64,7 @@ class ClockWatch:
     def _jumped(self, step_s: float, number: int) -> None:
         self._said.say(
             "clock-jump",
-            f"the sender's clock was set by {step_s:+.3f} s at sample {number}; time goes on by sample numbers",
+            f"the sender's clock was set by {step_s:+.3f} s; time goes on by sample numbers",
             sample=number,
             rate_hz=self._rate_hz,
             step_s=step_s,

@@ -7,17 +7,21 @@ from collections import deque
 
 from livebode.sources.live.spectra_batch import AnyBatch
 
-INBOX_BYTES_MAX = 64 << 20
+INBOX_S_MAX = 60.0
+"""The machine's time that may wait: longer than any pause of a tracker that works."""
+INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
+"""What may wait however long it is, and what may not however short: many axes share one computer."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
-    """A queue of batches between the thread that receives and the one that tracks; at most 64 MiB."""
+    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB."""
 
     def __init__(self, bytes_max: int = INBOX_BYTES_MAX) -> None:
         self._bytes_max = bytes_max
         self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
+        self._seconds = 0.0
         self._changed = threading.Condition()
         self._closed = False
 
@@ -33,16 +37,23 @@ class Inbox:
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
         """Whether the batch was taken. A full inbox refuses it, or with `wait` lets the sender wait."""
-        size = batch.nbytes + _ENTRY_BYTES
         with self._changed:
             if wait:
-                self._changed.wait_for(lambda: self._closed or self._bytes + size <= self._bytes_max)
-            if self._closed or self._bytes + size > self._bytes_max:
+                self._changed.wait_for(lambda: self._closed or self._has_room(batch))
+            if self._closed or not self._has_room(batch):
                 return False
             self._batches.append(batch)
-            self._bytes += size
-            self._changed.notify_all()
+            self._count(batch, 1)
             return True
+
+    def _has_room(self, batch: AnyBatch) -> bool:
+        size = self._bytes + _size_bytes(batch)
+        return size <= self._bytes_max and (size <= INBOX_BYTES_MIN or self._seconds + _seconds(batch) <= INBOX_S_MAX)
+
+    def _count(self, batch: AnyBatch, sign: int) -> None:
+        self._bytes += sign * _size_bytes(batch)
+        self._seconds = self._seconds + sign * _seconds(batch) if self._batches else 0.0  # no rounding stays
+        self._changed.notify_all()
 
     def get(self, timeout_s: float) -> AnyBatch | None:
         """The oldest batch; None where none came in time or none will come."""
@@ -51,8 +62,7 @@ class Inbox:
             if not self._batches:
                 return None
             batch = self._batches.popleft()
-            self._bytes -= batch.nbytes + _ENTRY_BYTES
-            self._changed.notify_all()
+            self._count(batch, -1)
             return batch
 
     def close(self) -> None:
@@ -60,3 +70,11 @@ class Inbox:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+
+
+def _size_bytes(batch: AnyBatch) -> int:
+    return batch.nbytes + _ENTRY_BYTES
+
+
+def _seconds(batch: AnyBatch) -> float:
+    return (batch.stop - batch.first_sample) / batch.rate_hz

@@ -31,12 +31,23 @@ def open_source(settings: SourceSettings) -> LiveSource:
         Where the settings do not fit the kind of source, its library is missing, the peer refuses us, or no samples
         come within `timeout_s`.
     """
+    return make_source(settings).open()
+
+
+def make_source(settings: SourceSettings) -> LiveSource:
+    """The same, still to be opened; InputError where the settings do not fit or a library is missing."""
     if settings.url is None:
         check_keys(settings, "log")
         if settings.log is None or not settings.follow:
             raise InputError("source names no machine; give url, such as udp://0.0.0.0:5000, or log with follow = true")
-        return FollowSource(settings, Address("follow", path=str(settings.log))).open()
-    address = parse_address(settings.url)
-    check_keys(settings, address.scheme)
+        return FollowSource(settings, Address("follow", path=str(settings.log)))
+    address = checked_address(settings.url, settings)
     kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
-    return kind(settings, address).open()
+    return kind(settings, address)
+
+
+def checked_address(url: str, settings: SourceSettings) -> Address:
+    """The address in the url of these settings; InputError where it is none, or a key means nothing for its kind."""
+    address = parse_address(url)
+    check_keys(settings, address.scheme)
+    return address

@@ -156,7 +156,7 @@ class Sequencer:
         self._number += missing
         self._said.say(
             "loss",
-            f"{missing} samples before sample {self._number} did not come",
+            f"{missing} samples did not come",
             sample=self._number,
             rate_hz=rate_hz,
             missing_samples=missing,

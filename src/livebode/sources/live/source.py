@@ -6,7 +6,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar, Self
 
@@ -129,19 +129,24 @@ class LiveSource(ABC):
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
             if self._inbox.ended or time.monotonic() > until:
+                asked = self._stop.is_set()
                 self.close()
                 self._raise_failure()
-                why = self._refused or f"no samples came within {self.settings.timeout_s:g} s ({self._trouble})"
-                raise InputError(f"{self.address}: {why}")
+                when = "before it was ended" if asked else f"within {self.settings.timeout_s:g} s"
+                raise InputError(f"{self.address}: {self._refused or f'no samples came {when} ({self._trouble})'}")
             self._take(TICK_S)
         return self
 
-    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock]:
+    def blocks(
+        self, channels: Sequence[str] | None = None, until: Callable[[], bool] = lambda: False
+    ) -> Iterator[LiveBlock]:
         """The samples of `channels` as they come, from the first received; ends with the sender or with `close`.
 
         Of a drive that sends spectra they are LiveSpectra, whose sums are of all its signals.
 
-        There is one stream: what one iteration took, another does not see.
+        There is one stream: what one iteration took, another does not see. An iteration that ended because `until`
+        became true (asked before each Block and ten times a second) took nothing more: another one goes on with the
+        next sample.
 
         Raises
         ------
@@ -154,7 +159,7 @@ class LiveSource(ABC):
                 raise InputError(missing_channel(name, names))
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
-        return (replace(block, data=block.data[rows], channels=labels) for block in self._stream())
+        return (replace(block, data=block.data[rows], channels=labels) for block in self._stream(until))
 
     def drain_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
@@ -177,13 +182,16 @@ class LiveSource(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stream(self) -> Iterator[LiveBlock]:
-        while True:
-            while self._ready:
+    def _stream(self, until: Callable[[], bool]) -> Iterator[LiveBlock]:
+        while not until():
+            if self._ready:
                 yield self._ready.popleft()
-            if self._inbox.ended:
+            elif self._inbox.ended:
                 break
-            self._take(TICK_S)
+            else:
+                self._take(TICK_S)
+        else:
+            return
         yield from self._sequencer.finish()
         self._raise_failure()
 

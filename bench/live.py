@@ -1,0 +1,222 @@
+"""`python -m bench.live`: how long a response takes from the arrival of its samples, and what the axes cost.
+
+Senders in another process send over UDP as drives would: 4 kHz, batches of 25 ms, numbered; the session in this process
+tracks 21 lines in a window of 400 at 20 responses a second and records them, as `livebode run` does. Latency is from a
+datagram's arrival (`LiveBlock.arrived_s`) until all that came of it was published (`Audience.followed`), of
+the Blocks that brought a response. Left out is the first second, at whose beginning a source over UDP gathers eight
+batches to put them in order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import socket
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event as Flag
+from pathlib import Path
+
+import numpy as np
+
+from bench.job import LINES, RATE_HZ, WINDOW, signals
+from livebode.nouns import Block, Channel, Responses
+from livebode.session import Audience, Axis, Destination, Session
+from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
+
+CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
+BATCH, HOP = 100, 200
+SECONDS = 75.0
+WAKE_S = 0.01
+TARGET_S = 0.020
+CORES = 2
+MakeAudience = Callable[[str], Audience]
+
+
+class Clock(Audience):
+    """Takes the time of each Block that brought a response."""
+
+    def __init__(self) -> None:
+        self.latency_s: list[float] = []
+        self._new = 0
+
+    def write(self, responses: Responses) -> None:
+        self._new += len(responses)
+
+    def followed(self, block: Block) -> None:
+        if self._new and isinstance(block, LiveBlock) and block.start >= RATE_HZ:
+            self.latency_s.append(time.monotonic() - block.arrived_s)
+        self._new = 0
+
+
+class Timed(Clock):
+    """The same around another audience, whose work counts."""
+
+    def __init__(self, inner: Audience) -> None:
+        super().__init__()
+        self._inner = inner
+        for name in ("begin", "write_parameters", "write_event", "drain_events", "finish"):
+            setattr(self, name, getattr(inner, name))
+
+    def write(self, responses: Responses) -> None:
+        self._inner.write(responses)
+        super().write(responses)
+
+    def followed(self, block: Block) -> None:
+        self._inner.followed(block)
+        super().followed(block)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    name: str
+    axes: int = 1
+    record: dict[str, object] = field(default_factory=dict)
+
+
+SCENARIOS = (
+    Scenario("one axis"),
+    Scenario("one axis, samples kept, a segment closed every 2 s", record={"samples": True, "segment_s": 2.0}),
+    Scenario("16 axes", axes=16),
+    Scenario(
+        "16 axes, samples kept, a segment closed every 10 s", axes=16, record={"samples": True, "segment_s": 10.0}
+    ),
+)
+
+
+def axis(port: int, scenario: Scenario) -> Axis:
+    data: dict[str, object] = {
+        "source": {"url": f"udp://127.0.0.1:{port}"},
+        "signals": {"excitation": "w", "input": "u", "output": "y"},
+        "lines": {"frequencies": ",".join(f"k={k}" for k in LINES.bins), "window": WINDOW},
+        "tracking": {"hop": HOP},
+        "record": scenario.record,
+    }
+    return Axis.of(data, scenario.name)
+
+
+def send(ports: list[int], end: Flag) -> None:
+    """What a cabinet of drives sends; the axes are spread over the 25 ms, as nothing keeps them in step."""
+    data = signals()[:, : 60 * RATE_HZ]
+    links = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in ports]
+    for link, port in zip(links, ports):
+        link.connect(("127.0.0.1", port))
+    began, step_s, count = time.monotonic(), BATCH / RATE_HZ / len(ports), 0
+    while not end.is_set():
+        turn, which = divmod(count, len(ports))
+        time.sleep(max(0.0, began + count * step_s - time.monotonic()))
+        first = turn * BATCH
+        at = first % data.shape[1]
+        frames = [encode_samples(Batch(first, data[:, at : at + BATCH], CHANNELS, RATE_HZ, epoch=7), sequence=turn)]
+        if first % RATE_HZ == 0:
+            frames.insert(0, encode_layout(CHANNELS, RATE_HZ, epoch=7))
+        for frame in frames:
+            try:
+                links[which].send(frame)
+            except ConnectionRefusedError:  # nobody listens yet
+                continue
+        count += 1
+
+
+def wake(end: Flag, said: Connection) -> None:
+    """How late a process wakes that does nothing else: what the machine adds to every latency meanwhile."""
+    late_s, due = [], time.monotonic()
+    while not end.is_set():
+        due += WAKE_S
+        time.sleep(max(0.0, due - time.monotonic()))
+        late_s.append(time.monotonic() - due)
+        due = max(due, time.monotonic() - WAKE_S)
+    said.send([float(np.quantile(late_s, 0.99)), max(late_s)])
+
+
+def measure(scenario: Scenario, seconds: float, audience: MakeAudience | None = None) -> dict[str, float]:
+    """Latency, losses and processor time of a scenario; `audience` makes what looks on at each axis."""
+    context = multiprocessing.get_context("spawn")
+    ports, end = _free_ports(scenario.axes), context.Event()
+    said, say = context.Pipe(duplex=False)
+    beside = [context.Process(target=send, args=(ports, end)), context.Process(target=wake, args=(end, say))]
+    clocks = {f"x{i}": Clock() if audience is None else Timed(audience(f"x{i}")) for i in range(scenario.axes)}
+    with tempfile.TemporaryDirectory() as folder:
+        session = Session(
+            {name: axis(port, scenario) for name, port in zip(clocks, ports)},
+            lambda name, _: Destination(Path(folder) / name, lambda *_: None, audience=clocks[name]),
+            tell=lambda name, event: print(f"  {name}: {event.message}"),
+            leave=lambda *_: None,
+        )
+        for process in beside:
+            process.start()
+        marks: list[tuple[float, float]] = []
+
+        def look() -> None:
+            tracking = all(thread.status.state == "tracking" for thread in session.all)
+            now = time.monotonic()
+            if tracking and (not marks or now - marks[0][0] < seconds):
+                marks[1:] = [(now, time.process_time())]
+                if len(marks) == 1:
+                    marks.append(marks[0])
+            elif marks:
+                session.end()
+
+        try:
+            session.run(look)
+        finally:
+            end.set()
+            late_s = said.recv()
+            for process in beside:
+                process.join()
+        for thread in session.all:
+            thread.result()
+    latency = np.concatenate([clock.latency_s for clock in clocks.values()])
+    health = [thread.result().summary["source"] for thread in session.all]
+    (began, cpu), (ended, cpu_then) = marks
+    return {
+        "responses": float(sum(thread.status.responses for thread in session.all)),
+        "p50, ms": 1e3 * float(np.median(latency)),
+        "p99, ms": 1e3 * float(np.quantile(latency, 0.99)),
+        "longest, ms": 1e3 * float(latency.max()),
+        "samples lost": float(sum(one["lost"] for one in health)),
+        "overflows": float(sum(one["counts"]["overflow"] for one in health)),
+        "cores used": (cpu_then - cpu) / (ended - began),
+        "seconds": ended - began,
+        "an idle process wakes late, p99, ms": 1e3 * late_s[0],
+        "the same, longest, ms": 1e3 * late_s[1],
+    }
+
+
+def report(scenario: Scenario, found: dict[str, float]) -> None:
+    print(scenario.name)
+    for label, value in found.items():
+        print(f"  {label:38}{value:10.4g}")
+    whole = not found["samples lost"] and found["cores used"] <= CORES
+    for target, reached in (
+        (f"p99 ≤ {1e3 * TARGET_S:g} ms", found["p99, ms"] <= 1e3 * TARGET_S),
+        (f"nothing lost, at most {CORES} cores", whole),
+    ):
+        print(f"  target {target}: {'reached' if reached else 'SHORT'}", flush=True)
+
+
+def _free_ports(count: int) -> list[int]:
+    links = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    for link in links:
+        link.bind(("127.0.0.1", 0))
+    ports = [int(link.getsockname()[1]) for link in links]
+    for link in links:
+        link.close()
+    return ports
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m bench.live", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each scenario")
+    parser.add_argument("--only", default="", help="scenarios whose name begins so")
+    options = parser.parse_args()
+    for scenario in SCENARIOS:
+        if scenario.name.startswith(options.only):
+            report(scenario, measure(scenario, options.seconds))
+
+
+if __name__ == "__main__":
+    main()

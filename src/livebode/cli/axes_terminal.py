@@ -1,0 +1,123 @@
+"""What the terminal shows of axes that run: a live table, or plain lines where it is none."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from livebode.nouns import Event, InputError
+from livebode.session import Session, StoppedError
+from livebode.session.axis_thread import AxisThread
+
+_COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "last event")
+_EVENT_LETTERS = 60
+_LOOKS_A_REDRAW = 5
+
+
+class AxesTerminal:
+    """Shows how the axes of a session are doing on standard error, and what they say; `quiet` says only what failed."""
+
+    def __init__(self, quiet: bool) -> None:
+        self._quiet = quiet
+        self._console = Console(stderr=True, highlight=False)
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+        self._shown: dict[AxisThread, str] = {}
+        self._looks = 0
+
+    def tell(self, name: str, event: Event) -> None:
+        """Print what an axis has to say."""
+        self._print(f"livebode: {name}: {event.message}" if name else f"livebode: {event.message}")
+
+    def run(self, session: Session) -> None:
+        """Run the session, and show it."""
+        table = self._console.is_terminal and not self._quiet
+        if table:
+            self._live.start()
+        try:
+            session.run(lambda: self._look(session, table))
+            self._look(session, False)
+        finally:
+            self._live.stop()
+
+    def leave(self, number: int, left: Mapping[str, Event]) -> None:
+        """End the process at once: what was recorded is safe, and the rest is not waited for."""
+        for name, event in left.items():
+            self.tell(name, event)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(128 + number)
+
+    def _look(self, session: Session, table: bool) -> None:
+        several = "" not in session.threads
+        for thread in session.all:
+            state = thread.status.state
+            if state == self._shown.get(thread):
+                continue
+            self._shown[thread] = state
+            if state == "refused" and several and not thread.ended_early:
+                self._print(f"livebode: {thread.name}: {said(thread.error)}")
+            elif several and not self._quiet and not table:
+                self._print(f"livebode: {thread.name}: {state}{_at(thread)}")
+        self._looks += 1
+        if table and self._looks % _LOOKS_A_REDRAW == 0:
+            self._live.update(table_of(session.all), refresh=True)
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, markup=False, soft_wrap=True)
+
+
+def table_of(threads: list[AxisThread]) -> Table:
+    """One line for each axis."""
+    table = Table(box=None, pad_edge=False)
+    for column in _COLUMNS:
+        table.add_column(column, justify="right" if column in _COLUMNS[2:7] else "left", no_wrap=True)
+    for thread in threads:
+        table.add_row(*map(Text, _row(thread)))
+    return table
+
+
+def said(error: Exception | None) -> str:
+    """A sentence, or the traceback of a fault of ours."""
+    if isinstance(error, (InputError, StoppedError)) or error is None:
+        return str(error)
+    return "".join(traceback.format_exception(error)) + "this is a fault in livebode, not yours; please report it"
+
+
+def _row(thread: AxisThread) -> tuple[str, ...]:
+    status = thread.status
+    health = status.health() if status.health is not None else None
+    event = "" if status.event is None else status.event.message
+    return (
+        thread.name or "axis",
+        status.state,
+        "" if status.rate_hz is None else f"{status.rate_hz:g} Hz",
+        str(status.samples),
+        str(status.responses),
+        "" if health is None else str(health.lost),
+        "" if status.latency_s is None else f"{1e3 * status.latency_s:.1f} ms",
+        event if len(event) <= _EVENT_LETTERS else event[:_EVENT_LETTERS] + "…",
+    )
+
+
+def _at(thread: AxisThread) -> str:
+    status = thread.status
+    return f" in {status.directory}" if status.state == "tracking" else ""
+
+
+def plain(session: Session) -> dict[str, Any]:
+    """Every axis's summary, or why it has none."""
+    return {thread.name: _plain(thread) for thread in session.all}
+
+
+def _plain(thread: AxisThread) -> dict[str, Any]:
+    if thread.outcome is None:
+        return {"error": str(thread.error)}
+    return {"directory": str(thread.outcome.directory)} | thread.outcome.summary

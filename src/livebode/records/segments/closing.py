@@ -1,0 +1,62 @@
+"""Closing: journals become segments in a thread of their own, so that tracking does not wait for it."""
+
+from __future__ import annotations
+
+import threading
+
+from livebode.records.segments.manifest import Segment
+from livebode.records.segments.shelf import Shelf
+
+# Over all records of the process: sixteen axes that close a segment in the same second would else take every core.
+_ONE_AT_A_TIME = threading.Lock()
+
+
+class Closing:
+    """Lets a Shelf keep its budget and close its journals beside what is recorded.
+
+    Nothing else may use the shelf between `begin` and the `result` or `wait` that follows.
+    """
+
+    def __init__(self, shelf: Shelf) -> None:
+        self._shelf = shelf
+        self._thread: threading.Thread | None = None
+        self._gone: list[Segment] = []
+        self._error: BaseException | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether a thread was begun, has ended, and its result was not taken."""
+        return self._thread is not None and not self._thread.is_alive()
+
+    def begin(self, bytes_max: int | None) -> None:
+        """Remove the oldest segments above `bytes_max`, then turn all sealed journals; see `result`."""
+        assert self._thread is None
+        self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
+        self._thread.start()
+
+    def result(self) -> tuple[list[Segment], OSError | None]:
+        """Wait for the end: the segments that were removed, and what the disk said where it refused.
+
+        Journals that it refused to turn are tried again with the next `begin`.
+        """
+        self.wait()
+        gone, error = self._gone, self._error
+        self._gone, self._error = [], None
+        if error is not None and not isinstance(error, OSError):
+            raise error
+        return gone, error
+
+    def wait(self) -> None:
+        """Wait for the end, whatever came of it."""
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _work(self, bytes_max: int | None) -> None:
+        try:
+            with _ONE_AT_A_TIME:
+                if bytes_max is not None:
+                    self._gone = self._shelf.make_room(bytes_max)
+                self._shelf.close_journals()
+        except BaseException as error:  # it must not vanish with the thread
+            self._error = error

@@ -1,0 +1,71 @@
+"""AxisThread: one axis of a session in a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+
+from livebode.session.axis import Axis
+from livebode.session.destination import Destination
+from livebode.session.following import Outcome
+from livebode.session.live import run_live
+from livebode.session.orders import Orders, StoppedError
+from livebode.session.recording import run
+from livebode.session.status import Status
+
+
+class AxisThread:
+    """Runs an axis until it ends, is told to end, or fails, without a consequence for the others.
+
+    Attributes
+    ----------
+    axis
+        Its configuration as it is now.
+    orders
+        What it is told.
+    status
+        How it is doing.
+    outcome, error
+        What it came to; of both one, once it has ended.
+    """
+
+    def __init__(self, name: str, axis: Axis, to: Destination, status: Status) -> None:
+        self.name, self.axis, self.status = name, axis, status
+        self.orders = Orders()
+        self.outcome: Outcome | None = None
+        self.error: Exception | None = None
+        self._to = to
+        # Not to be waited for at the end of the process: what is recorded is safe, and a second signal means at once.
+        self._thread = threading.Thread(target=self._work, name=f"livebode axis {name}", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        return self._thread.is_alive()
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether it was told to end before it had anything to leave."""
+        return self.orders.ended and (isinstance(self.error, StoppedError) or self.status.directory is None)
+
+    def end(self) -> None:
+        """Tell it to end."""
+        if self.alive:
+            self.status.state = "finishing"
+        self.orders.end()
+
+    def result(self) -> Outcome:
+        """What it came to, once it has ended; raises what it failed with."""
+        if self.outcome is None:
+            assert self.error is not None
+            raise self.error
+        return self.outcome
+
+    def _work(self) -> None:
+        try:
+            job = run_live if self.axis.source.live else run
+            self.outcome = job(self.axis, self._to, self.orders)
+        except Exception as error:  # a sentence for the user, or a fault of ours: the other axes go on
+            self.error = error
+        self.status.state = "done" if self.error is None else "refused"

@@ -1,0 +1,61 @@
+"""Change: what an edit of the configuration means for an axis that runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from livebode.nouns import Event, InputError
+from livebode.session.axis import Axis, RecordSection
+from livebode.session.orders import Orders
+from livebode.session.pipeline import Pipeline
+from livebode.sources.live import LiveSource
+
+_KIND = "configuration-applied"
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What an axis is told: to cut its record otherwise (`kept`), or to go on in another run (`pipeline`)."""
+
+    sections: tuple[str, ...]
+    kept: RecordSection | None = None
+    pipeline: Pipeline | None = None
+
+    @property
+    def event(self) -> Event:
+        """What is to be said of it."""
+        names = " and ".join(f"[{name}]" for name in self.sections)
+        how = "in place" if self.pipeline is None else "in another run, from the very next sample on"
+        return Event(_KIND, 0, 0.0, f"{names} changed: applied {how}", {"sections": list(self.sections)})
+
+    def tell(self, orders: Orders) -> None:
+        """Tell it; the event comes into the record that it finds."""
+        orders.say(_KIND, self.event.message, **self.event.details)
+        if self.kept is not None:
+            orders.keep(self.kept)
+        if self.pipeline is not None:
+            orders.change(self.pipeline)
+
+
+def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
+    """What turns one configuration into the other; None where they are the same.
+
+    Raises
+    ------
+    InputError
+        Where the new one cannot be applied without losing samples, or does not fit the source.
+    """
+    if old == new:
+        return None
+    sections = tuple(name for name in type(new).model_fields if getattr(old, name) != getattr(new, name))
+    if source is None:
+        raise InputError("a recording is tracked as it was begun; end livebode and start it again")
+    if "source" in sections:
+        raise InputError(
+            "[source] cannot be changed without losing samples; end livebode, or take the axis out and put it in again "
+            "under another name"
+        )
+    kept, before = new.record or RecordSection(), old.record or RecordSection()
+    if sections == ("record",) and kept.samples == before.samples:
+        return Change(sections, kept=kept)
+    return Change(sections, pipeline=Pipeline.live(new, source))

@@ -1,0 +1,111 @@
+"""The axes of a file: one, or several under [axes], each with what the file says for all of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import InputError
+from livebode.session.axis import Axis
+from livebode.session.toml_file import parse_table, read_bytes, shortened
+
+AXES_MAX = 64
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+_SUCCESSOR = re.compile(r".*-[0-9]+")
+Axes = Mapping[str, Axis]
+"""By name; the only axis of a file without [axes] has no name: it is the empty text."""
+
+
+class ConfigurationFile:
+    """A TOML file of axes that may be edited while they run.
+
+    Parameters
+    ----------
+    path
+        The file; relative paths in it are from its folder.
+    over
+        Sections whose keys are put over those of every axis: options of the command line.
+    """
+
+    def __init__(self, path: Path, over: Mapping[str, Mapping[str, Any]]) -> None:
+        self.path, self._over = path, over
+        self._used = self._seen = b""
+
+    def read(self) -> dict[str, Axis]:
+        """The axes in it.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read, is not TOML, or an axis cannot be; the message names axis, key and value.
+        """
+        self._used = self._seen = read_bytes(self.path)
+        return axes_of(self._used, self.path, self._over)
+
+    def changed(self) -> bool:
+        """Whether it is not what was read last, and is the same as a look ago: nobody is writing it just now."""
+        try:
+            data = read_bytes(self.path)
+        except InputError:
+            return False  # an editor may be replacing it
+        steady, self._seen = data == self._seen, data
+        return steady and data != self._used
+
+
+def axes_of(data: bytes, path: Path, over: Mapping[str, Mapping[str, Any]]) -> dict[str, Axis]:
+    """The axes in the bytes of a file; see `ConfigurationFile`."""
+    found = {}
+    for name, table in tables_of(parse_table(data, str(path)), str(path)).items():
+        origin = f"{path}, axis {name}" if name else str(path)
+        axis = Axis.of(table, origin).beside(path.parent)
+        if over:
+            axis = Axis.of(merged(axis.model_dump(exclude_unset=True), over), origin)
+        found[name] = axis
+    return found
+
+
+def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]:
+    """Each axis's sections: those outside [axes] hold for all, and its own go over them key by key."""
+    if "axes" not in data:
+        return {"": dict(data)}
+    axes = data["axes"]
+    if not isinstance(axes, dict) or not axes or not all(isinstance(axis, dict) for axis in axes.values()):
+        raise InputError(f"{origin}: 'axes' is no table of axes; write [axes.NAME.source] and so on")
+    if len(axes) > AXES_MAX:
+        raise InputError(f"{origin} has {len(axes)} axes, more than {AXES_MAX}; take several files")
+    shared = {key: value for key, value in data.items() if key != "axes"}
+    for name in axes:
+        _check_name(name, origin)
+    folded = [name.casefold() for name in axes]
+    if twice := [name for name in axes if folded.count(name.casefold()) > 1]:
+        raise InputError(f"{origin}: the axes {' and '.join(map(repr, twice[:2]))} differ in nothing but capitals")
+    return {name: merged(shared, axis) for name, axis in axes.items()}
+
+
+def merged(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Both, key by key down to single values, with those of `over` where both have one.
+
+    >>> merged({"lines": {"window": 400}, "fit": {}}, {"lines": {"window": 800, "frequencies": "20"}})
+    {'lines': {'window': 800, 'frequencies': '20'}, 'fit': {}}
+    """
+    result = dict(below)
+    for key, value in over.items():
+        before = result.get(key)
+        both = isinstance(before, Mapping) and isinstance(value, Mapping)
+        result[key] = merged(before, value) if both else value  # type: ignore[arg-type]
+    return result
+
+
+def _check_name(name: str, origin: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"{origin}: the axis {shortened(name)} names a directory; take up to 64 letters, digits, _ and -, "
+            "and a letter or digit first"
+        )
+    if _SUCCESSOR.fullmatch(name):
+        raise InputError(
+            f"{origin}: the axis {name!r} is called like a run that goes on from another; take "
+            f"{name.replace('-', '_')!r}"
+        )

@@ -1,0 +1,290 @@
+"""Following: the samples of a source through a pipeline into the directory of a run, and what they came to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+import numpy as np
+
+from livebode.estimation import response_unit
+from livebode.fitting import Fit
+from livebode.nouns import Block, Channel, Event, InputError, Responses
+from livebode.records import RunDirectory
+from livebode.session import summary
+from livebode.session.audience import Audience, Outlet
+from livebode.session.axis import RecordSection
+from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.continuing import Before, Numbering
+from livebode.session.destination import Destination
+from livebode.session.orders import Orders, StoppedError
+from livebode.session.overview import Overview
+from livebode.session.pipeline import Pipeline
+from livebode.session.tally import Tally
+from livebode.sources.live import Health, LiveSource
+
+if TYPE_CHECKING:
+    from livebode.session.segmented import SegmentedRun
+
+
+class Source(Protocol):
+    """What a run takes its samples from: a recording or a simulated machine."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def samples(self) -> int | None: ...
+
+    @property
+    def blocks(self) -> Callable[..., Iterator[Block]]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run came to: its directory, its summary as in run.json, a thinned copy of its responses, and the newest
+    fit that holds."""
+
+    directory: Path
+    summary: dict[str, Any]
+    responses: Responses
+    fit: Fit | None = None
+
+
+class Tracking:
+    """One run, from its first Block to run.json. Use it as a context manager around `follow`, `end` and `finish`.
+
+    Parameters
+    ----------
+    source
+        Where the samples come from.
+    pipeline
+        What they go through.
+    to
+        Where the run goes, and who hears of it.
+    about
+        What run.json says of it besides.
+    kept
+        How it is kept in segments; None for a run in one piece.
+    again
+        Whether the source begins with the same samples each time.
+    started
+        `time.perf_counter()` when opening the source began, where that is to count in the speed.
+    orders
+        What it is told meanwhile.
+    numbering
+        Of a source that cannot go back.
+    before
+        The run that it goes on from.
+    delivery
+        Goes to the source's `blocks`.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        pipeline: Pipeline,
+        to: Destination,
+        *,
+        about: dict[str, Any],
+        kept: RecordSection | None,
+        again: bool = True,
+        started: float | None = None,
+        orders: Orders | None = None,
+        numbering: Numbering | None = None,
+        before: Before | None = None,
+        **delivery: Any,
+    ) -> None:
+        _keep_freed_memory()
+        self.source, self.pipeline, self.to, self._about, self._kept = source, pipeline, to, about, kept
+        self._orders, self._numbering = orders or Orders(), numbering or Numbering()
+        self._follower, settings = pipeline.follower, pipeline.follower.settings
+        self._blocks = source.blocks(pipeline.channels, **delivery)
+        check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
+        self._tally = Tally(check, time.perf_counter() if started is None else started, before)
+        self._goes_on = before is not None
+        self._begun = summary.begun(about, self._follower, response_unit(source.channels, settings))
+        self._overview = Overview()
+        self._done: dict[str, Any] = {}
+        self._newest: Fit | None = None
+        self._origin_s = 0.0
+        self.recorder = self._recorder(again, before)
+        self._out = Outlet(self.recorder, to.audience)
+
+    def _recorder(self, again: bool, before: Before | None) -> RunDirectory | SegmentedRun:
+        if self._kept is None:
+            return RunDirectory(self.to.directory, force=self.to.force)
+        from livebode.session.segmented import SegmentedRun  # needs a POSIX system
+
+        channels = {channel.name: channel for channel in self.source.channels}
+        return SegmentedRun(
+            self.to.directory,
+            self._kept,
+            force=self.to.force,
+            summary=self._begun,
+            channels=[channels[name] for name in self.pipeline.channels],
+            rate_hz=self._follower.settings.lines.rate_hz,
+            parts=dict(self.pipeline.parts) | {"tally": self._tally},
+            again=again,
+            ends=self.source.samples is not None,
+            tell=self._said,
+            numbering=self._numbering,
+            before=before,
+        )
+
+    def _said(self, event: Event) -> None:
+        self.to.tell(event)
+        self.to.audience.write_event(event)
+
+    def __enter__(self) -> Self:
+        recorder = self.recorder.__enter__()
+        if not isinstance(recorder, RunDirectory):
+            self._orders.left = recorder.stopped
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.recorder.__exit__(*error)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """run.json as it ends; empty before `end`."""
+        return self._done
+
+    @property
+    def position(self) -> tuple[int, float]:
+        """Number and time of the next sample."""
+        stop = self._tally.stop
+        return stop, self._origin_s + stop / self._follower.settings.lines.rate_hz
+
+    def follow(self) -> None:
+        """Every Block through the pipeline into the record; InputError where there is none."""
+        fits, watching = self.pipeline.fits, self.pipeline.watching
+        self.to.audience.begin(self.to.directory, self._begun, _health(self.source))
+        blocks = self._blocks
+        if not isinstance(self.recorder, RunDirectory):
+            for responses in self.recorder.before():
+                self._overview.add(responses)
+                self.to.audience.write(responses)
+                if fits is not None:
+                    fits.take(responses[0:0], self._out)  # which tells it the lines
+            blocks = self.recorder.feed(blocks)
+        if watching is not None:
+            blocks = watching.over(blocks, self._out.write_event)
+        for block in _told(blocks, self.to.audience):
+            if self._orders.ended and not isinstance(self.source, LiveSource):
+                raise StoppedError("ended before the end of the recording")
+            self._origin_s = block.origin_s
+            self._tally.check.take(block)
+            self._tally.stop = block.stop
+            self._step(partial(self._follower.process, block))
+            self.to.progress(self._follower.counts["samples"], self.source.samples)
+        if not self._tally.stop:
+            raise InputError("the recording holds no samples")
+
+    def _step(self, step: Callable[[], Responses | None]) -> None:
+        """Take one step of the follower, and publish its responses and what happened meanwhile."""
+        before = time.perf_counter()
+        responses = step()
+        if responses is not None:
+            self._tally.take(responses, time.perf_counter() - before)
+            self._publish(responses)
+        events = self._drained() + self._follower.drain_events() + self._out.drain_events()
+        for event in events + self._orders.drain_events(*self.position):
+            self._out.write_event(event)
+        if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
+            self.recorder.keep(kept)
+
+    def _publish(self, responses: Responses) -> None:
+        fits, watching = self.pipeline.fits, self.pipeline.watching
+        self._overview.add(responses)
+        self._out.write(responses)
+        parameters = None if fits is None else fits.take(responses, self._out)
+        if watching is not None:
+            watching.follow(responses, parameters, self._out.write_event)
+
+    def _drained(self) -> list[Event]:
+        """What a live source has to say; a recording says it all at once."""
+        if not isinstance(self.source, LiveSource):
+            return []
+        rate_hz = self._follower.settings.lines.rate_hz
+        return [self._numbering.said(event, rate_hz) for event in self.source.drain_events()]
+
+    def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
+        """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.
+
+        Raises
+        ------
+        InputError
+            Where the signals mean nothing. In segments they are kept if there are responses, and an event says it.
+        """
+        try:
+            self._judge(hand_out=not handed_over)
+        except InputError as error:
+            if self._kept is None or not (self._tally.responses or self._goes_on or continued_in):
+                raise
+            # What was recorded stays, and says what is wrong with it.
+            self._out.write_event(Event("doubtful", *self.position, str(error)))
+        for event in self._drained() + self._orders.drain_events(*self.position):
+            self._out.write_event(event)
+        fits, watching = self.pipeline.fits, self.pipeline.watching
+        self._done = summary.begun(self._about, self._follower, self._begun["found"]["unit"])
+        self._done |= summary.done(self._follower, self._tally)
+        self._newest = None if fits is None else fits.newest()
+        self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, self._overview.responses())
+        if watching is not None:
+            self._done["monitoring"] = watching.finish(self._out.write_event)
+        if continued_in is not None:
+            self._done["continued_in"] = continued_in
+
+    def _judge(self, *, hand_out: bool) -> None:
+        """Hand out what is held back at the end; InputError where the responses mean nothing."""
+        follower, tally = self._follower, self._tally
+        window = follower.settings.lines.window
+        tally.check.finish()
+        check_length(follower.counts["samples"], window)
+        if hand_out and tally.handed_out != tally.stop:
+            self._step(follower.finish)
+            tally.handed_out = tally.stop
+        check_excitation(follower, tally.check.variance)
+        check_some_valid(tally.responses, tally.valid_lines, follower.counts, window)
+
+    def finish(self) -> Outcome:
+        """Draw the pictures and put the record in its place."""
+        label = _schedule_label(self.source, self._follower.settings.schedule)
+        responses = self._overview.responses()
+
+        def draw(into: Path) -> None:
+            if len(responses):
+                self.to.draw(responses, into, label, self._newest)
+
+        if isinstance(self.recorder, RunDirectory):
+            self.recorder.finish(self._done, draw)
+        else:
+            self.recorder.finish(self._done, draw, ends="continued_in" in self._done)
+        return Outcome(self.to.directory, self._done, responses, self._newest)
+
+
+def _told(blocks: Iterator[Block], audience: Audience) -> Iterator[Block]:
+    """The same blocks; `audience` hears of each when the next one is asked for."""
+    for block in blocks:
+        yield block
+        audience.followed(block)
+
+
+def _health(source: Source) -> Callable[[], Health] | None:
+    return (lambda: source.health) if isinstance(source, LiveSource) else None
+
+
+def _keep_freed_memory() -> None:
+    # glibc gives the memory of freed arrays back, and takes it again page by page for the next block: a third of the
+    # tracker's time. Once an array of this size was freed, it keeps what smaller ones leave.
+    np.empty(31 << 20, dtype=np.uint8)
+
+
+def _schedule_label(source: Source, name: str | None) -> str:
+    unit = next((channel.unit for channel in source.channels if channel.name == name), "")
+    return f"{name} in {unit}" if name and unit else name or ""

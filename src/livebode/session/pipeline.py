@@ -1,0 +1,90 @@
+"""Pipeline: what the samples of an axis go through, from the tracker to the alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from livebode.nouns import InputError, missing_channel
+from livebode.session.axis import Axis
+from livebode.session.fits import Fits
+from livebode.session.follower import Follower
+from livebode.session.plan import live_follower
+from livebode.session.stateful import Stateful
+from livebode.session.watching import Watching, make_watching
+from livebode.sources.live import LiveSource
+
+
+@dataclass(frozen=True, eq=False)
+class Pipeline:
+    """What the samples of an axis go through; nothing of it has begun when it is made.
+
+    Attributes
+    ----------
+    axis
+        What it was made from; None where it was put together by hand.
+    follower
+        Turns samples into responses.
+    fits
+        A model fitted to each, where one is asked for.
+    watching
+        Tells changes, or that it cannot.
+    """
+
+    follower: Follower
+    fits: Fits | None = None
+    watching: Watching | None = None
+    axis: Axis | None = None
+
+    @classmethod
+    def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
+        """What the axis asks for behind its follower, with or without `samples`; InputError where it cannot be."""
+        settings = follower.settings
+        return cls(follower, Fits.of(axis.fit, settings.loop), make_watching(axis, settings, samples=samples), axis)
+
+    @classmethod
+    def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
+        """The same for a machine that sends, whose channels and rate are known; InputError where they do not fit."""
+        pipeline = cls.of(axis, live_follower(axis, source), samples=source.spectra is None)
+        names = [channel.name for channel in source.channels]
+        for name in pipeline.channels:
+            if name not in names:
+                raise InputError(missing_channel(name, names))
+        return pipeline
+
+    @property
+    def signals(self) -> list[str]:
+        """Channels that the follower correlates."""
+        settings = self.follower.settings
+        return [name for role in settings.roles if (name := settings.channel(role))]
+
+    @property
+    def channels(self) -> list[str]:
+        """All channels in use, each once."""
+        schedule = self.follower.settings.schedule
+        return list(dict.fromkeys(self.signals + ([schedule] if schedule else [])))
+
+    @property
+    def parts(self) -> Mapping[str, Stateful]:
+        """What has a state, by name."""
+        optional = {"fits": self.fits, "watching": self.watching}
+        return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
+
+    def take_over(self, before: Pipeline) -> bool:
+        """Go on with the state of the one before, as far as the settings that it depends on are the same.
+
+        Returns whether the follower goes on, so that no window is lost; else it begins anew.
+        """
+        try:
+            self.follower.restore(before.follower.snapshot())
+        except InputError:
+            return False
+        if self._same(before, "signals", "tracking", "loop", "motion"):
+            if self.fits and before.fits and self._same(before, "fit"):
+                self.fits.restore(before.fits.snapshot())
+            if self.watching and before.watching and self._same(before, "monitoring", "fit"):
+                self.watching.restore(before.watching.snapshot())
+        return True
+
+    def _same(self, other: Pipeline, *sections: str) -> bool:
+        return all(getattr(self.axis, name) == getattr(other.axis, name) for name in sections)

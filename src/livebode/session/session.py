@@ -1,0 +1,178 @@
+"""Session: the axes of a configuration, each in its thread, until all have ended; and what an edit of it changes."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from livebode.nouns import Event, InputError
+from livebode.session.axis import Axis
+from livebode.session.axis_thread import AxisThread
+from livebode.session.change import Change, change_of
+from livebode.session.configuration import Axes, ConfigurationFile
+from livebode.session.destination import Destination
+from livebode.session.status import Status
+
+TICK_S = 0.1
+LOOK_S = 1.0
+"""How often the file is looked at."""
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+
+
+class Session:
+    """Runs axes until all have ended; an axis that fails does not end the others.
+
+    SIGINT and SIGTERM end every axis whole; the second one `leave`s. SIGHUP, or an edit of the file, is checked whole
+    and then applied, or refused for all axes alike. Signals are heard in the main thread only.
+
+    Parameters
+    ----------
+    axes
+        By name.
+    to
+        Where an axis goes, by name and configuration.
+    tell
+        Called with an axis's name, and what it has to say.
+    file
+        Where `axes` come from, if they may change.
+    leave
+        Called by the second signal with its number and what is to be said of each unfinished run; it does not return.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        to: Callable[[str, Axis], Destination],
+        *,
+        tell: Callable[[str, Event], None],
+        leave: Callable[[int, Mapping[str, Event]], None],
+        file: ConfigurationFile | None = None,
+    ) -> None:
+        self._to, self._tell, self._leave, self._file = to, tell, leave, file
+        self.threads: dict[str, AxisThread] = {}
+        """The axes of the configuration as it is now, by name."""
+        self.taken_out: list[AxisThread] = []
+        """Those that an edit of it took out."""
+        self.ended_by = 0
+        """The signal that ended it, or 0."""
+        self._reload_asked = threading.Event()
+        for name, axis in axes.items():
+            self._add(name, axis)
+
+    def run(self, look: Callable[[], None] = lambda: None) -> None:
+        """Until every axis has ended; `look` is called ten times a second, in this thread."""
+        with self._hearing():
+            for thread in list(self.threads.values()):
+                thread.start()
+            looked_s = time.monotonic()
+            while any(thread.alive for thread in self.all):
+                time.sleep(TICK_S)
+                look()
+                asked, now = self._reload_asked.is_set(), time.monotonic()
+                if self._file is not None and not self.ended_by and (asked or now - looked_s >= LOOK_S):
+                    looked_s = now
+                    self._look_at(self._file, asked)
+
+    @property
+    def all(self) -> list[AxisThread]:
+        """Every axis that was begun."""
+        return [*self.taken_out, *self.threads.values()]
+
+    def end(self) -> None:
+        """End every axis whole."""
+        for thread in self.all:
+            thread.end()
+
+    def _add(self, name: str, axis: Axis, *, anew: bool = True) -> AxisThread:
+        """An axis that may replace what was recorded before this session, and nothing of what was recorded in it."""
+        to = self._to(name, axis)
+        status = Status(to.audience)
+        to = replace(to, force=to.force and anew, audience=status, tell=lambda event: self._tell(name, event))
+        self.threads[name] = AxisThread(name, axis, to, status)
+        return self.threads[name]
+
+    def _look_at(self, file: ConfigurationFile, asked: bool) -> None:
+        running = [thread for thread in self.threads.values() if thread.alive]
+        if any(thread.axis.source.live and thread.orders.source is None for thread in running):
+            return  # an axis whose channels and rate are not known yet cannot be checked against another configuration
+        if not file.changed() and not asked:
+            return
+        self._reload_asked.clear()
+        try:
+            axes = file.read()
+            changes = self._checked(axes)
+        except (InputError, MemoryError) as error:
+            why = str(error) or "there is not enough memory for it"
+            self._say("configuration-refused", f"the configuration is refused, and the one before it stays: {why}")
+            return
+        if axes == {name: thread.axis for name, thread in self.threads.items()}:
+            if asked:
+                self._say("configuration-applied", "the configuration is the same", record=False)
+            return
+        self._apply(axes, changes)
+
+    def _checked(self, axes: Axes) -> dict[str, Change | None]:
+        """What each axis that runs is told; InputError where one of them cannot go on so."""
+        changes: dict[str, Change | None] = {}
+        if ("" in axes) != ("" in self.threads):
+            raise InputError("one axis does not become several while it runs; end livebode and start it again")
+        if finishing := [thread.name for thread in self.taken_out if thread.alive and thread.name in axes]:
+            raise InputError(f"axis {finishing[0]} was taken out and is still being finished; try again a moment later")
+        for name, thread in self.threads.items():
+            if name not in axes or not thread.alive:
+                continue
+            try:
+                changes[name] = change_of(thread.axis, axes[name], thread.orders.source)
+            except InputError as error:
+                raise InputError(f"axis {name}: {error}" if name else str(error)) from None
+        return changes
+
+    def _apply(self, axes: Axes, changes: Mapping[str, Change | None]) -> None:
+        for name, change in changes.items():
+            thread = self.threads[name]
+            if change is not None:
+                change.tell(thread.orders)
+                thread.axis = axes[name]
+                self._tell(name, change.event)
+        for name in [name for name in self.threads if name not in axes]:
+            self._tell(name, Event("configuration-applied", 0, 0.0, "the axis was taken out, and ends"))
+            self.taken_out.append(self.threads.pop(name))
+            self.taken_out[-1].end()
+        for name, axis in axes.items():
+            old = self.threads.get(name)
+            if old is None or (not old.alive and old.axis != axis):
+                self._tell(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
+                self._add(name, axis, anew=False).start()
+
+    def _say(self, kind: str, message: str, *, record: bool = True) -> None:
+        self._tell("", Event(kind, 0, 0.0, message))
+        for thread in self.threads.values() if record else ():
+            if thread.alive:
+                thread.orders.say(kind, message)
+
+    @contextmanager
+    def _hearing(self) -> Iterator[None]:
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        handlers: dict[signal.Signals, Any] = dict.fromkeys(_ENDING, self._heard)
+        if self._file is not None and hasattr(signal, "SIGHUP"):
+            handlers[signal.SIGHUP] = lambda *_: self._reload_asked.set()
+        before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _heard(self, number: int, _frame: object) -> None:
+        if self.ended_by:
+            left = {t.name: t.orders.left() for t in self.all if t.alive and t.orders.left is not None}
+            self._leave(number, left)
+        self.ended_by = number
+        self.end()

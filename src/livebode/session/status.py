@@ -1,0 +1,82 @@
+"""Status: how an axis is doing, for who looks at it from another thread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.session.audience import Audience
+from livebode.sources.live import Health, LiveBlock
+
+_LATENCY_OVER_S = 2.0
+
+
+class Status(Audience):
+    """Keeps what a line about the axis needs, and passes everything on to the audience proper.
+
+    Attributes
+    ----------
+    state
+        "waiting", "tracking", "finishing", "done" or "refused".
+    directory
+        Where its newest run is recorded.
+    samples, responses
+        How many were followed and published.
+    rate_hz
+        Samples per second, as the Blocks say; None before the first.
+    event
+        The newest one.
+    health
+        How its live source is doing; None of a recording.
+    """
+
+    def __init__(self, audience: Audience) -> None:
+        self._audience = audience
+        self.state = "waiting"
+        self.directory: Path | None = None
+        self.samples = self.responses = 0
+        self.rate_hz: float | None = None
+        self.event: Event | None = None
+        self.health: Callable[[], Health] | None = None
+        self._since_s = 0.0
+        self._latest: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def latency_s(self) -> float | None:
+        """From a Block's arrival until all that came of it was published, the longest of the last seconds."""
+        longest = max(self._latest)
+        return longest if longest > 0 else None
+
+    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
+        self.state, self.directory, self.health = "tracking", directory, health
+        self._audience.begin(directory, summary, health)
+
+    def write(self, responses: Responses) -> None:
+        self.responses += len(responses)
+        self._audience.write(responses)
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        self._audience.write_parameters(*parts)
+
+    def write_event(self, event: Event) -> None:
+        self.event = event
+        self._audience.write_event(event)
+
+    def drain_events(self) -> list[Event]:
+        return self._audience.drain_events()
+
+    def followed(self, block: Block) -> None:
+        self.samples += len(block)
+        self.rate_hz = block.rate_hz
+        if isinstance(block, LiveBlock):
+            now = time.monotonic()
+            if now - self._since_s > _LATENCY_OVER_S:
+                self._since_s, self._latest = now, (0.0, self._latest[0])
+            self._latest = (max(self._latest[0], now - block.arrived_s), self._latest[1])
+        self._audience.followed(block)
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self._audience.finish(summary)

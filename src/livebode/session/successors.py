@@ -1,0 +1,58 @@
+"""Under which names a run goes on when its configuration changes: NAME, NAME-2, NAME-3, …"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+
+def newest(directory: Path) -> Path:
+    """The run in which the one in this directory went on last; the directory itself where it did not."""
+    return [directory, *_after(directory)][-1]
+
+
+def all_of(directory: Path) -> list[Path]:
+    """This run and those in which it went on, by age."""
+    return [directory, *_after(directory)]
+
+
+def free(directory: Path) -> Path:
+    """Where a run that began in this directory can go on: the first name behind its newest that is not taken."""
+    number = _number(newest(directory), directory) + 1
+    while (path := _named(directory, number)).exists():
+        number += 1
+    return path
+
+
+def _after(directory: Path) -> list[Path]:
+    before = {}
+    for path in directory.parent.glob("*"):
+        if _number(path, directory) > 1 and (name := _summary(path).get("continues")) is not None:
+            before[str(name)] = path
+    found, name = [], directory.name
+    while name in before:
+        path = before.pop(name)
+        found.append(path)
+        name = path.name
+    return found
+
+
+def _named(directory: Path, number: int) -> Path:
+    return directory.with_name(f"{directory.name}-{number}")
+
+
+def _number(path: Path, first: Path) -> int:
+    """1 for the first, 2 for NAME-2, 0 for any other."""
+    if path.name == first.name:
+        return 1
+    text = path.name.removeprefix(f"{first.name}-")
+    return int(text) if text != path.name and text.isascii() and text.isdecimal() and len(text) < 10 else 0
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads((path / "run.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -1,0 +1,65 @@
+"""What run.json says of a run."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from livebode.fitting import Fit
+from livebode.kernel import instruction_set
+from livebode.nouns import Responses
+from livebode.session.fits import Fits
+from livebode.session.follower import Follower
+from livebode.session.loop_report import loop_report
+from livebode.session.tally import Tally
+from livebode.sources.live import LiveSource
+
+
+def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
+    """From the beginning: configuration, what was found, versions."""
+    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
+    versions = {
+        "livebode": version("livebode"),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "instruction_set": instruction_set(),
+    }
+    return dict(about) | {"found": about.get("found", {}) | found, "versions": versions}
+
+
+def done(tracker: Follower, tally: Tally) -> dict[str, Any]:
+    """At the end: what was counted, and how fast it went."""
+    counts, run_s = tally.counts(tracker.counts), tally.run_s
+    recorded_s = counts["samples"] / tracker.settings.lines.rate_hz
+    speed = {
+        "recorded_s": recorded_s,
+        "run_s": run_s,
+        "tracking_s": tally.tracked_s,
+        "times_real_time": recorded_s / run_s,
+        "samples_per_s": counts["samples"] / tally.tracked_s,
+    }
+    counts |= {"responses": tally.responses, "invalid_responses": tally.invalid}
+    return {"counts": counts, "speed": speed}
+
+
+def of_source(source: object) -> dict[str, Any]:
+    """How a live source did; nothing of a recording."""
+    if not isinstance(source, LiveSource):
+        return {}
+    return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
+
+
+def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+    """What the fits came to, and the margins of a known loop around them."""
+    if fits is None:
+        return {}
+    summary = {"fit": fits.summary()}
+    if newest is not None and fits.loop is not None:
+        words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+        summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
+    return summary

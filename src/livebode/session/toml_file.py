@@ -1,0 +1,88 @@
+"""A configuration's file: TOML of bounded size, as plain data."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import InputError
+
+FILE_BYTES_MAX = 1 << 20
+_SHOWN = 120
+_TEXT_MAX, _LINES_MAX, _DEPTH_MAX = 500, 20_000, 12
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """What is in a TOML file; InputError where it cannot be read, is not TOML, or is longer than 1 MiB."""
+    return parse_table(read_bytes(path), str(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file as it is, at most a byte more than may be; InputError where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(FILE_BYTES_MAX + 1)
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}; check the name") from None
+    except OSError as error:
+        raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+
+
+def parse_table(data: bytes, origin: str) -> dict[str, Any]:
+    """What is in the text of a TOML file; `origin` names it in messages."""
+    if len(data) > FILE_BYTES_MAX:
+        raise InputError(f"{origin!r} is longer than {FILE_BYTES_MAX} bytes; is it a configuration?")
+    try:
+        found = tomllib.loads(data.decode("utf-8"))
+        _check_texts(found, "", origin, 0)
+        return found
+    except UnicodeDecodeError:
+        raise InputError(f"{origin!r} is not text; give a configuration in TOML, or a recording") from None
+    except RecursionError:
+        raise InputError(f"{origin!r} is not a configuration: its values are nested too deeply") from None
+    except InputError:
+        raise
+    except ValueError as error:  # also a number of more digits than Python reads
+        raise InputError(f"{origin!r} is not TOML: {one_line(str(error))}") from None
+
+
+def shortened(value: Any) -> str:
+    """A value in a message, however long it is."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deeply, or more digits than Python writes
+        return "that"
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
+
+
+def one_line(text: str) -> str:
+    """Text of a user in a message: printable, and not endless.
+
+    >>> one_line("lines.\\n")
+    'lines. '
+    """
+    shown = "".join(letter if letter.isprintable() else " " for letter in text[: 4 * _SHOWN])
+    return shown if len(text) <= 2 * _SHOWN else shown[: 2 * _SHOWN] + "…"
+
+
+def _check_texts(value: Any, place: str, origin: str, depth: int) -> None:
+    if depth > _DEPTH_MAX:
+        raise InputError(f"{origin!r} is not a configuration: its values are nested too deeply")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_text(key, f"a key in [{place}]" if place else "a key", origin)
+            _check_texts(inner, f"{place}.{key}" if place else key, origin, depth + 1)
+    elif isinstance(value, list):
+        for inner in value:
+            _check_texts(inner, place, origin, depth + 1)
+    elif isinstance(value, str):
+        _check_text(value, place, origin)
+
+
+def _check_text(text: str, place: str, origin: str) -> None:
+    long = _LINES_MAX if place.endswith("frequencies") else _TEXT_MAX
+    if len(text) > long:
+        raise InputError(f"{origin}: {place} has {len(text)} letters, more than {long}")
+    if not text.isprintable():
+        raise InputError(f"{origin}: {place} = {shortened(text)} has a letter that cannot be printed; leave it out")

@@ -1,0 +1,144 @@
+"""Several axes in one file: each as if it were alone, and none ended by another."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.estimation import Settings, Tracker
+from livebode.nouns import Lines
+from livebode.records import Run
+from tests.command import livebode, signals, write_parquet
+from tests.peers.machine import Machine
+from tests.recorded import same
+from tests.session_process import SHARED, Running, block, check_samples, events, numbers, said, source
+
+LINES = Lines.parse("50,100,200", 1000.0, 100)
+SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
+
+
+def two(a: Machine, b: Machine) -> str:
+    return f"{SHARED}[axes.x]\n{source(a)}[axes.y]\n{source(b)}lines.window = 200\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_each_axis_leaves_what_it_would_have_left_alone(tmp_path: Path, number: int) -> None:
+    with Machine(tmp_path) as a, Machine(tmp_path, times=1.0) as b, Running(tmp_path, two(a, b)) as running:
+        running.tracked("x", 2500)
+        running.tracked("y", 500)
+        for machine in (a, b):
+            machine.silence()
+        time.sleep(0.5)  # what was sent is on its way
+        code, out, err = running.end(number)
+        sent = {"x": a.sent, "y": b.sent}
+    assert (code, err) == (0, "")
+    summaries = json.loads(out)["axes"]
+    for name, samples in sent.items():
+        run = Run.open(running.out / name)
+        check_samples([run.path], samples)
+        assert run.lines.window == {"x": 100, "y": 200}[name]
+        assert summaries[name]["counts"]["samples"] == samples
+        assert (run.path / "bode.png").stat().st_size > 10_000
+        assert not [e.kind for e in run.events() if e.kind != "connected"]
+    assert same(Run.open(running.out / "x").responses(), Tracker(SETTINGS).process(block(sent["x"])))
+
+
+def test_an_axis_that_fails_does_not_end_the_others(tmp_path: Path) -> None:
+    with Machine(tmp_path) as a, Machine(tmp_path) as b:
+        text = f'{SHARED}[axes.x]\n{source(a)}[axes.gone]\nsource.url = "tcp://127.0.0.1:1"\nsource.timeout_s = 0.3\n'
+        text += f"[axes.odd]\n{source(b)}signals.output = 'yy'\n"
+        with Running(tmp_path, text) as running:
+            running.tracked("x", 1500)
+            code, out, err = running.end()
+    assert code == 2
+    found = json.loads(out)["axes"]
+    assert "no samples came" in found["gone"]["error"]
+    assert "did you mean 'y'" in found["odd"]["error"]
+    assert found["x"]["counts"]["samples"] >= 1500
+    assert sorted(line.split(":")[1] for line in err.splitlines()) == [" gone", " odd"]
+
+
+def test_a_second_signal_leaves_what_was_recorded_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    with Machine(tmp_path) as a, Machine(tmp_path) as b:
+        text = two(a, b)
+        with Running(tmp_path, text) as running:
+            running.tracked("x", 1500)
+            running.tracked("y", 500)
+            running.process.send_signal(signal.SIGINT)
+            code, _, err = running.end()
+        assert code in (130, 0)  # 0 where it had ended before the second one came
+        assert "Traceback" not in err
+        held = {name: numbers(running.out / name).size for name in "xy"}
+        with Running(tmp_path, text) as running:
+            for name in "xy":
+                running.tracked(name, held[name] + 200)
+            assert running.end()[0] == 0
+    for name in "xy":
+        number = numbers(running.out / name)
+        assert np.array_equal(number[: held[name]], np.arange(held[name]))
+        assert np.count_nonzero(np.diff(number) != 1) == 1
+
+
+def test_recordings_beside_each_other(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "a.parquet", signals())
+    write_parquet(tmp_path / "b.parquet", signals(seed=1))
+    (tmp_path / "axes.toml").write_text(
+        '[signals]\nexcitation = "w"\ninput = "u"\noutput = "y"\n[lines]\nfrequencies = "50,100,200"\nwindow = 100\n'
+        '[axes.a]\nsource.log = "a.parquet"\n[axes.b]\nsource.log = "b.parquet"\ntracking.hop = 50\n'
+        '[axes.c]\nsource.log = "c.parquet"\n'
+    )
+    result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
+    assert result.code == 2
+    assert "livebode: c: there is no file" in result.err
+    assert "a: 400 responses at 3 lines" in result.out
+    assert "b: 40 responses at 3 lines" in result.out
+    for name, hop in (("a", 5), ("b", 50)):
+        alone = livebode(
+            "run", tmp_path / f"{name}.parquet", "--excitation", "w", "--input", "u", "--output", "y", "--lines",
+            "50,100,200", "--window", 100, "--hop", hop, "--out", tmp_path / f"{name}-alone",
+        )  # fmt: skip
+        assert alone.code == 0
+        assert same(Run.open(tmp_path / "runs" / name).responses(), Run.open(tmp_path / f"{name}-alone").responses())
+    assert not (tmp_path / "runs" / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("axes", "says"),
+    [
+        ("axes = 3", "no table of axes"),
+        ("[axes]", "no table of axes"),
+        ('[axes."../x"]\nsource.url = "udp://h:1"', "names a directory"),
+        ('[axes.x-2]\nsource.url = "udp://h:1"', "take 'x_2'"),
+        ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "nothing but capitals"),
+        ('[axes.x]\nsource.url = "udp://h:1"\nlines.windw = 3', "axis x: there is no setting 'lines.windw'"),
+        ("[axes.x]\nlines.window = 3", "axis x: 'source' is missing"),
+    ],
+)
+def test_axes_that_cannot_be(tmp_path: Path, axes: str, says: str) -> None:
+    (tmp_path / "axes.toml").write_text(f"{axes}\n{SHARED}")
+    result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
+    assert result.code == 2
+    assert says in result.err
+    assert result.err.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
+
+
+def test_numbers_of_the_source_go_on_with_its_events(tmp_path: Path) -> None:
+    with Machine(tmp_path) as a:
+        for more in (1000, 500):
+            with Running(tmp_path, f"{SHARED}[axes.x]\n{source(a)}") as running:
+                held = numbers(running.out / "x").size
+                running.tracked("x", held + more)
+                running.end()
+    number = numbers(running.out / "x")
+    connected = [event for event in events(running.out / "x") if event.kind == "connected"]
+    assert connected[0].sample == 0
+    assert connected[1].sample == number[held] > held
+    assert connected[1].time_s == pytest.approx(number[held] / 1000)
+    assert np.array_equal(np.diff(number[held:]), np.ones(number.size - held - 1))
+    assert said(running.out / "x")["counts"]["gaps"] == 1
