@@ -45,7 +45,7 @@ class Pipeline:
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
         """The same for a machine that sends, whose channels and rate are known; InputError where they do not fit."""
-        pipeline = cls.of(axis, live_follower(axis, source), samples=source.spectra is None)
+        pipeline = cls.of(axis, live_follower(axis, source.rate_hz, source.spectra), samples=source.spectra is None)
         names = [channel.name for channel in source.channels]
         for name in pipeline.channels:
             if name not in names:

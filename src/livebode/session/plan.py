@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.estimation import Settings, SpectraTracker, Tracker
-from livebode.nouns import InputError, Lines
+from livebode.nouns import InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.session.follower import Follower
 from livebode.session.spectra_plan import check_spectra
 from livebode.sources import Log
-from livebode.sources.live import LiveSource
 
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
 
@@ -21,10 +20,9 @@ def make_follower(axis: Axis, log: Log) -> Follower:
     return _follower(axis, make_settings(axis, log))
 
 
-def live_follower(axis: Axis, source: LiveSource) -> Follower:
-    """The same for a machine that sends: samples, whose lines and window must be given, or spectra, which say them."""
-    rate_hz = source.rate_hz
-    if (layout := source.spectra) is not None:
+def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
+    """The same for a machine that sends: samples, whose lines and window must be given, or spectra of a layout."""
+    if layout is not None:
         lines = check_spectra(axis, layout, rate_hz)
         return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
