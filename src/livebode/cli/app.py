@@ -20,6 +20,7 @@ from livebode.cli.margins_command import margins_command
 from livebode.cli.query_command import query_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
+from livebode.cli.view_command import view_command
 from livebode.nouns import InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -39,6 +40,7 @@ app.command("export")(export_command)
 app.command("margins")(margins_command)
 app.command("validate")(validate_command)
 app.command("learn")(learn_command)
+app.command("view")(view_command)
 
 
 @app.callback(invoke_without_command=True)

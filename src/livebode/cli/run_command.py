@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import drawing, show
+from livebode.cli.serving import served
 from livebode.nouns import Event, InputError
 from livebode.records import to_json
-from livebode.session import Axis, Outcome, run, run_live
+from livebode.session import Audience, Axis, Outcome, run, run_live
 
 
 def run_command(
@@ -59,6 +60,8 @@ def run_command(
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
     ] = False,
+    serve: Serve = False,
+    port: Port = None,
     as_json: Json = False,
 ) -> None:
     """Track the frequency response of a machine through a recording, or live until it ends or Ctrl-C.
@@ -83,11 +86,12 @@ def run_command(
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
     axis = _axis(target, given, go_on)
-    outcome = _run(axis, out or Path("runs") / target.stem, force, quiet=as_json)
-    if as_json:
-        print(to_json({"directory": str(outcome.directory)} | outcome.summary))
-    else:
-        show(outcome)
+    with served(serve, axis.serve, port, target.stem, stays=not axis.source.live) as audience:
+        outcome = _run(axis, out or Path("runs") / target.stem, force, quiet=as_json, audience=audience)
+        if as_json:
+            print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
+        else:
+            show(outcome)
 
 
 def _axis(target: Path, given: dict[str, dict[str, Any]], go_on: bool) -> Axis:
@@ -114,7 +118,7 @@ def _window(text: str | None) -> int | str | None:
         raise InputError(f"--window {text!r} is neither a whole number of samples nor auto") from None
 
 
-def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
+def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience | None) -> Outcome:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -137,4 +141,4 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
             bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
 
         job = run_live if axis.source.live else run
-        return job(axis, directory, force=force, progress=progress, draw=draw, tell=tell)
+        return job(axis, directory, force=force, progress=progress, draw=draw, tell=tell, audience=audience)

@@ -42,7 +42,7 @@ def run_live(
     with open_source(axis.source) as source, ended_by_signals(source):
         tracker = live_follower(axis, source.rate_hz)
         about = {
-            "configuration": axis.model_dump(mode="json", exclude_defaults=True),
+            "configuration": axis.model_dump(mode="json", exclude_defaults=True, exclude={"serve"}),
             "found": {"format": source.format, "rate_from": "the sender"},
         }
         fits = Fits.of(axis.fit, tracker.settings.loop)

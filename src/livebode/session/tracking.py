@@ -106,7 +106,7 @@ def run(
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     tracker = make_follower(axis, log)
     found = {"format": log.format, "rate_from": log.rate_origin}
-    about = {"configuration": axis.model_dump(mode="json"), "found": found}
+    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
     fits = Fits.of(axis.fit, tracker.settings.loop)
     watching = make_watching(axis, tracker.settings)
     return record(
@@ -158,6 +158,8 @@ def record(
     blocks = source.blocks(wanted, **delivery)
     check = ChannelCheck(tuple(signals), settings.channel(settings.method.reference) or "")
     tally = Tally(check, time.perf_counter() if started is None else started)
+    label = _schedule_label(source, settings.schedule)
+    about = about | {"found": about.get("found", {}) | {"schedule": label}}
     begun = _begun(about, tracker, response_unit(source.channels, settings))
     channels = {channel.name: channel for channel in source.channels}
 
@@ -187,7 +189,7 @@ def record(
             watching.follow(responses, parameters, out.write_event)
 
     with recorder:
-        audience.begin(directory, begun, _health(source))
+        audience.begin(directory, begun | ({} if kept is None else {"record": {"finished": False}}), _health(source))
         if not isinstance(recorder, RunDirectory):
             for responses in recorder.before():
                 overview.add(responses)
@@ -204,7 +206,6 @@ def record(
         summary |= _said(source) | _fitted(fits, newest, overview.responses())
         if watching is not None:
             summary["monitoring"] = watching.finish(out.write_event)
-        label = _schedule_label(source, settings.schedule)
         recorder.finish(summary, lambda into: draw(overview.responses(), into, label, newest))
     audience.finish(summary)
     return Outcome(directory, summary, overview.responses(), newest)
