@@ -32,13 +32,13 @@ class Span:
 class Wish:
     """A message on the web socket.
 
-    `watch` chooses axis and quantity, `pause` stops and `resume` goes on with what is new, `freeze` keeps the newest
-    response, or the one at `time_s`, as a reference, `unfreeze` forgets it.
+    `watch` chooses axis and quantity (the run's own unless said), `pause` stops and `resume` goes on with what is new,
+    `freeze` keeps the newest response, or the one at `time_s`, as a reference, `unfreeze` forgets it.
     """
 
     kind: str
     axis: int = 0
-    quantity: Quantity = "plant"
+    quantity: Quantity | None = None
     time_s: float | None = None
 
 
@@ -78,7 +78,9 @@ def wish(text: str, axes: int) -> Wish:
         axis = said.get("axis", 0)
         if isinstance(axis, bool) or not isinstance(axis, int):
             raise InputError("axis is no whole number")
-        return Wish(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), _quantity(said.get("quantity")))
+        quantity = said.get("quantity")
+        asked_for = None if quantity is None else _quantity(quantity)
+        return Wish(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
     if kind in ("pause", "resume", "unfreeze"):
         return Wish(kind)
     if kind == "freeze":

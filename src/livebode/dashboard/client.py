@@ -73,7 +73,7 @@ class Client:
     async def _heed(self, asked: Wish) -> None:
         if asked.kind == "watch":
             state = self._board.states[asked.axis]
-            if state.quantities is not None and (why := state.quantities.why_not(asked.quantity)):
+            if asked.quantity and state.quantities is not None and (why := state.quantities.why_not(asked.quantity)):
                 raise InputError(why)
             if asked.axis != self._watched.axis:
                 self._reference = None
@@ -105,7 +105,10 @@ class Client:
                 self._anew = False
                 self._sent = {"notices": 0, "trends": -1, "rows": state.recent.count, "finished": state.finished}
                 await self._tell(
-                    {"facts": state.facts() | {"role": self._role}, "axes": self._board.names}
+                    {
+                        "facts": state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)},
+                        "axes": self._board.names,
+                    }
                     | {"span": state.span(), "trends": state.trends.plain(whole=True)}
                 )
                 self._sent["trends"] = state.trends.version
@@ -135,7 +138,7 @@ class Client:
     def _frames(self, state: State) -> bytes:
         if state.quantities is None or state.newest is None:
             return b""
-        quantity, found = self._watched.quantity, b""
+        quantity, found = state.shown(self._watched.quantity), b""
         if not self._paused and self._sent.get("newest") != state.version:
             self._sent["newest"] = state.version
             found += state.newest_frames(quantity)

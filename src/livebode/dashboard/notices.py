@@ -27,8 +27,9 @@ class Notices:
             if (seen := self._shown.get(str(event.details.get("event")))) is not None:
                 seen |= {"acknowledged": True, "changed": self.version}
             return
-        self.counts[event.kind] = self.counts.get(event.kind, 0) + 1
         key = event_id(event)
+        if key not in self._shown:
+            self.counts[event.kind] = self.counts.get(event.kind, 0) + 1
         self._shown.setdefault(key, {"acknowledged": False}).update(
             id=key, kind=event.kind, time_s=event.time_s, message=event.message[:_PLAIN_MAX], changed=self.version
         )

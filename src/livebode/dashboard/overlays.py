@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,7 @@ class Fitted:
     def __init__(self, quantities: Quantities, section: FitSection) -> None:
         self._quantities = quantities
         self.model: PhysicalModel = chosen_model(section, quantities.unit)
+        self._newest: tuple[float, Floats] | None = None
         self._grid = Grid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
 
     @classmethod
@@ -48,21 +50,35 @@ class Fitted:
 
     def curve(self, trends: Trends, quantity: Quantity, time_s: float | None) -> tuple[float, Any] | None:
         """Time and values on the grid of the newest fit that holds, or of the one nearest to a moment."""
-        found = [trends.by_name.get((self.model.name, name)) for name in self.model.names]
-        rows = [trend.rows() for trend in found if trend is not None and trend.newest is not None]
-        if len(rows) < len(found) or any(len(r) != len(rows[0]) for r in rows):
+        found = self._parameters(trends, time_s)
+        if found is None:
             return None
-        values = np.stack([r.value for r in rows], axis=1)
-        good = np.flatnonzero(np.isfinite(values).all(axis=1))
-        if not good.size:
-            return None
-        at = good[-1] if time_s is None else good[np.argmin(np.abs(rows[0].time_s[good] - time_s))]
-        plant = self.model.at(values[at], self._grid)
+        at_s, values = found
+        plant = self.model.at(values, self._grid)
         if quantity == "plant":
-            return float(rows[0].time_s[at]), plant
+            return at_s, plant
+        return at_s, self._quantities.converted(plant, quantity, self._feedback)[0]
+
+    @cached_property
+    def _feedback(self) -> Any:
         assert self._quantities.loop is not None
-        feedback = self._quantities.loop.feedback_at(self._grid.frequency_hz)
-        return float(rows[0].time_s[at]), self._quantities.converted(plant, quantity, feedback)[0]
+        return self._quantities.loop.feedback_at(self._grid.frequency_hz)
+
+    def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
+        """Time and values of one fit that holds."""
+        found = [trends.by_name.get((self.model.name, name)) for name in self.model.names]
+        rows = [t.newest if time_s is None else t.rows() for t in found if t is not None and t.newest is not None]
+        if len(rows) < len(found) or any(len(r) != len(rows[0]) for r in rows if r is not None):
+            return None
+        values = np.stack([r.value for r in rows if r is not None], axis=1)
+        at_s = rows[0].time_s if rows[0] is not None else np.zeros(0)
+        good = np.flatnonzero(np.isfinite(values).all(axis=1))
+        if time_s is not None and good.size:
+            at = good[np.argmin(np.abs(at_s[good] - time_s))]
+            return float(at_s[at]), values[at]
+        if time_s is None and good.size:
+            self._newest = float(at_s[-1]), values[-1]
+        return self._newest if time_s is None else None
 
 
 class Healthy:

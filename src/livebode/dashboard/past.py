@@ -29,6 +29,8 @@ class Past:
         The newest responses, and every n-th of the whole run; None before the first.
     first_s, last_s
         When the run began, and its newest response.
+    shown
+        The newest responses that were sent to browsers.
     readable
         Whether the record can be read: not that of a run in one piece while it goes on.
     """
@@ -39,13 +41,22 @@ class Past:
     first_s: float
     last_s: float
     readable: bool
+    shown: tuple[Responses, ...]
 
     @classmethod
     def of(cls, state: State) -> Past:
         """Of an axis; in the server's thread."""
         assert state.directory is not None
         overview = None if state.newest is None else state.overview.responses()
-        return cls(state.directory, state.recent.all(), overview, state.first_s, state.last_s, state.readable)
+        return cls(
+            state.directory,
+            state.recent.all(),
+            overview,
+            state.first_s,
+            state.last_s,
+            state.readable,
+            tuple(state.sent),
+        )
 
     def between(self, from_s: float, to_s: float, rows: int) -> Responses:
         """Every n-th response of a span, at most `rows`; InputError before the first response."""
@@ -77,14 +88,11 @@ class Past:
 
     def at(self, time_s: float) -> Responses:
         """The response with a valid line nearest to a moment, one row, as exactly as it is known."""
-        if self.overview is not None:
-            lines = self.overview.lines
-            half_s = 2 * lines.window / lines.rate_hz
-            for reach_s in (half_s, 30 * half_s):
-                best = _nearest([self.between(time_s - reach_s, time_s + reach_s, ROWS_MAX)], time_s)
-                if best is not None:
-                    return best
-        best = _nearest([p for p in (self.recent, self.overview) if p is not None], time_s)
+        found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
+        if self.readable and self.overview is not None:
+            reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz
+            found += Run.open(self.directory).between(time_s - reach_s, time_s + reach_s)
+        best = _nearest(found, time_s)
         if best is None:
             raise InputError("no response has a valid line yet; wait for the first window")
         return best

@@ -6,6 +6,7 @@ import json
 import time
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,15 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
-from livebode.nouns import Event, Quantity, Responses
-from livebode.records import to_json
+from livebode.nouns import Event, InputError, Quantity, Responses
+from livebode.records import Run, to_json
 from livebode.session.overview import Overview
 from livebode.session.said import said
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
+_GROWS_S = 10.0
+_SENT = 90  # three seconds of what browsers were sent: what a person freezes is among them
 
 
 class State:
@@ -49,14 +52,24 @@ class State:
         self._fitted: Fitted | None = None
         self._healthy: Healthy | None = None
         self._remark = ""
-        self._seen = 0
+        self._seen, self._grew = 0, float("-inf")
         self._pace: deque[tuple[float, int]] = deque(maxlen=128)
+        self.sent: deque[Responses] = deque(maxlen=_SENT)
         self._made: dict[tuple[str, Quantity, float], bytes] = {}
 
     @property
     def live(self) -> bool:
         """Whether a run in this process goes on."""
         return self.hub is not None and not self.finished
+
+    @property
+    def growing(self) -> bool:
+        """Whether another process records it: something came just now."""
+        return self.hub is None and not self.finished and time.monotonic() - self._grew < _GROWS_S
+
+    def read(self) -> None:
+        """All that came until now was there before."""
+        self._grew = float("-inf")
 
     @property
     def readable(self) -> bool:
@@ -76,10 +89,18 @@ class State:
             return
         if self.quantities is None and hub.begun is not None and hub.directory is not None:
             self.begin(hub.directory, hub.begun)
+            self._before()
         ended = hub.ended
         self.take(hub.take())
         if ended is not None and not self.finished:
             self.finished, self._summary = True, json.loads(to_json(dict(ended)))
+
+    def _before(self) -> None:
+        """The events of a run that is gone on with."""
+        if "record" not in self._summary or self.directory is None:
+            return
+        with suppress(InputError):  # it has just begun
+            self.take(list(Run.open(self.directory).events()))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
         """run.json as it is now."""
@@ -99,6 +120,7 @@ class State:
         if not len(responses):
             return
         self._seen += len(responses)
+        self._grew = time.monotonic()
         self.overview.add(responses)
         self.recent.add(responses)
         use = np.flatnonzero(responses.valid.any(axis=1))
@@ -109,11 +131,19 @@ class State:
             self.first_s = float(responses.time_s[0])
         self.last_s = float(responses.time_s[-1])
 
+    def shown(self, quantity: Quantity | None) -> Quantity:
+        """The quantity that is wished for where the run permits it, else its own."""
+        if self.quantities is None:
+            return quantity or "plant"
+        return quantity if quantity and not self.quantities.why_not(quantity) else self.quantities.own
+
     def newest_frames(self, quantity: Quantity) -> bytes:
         """The newest response, and the model and the healthy machine beside it."""
         assert self.quantities is not None
         if self.newest is None:
             return b""
+        if not self.sent or self.sent[-1] is not self.newest:
+            self.sent.append(self.newest)
         return self.frames_of("newest", self.newest, quantity, newest=True)
 
     def frames_of(self, kind: str, one: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
@@ -177,7 +207,7 @@ class State:
 
     def span(self) -> dict[str, Any]:
         """From when to when there is something to see."""
-        return {"first_s": self.first_s, "last_s": self.last_s, "live": self.live, "finished": self.finished}
+        return {"first_s": self.first_s, "last_s": self.last_s, "live": self.live, "growing": self.growing}
 
     def health(self) -> dict[str, Any]:
         """How source and tracking are doing."""

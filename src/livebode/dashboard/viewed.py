@@ -56,6 +56,7 @@ class Viewed:
         state.take(list(events))
         self._events = len(events)
         state.finished = self._run.finished
+        state.read()
 
     def _responses(self, state: State, part: Responses) -> None:
         if (new := self._new(part)) is not None:

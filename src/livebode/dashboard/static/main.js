@@ -1,24 +1,22 @@
 // The page: what comes from the server goes to the panels, what the person does goes to the server.
 import { Bode } from "./bode.js";
-import { numbers, Menu, picture } from "./download.js";
+import { controls } from "./controls.js";
 import { Events } from "./events.js";
 import { framesOf } from "./frames.js";
 import { health } from "./health.js";
-import { keys } from "./keys.js";
 import { ask, Link } from "./link.js";
 import { choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { Margins } from "./margins.js";
 import { readout } from "./readout.js";
 import { Rows } from "./rows.js";
-import { applyTheme, nextTheme } from "./theme.js";
+import { applyTheme } from "./theme.js";
 import { Timeline } from "./timeline.js";
 import { Tracking } from "./tracking.js";
 import { Trends } from "./trends.js";
-import { moment, named } from "./words.js";
+import { named } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
-const SPANS = [["20", "20 s"], ["120", "2 min"], ["whole", "whole run"]];
 const TEXT_MS = 120, TRACK_MS = 100, MAP_MS = 600, WHOLE_MS = 4000, ROWS = 1000;
 const LEGEND = [["measured", "measured ±3σ", ""], ["reference", "reference", "dashed"], ["baseline", "baseline", "dotted"], ["model", "fitted model", "dashed"]];
 
@@ -89,7 +87,7 @@ function begin({ facts, axes, trends }) {
   events.begin(facts.axis, facts.role === "operator" && facts.live);
   if (facts.remark) complain(facts.remark);
   if (timeline.atS !== null) showMoment(timeline.atS);
-  say();
+  if (facts.watched !== page.quantity) say();
 }
 
 const whyNoMargins = (facts) => (facts.quantities.find((q) => q.name === "open loop").why_not ? "Margins need the loop: describe its controllers under [loop]." : "Margins need a fitted model: add [fit] to the configuration.");
@@ -101,7 +99,8 @@ function watch(quantity, why) {
   if (quantity === page.quantity) return;
   page.quantity = quantity;
   choose($("quantities"), quantity);
-  begin({ facts: page.facts, axes: [...$("axis").children].map((o) => o.textContent), trends: [] });
+  page.key = null;
+  say();
 }
 
 // What happened before this page came: the recent past at first, the whole run when it is asked for.
@@ -148,13 +147,12 @@ function goLive() {
   link.wish({ kind: "resume" });
   page.rows.clear();
   fill();
-  say();
   status();
 }
 
 function status() {
-  const { live, finished } = timeline.span, paused = timeline.atS !== null;
-  const word = !page.up ? "no connection" : paused ? "paused" : live ? "live" : finished ? "recorded" : "being recorded";
+  const { live, growing } = timeline.span, paused = timeline.atS !== null;
+  const word = !page.up ? "no connection" : paused ? "paused" : live ? "live" : growing ? "being recorded" : "recorded";
   $("lamp").className = `lamp ${!page.up ? "lost" : paused ? "paused" : live ? "live" : ""}`;
   $("status-text").textContent = `${page.facts?.name ?? ""} · ${word}`;
 }
@@ -188,6 +186,7 @@ function draw(now) {
   if (due("bode", 0)) bode.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule);
   if (due("rows", TRACK_MS)) drawRows(now);
+  if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
   if (due("trends", 250)) { if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN); if (page.tab === "margins") margins.draw(); }
 }
 
@@ -199,57 +198,11 @@ function drawRows(now) {
     rows = page.past.frame; ({ from, to } = page.past);
     if (whole && !paused && span.live && now - (page.last.whole ?? -1e9) > WHOLE_MS) { page.last.whole = now; fill(); }
   } else if (!whole && !paused) from = Math.max(from, Math.min(span.first_s, end));
-  tracking.draw(rows, from, to);
-  if (page.tab === "map" && (paused || now - (page.last.map ?? -1e9) >= MAP_MS)) { page.last.map = now; map.draw(rows, from, to); } else page.dirty.add("map");
+  page.seen = [rows, from, to];
+  tracking.draw(...page.seen);
+  page.dirty.add("map");
 }
 
-function tab(name) {
-  page.tab = name;
-  for (const [value] of TABS) $(`pane-${value}`).hidden = value !== name;
-  for (const button of $("tabs").children) { const on = button.dataset.value === name; button.setAttribute("aria-selected", String(on)); button.tabIndex = on ? 0 : -1; }
-  $("map-what").hidden = name !== "map";
-  page.dirty.add("trends").add("rows");
-  page.last.map = -1e9;
-}
-
-const TABS = [["map", "Map"], ["parameters", "Parameters"], ["margins", "Margins"]];
-$("tabs").append(...TABS.map(([value, text]) => element("button", { type: "button", role: "tab", id: `tab-${value}`, "aria-controls": `pane-${value}`, "data-value": value, onclick: () => tab(value) }, text)));
-const option = (id, choices, chosen, act) => segments($(id), choices.map(([value, text]) => ({ value, text })), chosen, (value) => { choose($(id), value); act(value); });
-option("tracking-what", [["magnitude", "dB"], ["phase", "°"]], "magnitude", (value) => { tracking.what = value; tracking.build(); page.dirty.add("rows"); });
-option("tracking-over", [["time", "over time"], ["position", "over position"]], "time", (value) => { tracking.over = value; tracking.build(); page.dirty.add("rows"); });
-option("tracking-span", SPANS, page.spanS, (value) => { page.spanS = value; page.rows.clear(); fill(); });
-option("map-what", [["level", "level"], ["change", "change"]], "level", (value) => { map.what = value; map.paint(); });
-tab("map");
-
-const stem = () => `${page.facts.name}-${page.quantity.replace(" ", "-")}`;
-const query = (format, whole) => {
-  const at = bode.curves.measured?.frame.timeS[0] ?? timeline.span.last_s;
-  const [from, to] = whole ? [tracking.fromS, tracking.toS] : [at, at];
-  return { axis: page.axis, quantity: page.quantity, format, from, to };
-};
-const get = (format, whole) => numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) => complain(error.message));
-const menu = new Menu($("download"), $("download-menu"), [
-  ["Bode plot as PNG", () => picture(`${stem()}.png`, `${page.facts.name}: ${page.quantity}`, `at ${moment(bode.curves.measured?.frame.timeS[0])}, bands are ±3σ`, bode.charts)],
-  ["this response as CSV", () => get("csv", false)], ["this response as .mat", () => get("mat", false)],
-  ["every response in the tracking's span as CSV", () => get("csv", true)], ["every response in the tracking's span as .mat", () => get("mat", true)],
-]);
-$("axis").addEventListener("change", () => { page.axis = Number($("axis").value); if (page.frozen) freeze(); timeline.atS = null; say(); });
-$("freeze").addEventListener("click", freeze);
-$("theme").addEventListener("click", nextTheme);
-$("help").addEventListener("click", () => $("keys").showModal());
-const nth = (i) => () => { const q = page.facts?.quantities[i]; if (q) watch(q.name, q.why_not); };
-keys($("keys"), $("keys-list"), [
-  [["?"], "this help", () => $("keys").showModal()],
-  [[" "], "pause, and go on", () => timeline.toggle()],
-  [["←", "→"], "the line under the cursor", null],
-  [[",", "."], "a tenth of a second back and forth in the record", null],
-  [["1", "2", "3", "4"], "plant, open loop, closed loop, sensitivity", null],
-  [["F"], "freeze this curve as a reference, and let it go", freeze],
-  [["M", "P", "G"], "map, parameters, margins", null],
-  [["A"], "alarms only, and to the events", () => { $("alarms-only").click(); $("events").focus(); }],
-  [["D"], "download", () => menu.show(true)],
-  [["0"], "the whole band of frequencies", () => bode.zoom(bode.whole)],
-  [["T"], "light or dark", nextTheme],
-], { "←": () => bode.step(-1), "→": () => bode.step(1), ",": () => timeline.step(-0.1), ".": () => timeline.step(0.1), 1: nth(0), 2: nth(1), 3: nth(2), 4: nth(3), M: () => tab("map"), P: () => tab("parameters"), G: () => tab("margins") });
+controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, timeline };
 requestAnimationFrame(draw);

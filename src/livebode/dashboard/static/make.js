@@ -12,6 +12,7 @@ export function element(tag, attributes = {}, ...children) {
 
 // Buttons of which one is chosen. `choices` are {value, text, title, why}; one with `why` cannot be chosen, and says so.
 export function segments(host, choices, chosen, onChoose) {
+  const focused = host.contains(document.activeElement);
   host.replaceChildren();
   const buttons = choices.map(({ value, text, title, why }) =>
     element("button", {
@@ -20,6 +21,7 @@ export function segments(host, choices, chosen, onChoose) {
       onclick: () => onChoose(value, why),
     }, text));
   host.append(...buttons);
+  if (focused) buttons.find((button) => button.tabIndex === 0)?.focus();
   host.onkeydown = (event) => {
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
     if (!step) return;
