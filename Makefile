@@ -41,6 +41,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.live
+	$(BIN)/python -m bench.dashboard
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
 	$(BIN)/python -m studies.peers
@@ -51,11 +52,12 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
-fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources and the configuration
+fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
 	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
+	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py

@@ -29,6 +29,7 @@ from livebode.cli.query_command import query_command
 from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
+from livebode.cli.view_command import view_command
 from livebode.nouns import InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -52,6 +53,7 @@ app.command("learn")(learn_command)
 app.command("plc")(plc_command)
 app.command("report")(report_command)
 app.command("compare")(compare_command)
+app.command("view")(view_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli.options import Json
+from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
+from livebode.cli.serving import served
 from livebode.nouns import Responses
 from livebode.records import to_json
 from livebode.session import Audience
+from livebode.session.axis import ServeSection
 
 
 def demo_command(
@@ -21,6 +23,8 @@ def demo_command(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; an earlier demo there is replaced.")] = Path(
         "runs/demo"
     ),
+    serve: Serve = False,
+    port: Port = None,
     as_json: Json = False,
 ) -> None:
     """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
@@ -33,30 +37,31 @@ def demo_command(
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
-    with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
-        task = bar.add_task("", total=seconds)
+    with served(serve, ServeSection(), port, ["demo"], stays=True) as audience_of:
+        with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
+            task = bar.add_task("", total=seconds)
 
-        class Numbers(Audience):
-            def write(self, responses: Responses) -> None:
-                bar.update(task, description=_numbers(responses))
+            class Numbers(Audience):
+                def write(self, responses: Responses) -> None:
+                    bar.update(task, description=_numbers(responses))
 
-        def progress(done: int, total: int | None) -> None:
-            bar.update(task, completed=seconds * done / (total or done))
+            def progress(done: int, total: int | None) -> None:
+                bar.update(task, completed=seconds * done / (total or done))
 
-        outcome, found = demo(
-            out,
-            seconds=seconds,
-            seed=seed,
-            real_time=not fast,
-            progress=progress,
-            audience=Numbers(),
-            draw=drawing("simulated belt axis", ("u", "velocity")),
-        )
-    if as_json:
-        print(to_json({"directory": str(outcome.directory), "finding": found} | outcome.summary))
-        return
-    show(outcome)
-    print(f"\n{found}")
+            outcome, found = demo(
+                out,
+                seconds=seconds,
+                seed=seed,
+                real_time=not fast,
+                progress=progress,
+                audience=audience_of("demo") if serve else Numbers(),
+                draw=drawing("simulated belt axis", ("u", "velocity")),
+            )
+        if as_json:
+            print(to_json({"directory": str(outcome.directory), "finding": found} | outcome.summary), flush=True)
+            return
+        show(outcome)
+        print(f"\n{found}", flush=True)
 
 
 def _numbers(responses: Responses) -> str:

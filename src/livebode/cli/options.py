@@ -19,3 +19,8 @@ Time = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+Port = Annotated[
+    int | None,
+    typer.Option(metavar="PORT", min=0, max=65535, help="Of the dashboard; 8765 unless said, 0 for a free one."),
+]
+Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it goes on.")]

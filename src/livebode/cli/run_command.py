@@ -8,11 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
+from livebode.cli.serving import AudienceOf, served
 from livebode.nouns import Event, InputError
 from livebode.records import to_json
 from livebode.session import (
+    Audience,
     Axes,
     Axis,
     ConfigurationFile,
@@ -23,6 +25,7 @@ from livebode.session import (
     StoppedError,
     run,
 )
+from livebode.session.axis import ServeSection
 
 
 def run_command(
@@ -70,6 +73,8 @@ def run_command(
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
     ] = False,
+    serve: Serve = False,
+    port: Port = None,
     as_json: Json = False,
 ) -> None:
     """Track the frequency response of a machine through a recording, or live until it ends or Ctrl-C.
@@ -98,10 +103,24 @@ def run_command(
     file = ConfigurationFile(target, over) if target.suffix.lower() == ".toml" else None
     axes = {"": _axis(target, over)} if file is None else file.read()
     directory = out or Path("runs") / target.stem
-    if list(axes) == [""] and not axes[""].source.live:
-        _show(_run(axes[""], directory, force, quiet=as_json), as_json)
-    else:
-        _run_axes(axes, directory, force, as_json, file)
+    live = any(axis.source.live for axis in axes.values())
+    with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as audience_of:
+        if list(axes) == [""] and not live:
+            _show(_run(axes[""], directory, force, as_json, audience_of(target.stem)), as_json)
+        else:
+            _run_axes(axes, directory, force, as_json, file, lambda name: audience_of(name or target.stem))
+
+
+def _serving(axes: Axes) -> ServeSection:
+    """What all of them say of the dashboard; InputError where they do not agree."""
+    name, first = next(iter(axes.items()))
+    for other, axis in axes.items():
+        if axis.serve != first.serve:
+            raise InputError(
+                f"axes {name} and {other} have another [serve], but there is one dashboard; write [serve] once, "
+                "outside [axes]"
+            )
+    return first.serve
 
 
 def _axis(target: Path, said: dict[str, dict[str, Any]]) -> Axis:
@@ -120,7 +139,7 @@ def _window(text: str | None) -> int | str | None:
         raise InputError(f"--window {text!r} is neither a whole number of samples nor auto") from None
 
 
-def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
+def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
     """One recording, with a bar."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -141,15 +160,17 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool) -> Outcome:
         def tell(event: Event) -> None:
             bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
 
-        return run(axis, Destination(directory, _drawing(axis), force, progress, tell))
+        return run(axis, Destination(directory, _drawing(axis), force, progress, tell, audience))
 
 
-def _run_axes(axes: Axes, directory: Path, force: bool, as_json: bool, file: ConfigurationFile | None) -> None:
+def _run_axes(
+    axes: Axes, directory: Path, force: bool, as_json: bool, file: ConfigurationFile | None, audience_of: AudienceOf
+) -> None:
     """Machines that send, or several axes, until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
 
     def to(name: str, axis: Axis) -> Destination:
-        return Destination(directory / name, _drawing(axis), force)
+        return Destination(directory / name, _drawing(axis), force, audience=audience_of(name))
 
     terminal = AxesTerminal(quiet=as_json)
     session = Session(axes, to, tell=terminal.tell, leave=terminal.leave, file=file)
@@ -176,6 +197,6 @@ def _drawing(axis: Axis) -> Draw:
 
 def _show(outcome: Outcome, as_json: bool) -> None:
     if as_json:
-        print(to_json({"directory": str(outcome.directory)} | outcome.summary))
+        print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
     else:
         show(outcome)

@@ -1,1 +1,7 @@
-"""The page that shows a run while it goes, and one that was."""
+"""The page that shows a run while it goes on, and afterwards (docs/dashboard.md)."""
+
+from livebode.dashboard.dashboard import Dashboard
+from livebode.dashboard.hub import Hub
+from livebode.dashboard.settings import Serving
+
+__all__ = ["Dashboard", "Hub", "Serving"]

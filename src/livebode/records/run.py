@@ -79,9 +79,19 @@ class Run:
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
         """All responses in order, in parts of bounded size; or the newest, from files of no more than this."""
+        return self._in_parts(self.tables("responses", size_bytes_max))
+
+    def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
+        """Those that speak for a span of time, ends included, in parts; segments outside of it are not read."""
+        for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
+            within = (part.time_s >= from_s) & (part.time_s <= to_s)
+            if within.any():
+                yield part[np.flatnonzero(within)]
+
+    def _in_parts(self, tables: Iterator[pa.Table]) -> Iterator[Responses]:
         lines = self.lines
         rest: pa.Table | None = None
-        for part in self.tables("responses", size_bytes_max):
+        for part in tables:
             if part.schema.names != SCHEMA.names:
                 raise InputError(f"the responses in {str(self.path)!r} have other columns than a run writes")
             for start in range(0, part.num_rows, _ROWS):
@@ -94,8 +104,12 @@ class Run:
         if rest is not None and rest.num_rows:
             raise InputError(f"the record in {str(self.path)!r} ends within a response; it is not what the run wrote")
 
-    def tables(self, name: str, size_bytes_max: int | None = None) -> Iterator[pa.Table]:
+    def tables(
+        self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
+    ) -> Iterator[pa.Table]:
         """The rows of "responses", "parameters" or "samples" in order, part by part; none where it was not recorded.
+
+        With `span_s`, segments that lie wholly outside of that time are left out.
 
         Raises
         ------
@@ -105,7 +119,7 @@ class Run:
         file = self.path / name
         try:
             if reading.in_segments(self.path):
-                yield from reading.tables(self.path, name, size_bytes_max, finished=self.finished)
+                yield from reading.tables(self.path, name, size_bytes_max, span_s, finished=self.finished)
             elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
                 # Else what was read ahead of a long run stays in memory until its end.
                 with pq.ParquetFile(file, pre_buffer=False) as parquet:

@@ -15,8 +15,12 @@ from livebode.sources.live import SourceSettings, checked_address
 
 _SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
-_MAY_BE_SECRET = {"url", "username", "password_env", "password_file"}
+_MAY_BE_SECRET = {
+    *("url", "username", "password_env", "password_file"),
+    *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
+}
 Ticks = Annotated[int, Field(ge=0)]
+File = Annotated[Path, Field(strict=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -66,7 +70,7 @@ class MotionSection(_Section):
 class MonitoringSection(_Section):
     """[monitoring]: the baseline to tell changes against, and how often a false alarm may come, in words."""
 
-    baseline: Annotated[Path, Field(strict=False)] | None = None
+    baseline: File | None = None
     false_alarms: str = "one in 30 days of motion"
 
 
@@ -160,6 +164,26 @@ class RecordSection(_Section):
     segment_s: Annotated[float, Field(gt=0, le=86400)] = 300.0
 
 
+class ServeSection(_Section):
+    """[serve]: where `livebode run --serve` listens, and who may look (docs/dashboard.md)."""
+
+    address: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8765
+    names: list[str] = []
+    token_env: str | None = None
+    token_file: File | None = None
+    viewer_token_env: str | None = None
+    viewer_token_file: File | None = None
+    certificate_file: File | None = None
+    key_file: File | None = None
+    read_only: bool = False
+
+    def beside(self, folder: Path) -> ServeSection:
+        """With files relative to a folder."""
+        files = {name: path for name, path in self if name.endswith("_file") and path is not None}
+        return self.model_copy(update={name: folder / path for name, path in files.items()})
+
+
 class FitSection(_Section):
     """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
 
@@ -186,6 +210,7 @@ class Axis(_Section):
     motion: MotionSection | None = None
     fit: FitSection | None = None
     monitoring: MonitoringSection = MonitoringSection()
+    serve: ServeSection = ServeSection()
 
     @classmethod
     def read(cls, path: Path) -> Axis:
@@ -214,7 +239,7 @@ class Axis(_Section):
 
     def beside(self, folder: Path) -> Axis:
         """The same with relative paths from `folder`."""
-        axis = self.model_copy(update={"source": self.source.beside(folder)})
+        axis = self.model_copy(update={"source": self.source.beside(folder), "serve": self.serve.beside(folder)})
         baseline = axis.monitoring.baseline
         if baseline is None:
             return axis

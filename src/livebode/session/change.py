@@ -55,6 +55,8 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
             "[source] cannot be changed without losing samples; end livebode, or take the axis out and put it in again "
             "under another name"
         )
+    if "serve" in sections:
+        raise InputError("[serve] is the whole session's, and cannot be changed while it runs; end livebode first")
     kept, before = new.record or RecordSection(), old.record or RecordSection()
     if sections == ("record",) and kept.samples == before.samples:
         return Change(sections, kept=kept)

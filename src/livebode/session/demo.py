@@ -11,10 +11,12 @@ from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, Responses
 from livebode.records import Run
 from livebode.session.audience import Audience
+from livebode.session.axis import FitSection, LoopSection, PIDSection
 from livebode.session.destination import Draw, Progress
+from livebode.session.fits import Fits
 from livebode.session.following import Outcome
 from livebode.session.tracking import record
-from livebode.simulation import BeltAxis, BeltResponse, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
+from livebode.simulation import BeltAxis, BeltResponse, Drive, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
 RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 400, 40, 0.1
 SECONDS_MIN = 8.0  # two strokes before the loss and two after it
@@ -59,11 +61,14 @@ def demo(
     `audience` sees what is published. An earlier demo in `directory` is replaced.
     """
     axis = demo_axis(seconds, seed)
+    fit, loop = FitSection(radius_m=axis.mechanics.radius_m), _described(axis.drive)
+    said = {"demo": {"seconds": seconds, "seed": seed}, "fit": fit.model_dump(), "loop": loop.model_dump(mode="json")}
     outcome = record(
         SimulatedAxis(axis),
         Tracker(demo_settings()),
         directory,
-        about={"configuration": {"demo": {"seconds": seconds, "seed": seed}}},
+        about={"configuration": said},
+        fits=Fits(fit, loop.build(RATE_HZ)),
         block_samples=400,
         real_time=real_time,
         force=True,
@@ -72,6 +77,16 @@ def demo(
         draw=draw,
     )
     return outcome, finding(Run.open(directory).responses(), axis)
+
+
+def _described(drive: Drive) -> LoopSection:
+    """The axis's loop as a person would write it down."""
+    velocity = PIDSection(
+        gain=drive.velocity_gain_n_m_s, integral_time_s=drive.integral_time_s, rate_hz=drive.velocity_rate_hz
+    )
+    held = round(drive.rate_hz / drive.position_rate_hz)
+    position = PIDSection(gain=drive.position_gain_per_s, rate_hz=drive.position_rate_hz, held_ticks=held)
+    return LoopSection(velocity=velocity, position=position)
 
 
 def finding(responses: Responses, axis: BeltAxis) -> str:

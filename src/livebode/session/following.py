@@ -100,13 +100,16 @@ class Tracking:
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
-        self.source, self.pipeline, self.to, self._about, self._kept = source, pipeline, to, about, kept
+        self.source, self.pipeline, self.to, self._kept = source, pipeline, to, kept
         self._orders, self._numbering = orders or Orders(), numbering or Numbering()
         self._follower, settings = pipeline.follower, pipeline.follower.settings
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
+        self._label = _schedule_label(source, settings.schedule)
+        about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
+        self._about = about
         self._begun = summary.begun(about, self._follower, response_unit(source.channels, settings))
         self._overview = Overview()
         self._done: dict[str, Any] = {}
@@ -163,7 +166,8 @@ class Tracking:
     def follow(self) -> None:
         """Every Block through the pipeline into the record; InputError where there is none."""
         fits, watching = self.pipeline.fits, self.pipeline.watching
-        self.to.audience.begin(self.to.directory, self._begun, _health(self.source))
+        begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
+        self.to.audience.begin(self.to.directory, begun, _health(self.source))
         blocks = self._blocks
         if not isinstance(self.recorder, RunDirectory):
             for responses in self.recorder.before():
@@ -254,12 +258,11 @@ class Tracking:
 
     def finish(self) -> Outcome:
         """Draw the pictures and put the record in its place."""
-        label = _schedule_label(self.source, self._follower.settings.schedule)
         responses = self._overview.responses()
 
         def draw(into: Path) -> None:
             if len(responses):
-                self.to.draw(responses, into, label, self._newest)
+                self.to.draw(responses, into, self._label, self._newest)
 
         if isinstance(self.recorder, RunDirectory):
             self.recorder.finish(self._done, draw)

@@ -78,7 +78,7 @@ class _Succession:
         axis = pipeline.axis
         assert axis is not None
         about = {
-            "configuration": axis.model_dump(mode="json", exclude_defaults=True),
+            "configuration": axis.model_dump(mode="json", exclude_defaults=True, exclude={"serve"}),
             "found": {"format": self._source.format, "rate_from": "the sender"},
         }
         return Tracking(

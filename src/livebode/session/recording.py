@@ -30,5 +30,5 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     pipeline = Pipeline.of(axis, make_follower(axis, log))
     found = {"format": log.format, "rate_from": log.rate_origin}
-    about = {"configuration": axis.model_dump(mode="json"), "found": found}
+    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
     return whole(Tracking(log, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))

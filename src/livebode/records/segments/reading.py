@@ -32,8 +32,11 @@ def parts(run: Path, table: str, *, finished: bool) -> tuple[list[Segment], list
     return [segment for segment in found.segments if segment.table == table], rows
 
 
-def tables(run: Path, table: str, size_bytes_max: int | None, *, finished: bool) -> Iterator[pa.Table]:
-    """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it.
+def tables(
+    run: Path, table: str, size_bytes_max: int | None, span_s: tuple[float, float] | None = None, *, finished: bool
+) -> Iterator[pa.Table]:
+    """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
+    segments outside of that time.
 
     Raises
     ------
@@ -43,6 +46,8 @@ def tables(run: Path, table: str, size_bytes_max: int | None, *, finished: bool)
         If something cannot be read.
     """
     segments, rows = parts(run, table, finished=finished)
+    if span_s is not None:
+        segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
     for segment in segments if size_bytes_max is None else _newest(segments, size_bytes_max):
         try:
             yield segment.read(run)

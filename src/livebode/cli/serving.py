@@ -1,0 +1,66 @@
+"""The dashboard beside a command."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from livebode.session import Audience
+from livebode.session.axis import ServeSection
+
+if TYPE_CHECKING:
+    from livebode.dashboard import Dashboard
+
+AudienceOf = Callable[[str], Audience]
+
+
+def tell(sentence: str) -> None:
+    """Say it beside what the command prints."""
+    print(f"livebode: {sentence}", file=sys.stderr, flush=True)
+
+
+def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
+    """The dashboard as the configuration wants it; `port` goes over it."""
+    from livebode.dashboard import Dashboard, Serving
+
+    if port is not None:
+        section = section.model_copy(update={"port": port})
+    return Dashboard(Serving.of(section), tell)
+
+
+@contextmanager
+def served(
+    wanted: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
+) -> Iterator[AudienceOf]:
+    """What gives each axis its audience, by name: the dashboard that shows it while it goes on, or nobody.
+
+    `names` are the axes from the beginning; `stays` keeps the page after the run, until Ctrl-C.
+    """
+    if not wanted:
+        yield lambda _: Audience()
+        return
+    dashboard = dashboard_of(section, port)
+    for name in names:
+        dashboard.hub(name)
+    with dashboard:
+        tell(f"the dashboard is at {dashboard.url}")
+        yield dashboard.hub
+        if stays:
+            tell(f"the run is done; {dashboard.url} shows it until Ctrl-C")
+            wait_for_the_end()
+
+
+def wait_for_the_end() -> None:
+    """Until Ctrl-C or SIGTERM."""
+    ended = threading.Event()
+    before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        while not ended.wait(0.2):  # a wait without end would not let the signal through everywhere
+            pass
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

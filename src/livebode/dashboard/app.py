@@ -1,0 +1,196 @@
+"""The paths of the dashboard. None of them changes anything by GET."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.background import BackgroundTask
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from livebode import export
+from livebode.dashboard import asked
+from livebode.dashboard.access import COOKIE, SESSION_S, TooManyTriesError
+from livebode.dashboard.board import Board
+from livebode.dashboard.client import Client
+from livebode.dashboard.frames import frame
+from livebode.dashboard.guard import Guard, body
+from livebode.dashboard.past import Past
+from livebode.dashboard.settings import Serving
+from livebode.dashboard.state import State
+from livebode.nouns import InputError, Responses
+
+_HERE = Path(__file__).parent
+SOCKETS_MAX = 16
+"""Browsers at once."""
+_TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
+
+
+def application(board: Board, serving: Serving) -> Guard:
+    """The ASGI application."""
+    pages = _Pages(board, serving)
+    routes: list[BaseRoute] = [
+        Route("/", pages.page),
+        Route("/login", pages.login_page, methods=["GET"]),
+        Route("/login", pages.login, methods=["POST"]),
+        Route("/logout", pages.logout, methods=["POST"]),
+        Route("/api/past", pages.past),
+        Route("/api/moment", pages.moment),
+        Route("/api/export", pages.export),
+        Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
+        WebSocketRoute("/live", pages.live),
+        Mount("/static/uplot", StaticFiles(directory=_HERE / "_vendor" / "uplot")),
+        Mount("/static", StaticFiles(directory=_HERE / "static")),
+    ]
+    handlers = {InputError: _sorry, TooManyTriesError: _wait}
+    return Guard(Starlette(routes=routes, exception_handlers=handlers), serving.names, serving.tls is not None)
+
+
+class _Pages:
+    """What the paths answer."""
+
+    def __init__(self, board: Board, serving: Serving) -> None:
+        self._board, self._secure = board, serving.tls is not None
+
+    async def page(self, request: Request) -> Response:
+        if self._role(request) is None:
+            return RedirectResponse("/login", 303)
+        return FileResponse(_HERE / "static" / "index.html")
+
+    async def login_page(self, _request: Request) -> Response:
+        return FileResponse(_HERE / "static" / "login.html")
+
+    async def login(self, request: Request) -> Response:
+        data = await body(request)
+        token = None if data is None else asked.plain(data).get("token")
+        if not isinstance(token, str):
+            raise InputError("a login has a token")
+        session = self._board.access.login(token, _address(request))
+        if session is None:
+            return JSONResponse({"error": "this token is not right"}, 401)
+        answer = JSONResponse({})
+        answer.set_cookie(
+            COOKIE, session, max_age=int(SESSION_S), httponly=True, samesite="strict", secure=self._secure
+        )
+        return answer
+
+    async def logout(self, request: Request) -> Response:
+        self._board.access.logout(request.headers.get("cookie", ""))
+        answer = JSONResponse({})
+        answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=self._secure)
+        return answer
+
+    async def past(self, request: Request) -> Response:
+        """Rows of a span of time."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        span, past = asked.span(request.query_params, len(self._board.states)), Past.of(state)
+        found = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
+        return Response(frame("history", span.axis, _as(state, found, span)), media_type="application/octet-stream")
+
+    async def moment(self, request: Request) -> Response:
+        """The response nearest to a moment, and what is drawn over it."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        span = asked.span(request.query_params, len(self._board.states))
+        found = await self._board.elsewhere(Past.of(state).at, span.from_s)
+        data = state.frames_of("moment", found, span.quantity)
+        return Response(data, media_type="application/octet-stream")
+
+    async def export(self, request: Request) -> Response:
+        """Responses of a span of time as a file; of a moment where the span has no length."""
+        if (state := self._asked_state(request)) is None:
+            return _unknown()
+        span, past = asked.span(request.query_params, len(self._board.states)), Past.of(state)
+
+        def write() -> Path:
+            parts = past.all_between(span.from_s, span.to_s) if span.to_s > span.from_s else [past.at(span.from_s)]
+            with tempfile.NamedTemporaryFile(suffix=f".{span.format}", delete=False) as file:
+                path = Path(file.name)
+            try:
+                export.FORMATS[span.format](path, (_as(state, part, span) for part in parts), {})
+            except BaseException:
+                path.unlink(missing_ok=True)
+                raise
+            return path
+
+        path = await self._board.elsewhere(write)
+        name = f"{span.quantity.replace(' ', '-')}-{span.from_s:.6g}s.{span.format}"
+        return FileResponse(
+            path, media_type=_TYPES[span.format], filename=name, background=BackgroundTask(path.unlink, True)
+        )
+
+    async def acknowledge(self, request: Request) -> Response:
+        role = self._role(request)
+        if role is None:
+            return _unknown()
+        if role != "operator":
+            return JSONResponse({"error": "this session may only look"}, 403)
+        data = await body(request)
+        if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
+            raise InputError("an acknowledgement is a short object of JSON")
+        axis, event = asked.acknowledged(data, len(self._board.states))
+        self._board.acknowledge(axis, event)
+        return JSONResponse({}, 202)
+
+    async def live(self, socket: WebSocket) -> None:
+        headers = socket.headers
+        address = socket.client.host if socket.client else ""
+        try:
+            role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
+        except TooManyTriesError:
+            role = None
+        if role is None or len(self._board.clients) >= SOCKETS_MAX:
+            await socket.close(1008 if role is None else 1013)
+            return
+        client = Client(self._board, socket, role)
+        self._board.clients.add(client)
+        self._board.pulse_now()
+        try:
+            await client.run()
+        finally:
+            self._board.clients.discard(client)
+
+    def _role(self, request: Request) -> str | None:
+        headers = request.headers
+        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), _address(request))
+
+    def _asked_state(self, request: Request) -> State | None:
+        """The axis of a query that has begun; None where nobody may see it."""
+        if self._role(request) is None:
+            return None
+        state = self._board.states[asked.span(request.query_params, len(self._board.states)).axis]
+        state.refresh()
+        if state.quantities is None:
+            raise InputError("the run has not begun; wait for its first samples")
+        return state
+
+
+def _as(state: State, responses: Responses, span: asked.Span) -> Responses:
+    assert state.quantities is not None
+    return state.quantities.of_responses(responses, span.quantity)
+
+
+def _address(request: Request) -> str:
+    return request.client.host if request.client else ""
+
+
+def _unknown() -> Response:
+    return JSONResponse({"error": "log in first"}, 401)
+
+
+async def _sorry(_request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": str(error)}, 400)
+
+
+async def _wait(_request: Request, error: Exception) -> Response:
+    seconds = math.ceil(float(error.args[0]))
+    return JSONResponse(
+        {"error": f"too many wrong tokens; try again in {seconds} s"}, 429, headers={"retry-after": str(seconds)}
+    )

@@ -1,0 +1,136 @@
+"""What a browser asks: queries and web-socket messages, checked into plain values."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from livebode.dashboard.quantities import QUANTITIES
+from livebode.nouns import InputError, Quantity
+
+MESSAGE_BYTES_MAX = 1024
+_FORMATS = ("csv", "mat")
+_TIME_S_MAX = 1e12
+
+
+@dataclass(frozen=True)
+class Span:
+    """A query for the past: axis, quantity, from when to when, how many rows at most, and for downloads a format."""
+
+    axis: int
+    quantity: Quantity
+    from_s: float
+    to_s: float
+    rows: int = 1200
+    format: str = "csv"
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A message on the web socket.
+
+    `watch` chooses axis and quantity (the run's own unless said), `pause` stops and `resume` goes on with what is new,
+    `freeze` keeps the newest response, or the one at `time_s`, as a reference, `unfreeze` forgets it.
+    """
+
+    kind: str
+    axis: int = 0
+    quantity: Quantity | None = None
+    time_s: float | None = None
+
+
+def span(query: Mapping[str, str], axes: int) -> Span:
+    """From the query of a request; InputError where it cannot be.
+
+    >>> span({"axis": "0", "quantity": "plant", "from": "0", "to": "2.5"}, axes=1).to_s
+    2.5
+    """
+    from_s, to_s = _time(query.get("from", "0")), _time(query.get("to", "0"))
+    if to_s < from_s:
+        raise InputError(f"from={from_s:g} is behind to={to_s:g}; swap them")
+    format = query.get("format", "csv")
+    if format not in _FORMATS:
+        raise InputError(f"format={format[:20]!r} is not known; take csv or mat")
+    rows = _whole(query.get("rows", "1200"), 1, 1 << 20, "rows")
+    axis = _whole(query.get("axis", "0"), 0, axes - 1, "axis")
+    return Span(axis, _quantity(query.get("quantity", "plant")), from_s, to_s, rows, format)
+
+
+def wish(text: str, axes: int) -> Wish:
+    """From a message; InputError where it cannot be.
+
+    >>> wish('{"kind": "watch", "axis": 0, "quantity": "open loop"}', axes=1).quantity
+    'open loop'
+    """
+    if len(text) > MESSAGE_BYTES_MAX:
+        raise InputError(f"the message is longer than {MESSAGE_BYTES_MAX} bytes")
+    try:
+        said = json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError("the message is not JSON") from None
+    if not isinstance(said, dict):
+        raise InputError("the message is no object")
+    kind = said.get("kind")
+    if kind == "watch":
+        axis = said.get("axis", 0)
+        if isinstance(axis, bool) or not isinstance(axis, int):
+            raise InputError("axis is no whole number")
+        quantity = said.get("quantity")
+        asked_for = None if quantity is None else _quantity(quantity)
+        return Wish(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
+    if kind in ("pause", "resume", "unfreeze"):
+        return Wish(kind)
+    if kind == "freeze":
+        time_s = said.get("time_s")
+        if time_s is not None:
+            if isinstance(time_s, bool) or not isinstance(time_s, int | float):
+                raise InputError("time_s is no number")
+            time_s = _time(str(time_s)[:40])
+        return Wish(kind, time_s=time_s)
+    raise InputError(f"the message's kind {str(kind)[:20]!r} is not known")
+
+
+def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
+    """Axis and event of an acknowledgement; InputError where it cannot be."""
+    said = plain(data)
+    axis, event = said.get("axis"), said.get("event")
+    if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
+        raise InputError("an acknowledgement has an axis and an event")
+    return _whole(str(axis)[:10], 0, axes - 1, "axis"), event
+
+
+def plain(data: bytes) -> dict[str, Any]:
+    """An object of JSON; InputError where it is none."""
+    try:
+        said = json.loads(data)
+    except (ValueError, RecursionError):
+        raise InputError("the body is not JSON") from None
+    if not isinstance(said, dict):
+        raise InputError("the body is no object of JSON")
+    return said
+
+
+def _quantity(word: object) -> Quantity:
+    for known in QUANTITIES:
+        if word == known:
+            return known
+    raise InputError(f"quantity={str(word)[:20]!r} is not known; take {', '.join(QUANTITIES)}")
+
+
+def _time(text: str) -> float:
+    try:
+        value = float(text[:40])
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= _TIME_S_MAX:
+        raise InputError(f"{text[:40]!r} is no time in seconds")
+    return value
+
+
+def _whole(text: str, low: int, high: int, name: str) -> int:
+    if text.isascii() and text.isdigit() and len(text) <= 10 and low <= int(text) <= high:
+        return int(text)
+    raise InputError(f"{name}={text[:20]!r} is no whole number from {low} to {high}")

@@ -1,0 +1,122 @@
+"""Board: the states of all axes in the server's thread, and what requests want of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from livebode.dashboard.access import Access
+from livebode.dashboard.client import Client, Pulse
+from livebode.dashboard.notices import acknowledgement
+from livebode.dashboard.state import State
+from livebode.dashboard.viewed import Viewed
+from livebode.nouns import InputError
+
+UPDATES_PER_S = 30.0
+_IDLE_S = 0.5
+_VIEW_EVERY_S = 1.0
+_JOBS_MAX = 8
+T = TypeVar("T")
+
+
+class Board:
+    """What the server's thread holds: a State for each axis, the browsers, and the pace of both.
+
+    Parameters
+    ----------
+    states
+        One for each axis.
+    viewed
+        The record that each state without a hub is read from.
+    access
+        Who may what.
+    """
+
+    def __init__(self, states: list[State], viewed: dict[int, Viewed], access: Access) -> None:
+        self.states, self.access = states, access
+        self.clients: set[Client] = set()
+        self.pulse = Pulse()
+        self._viewed = viewed
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="livebode dashboard reads")
+        self._jobs = 0
+        self._hurry = asyncio.Event()
+
+    @property
+    def names(self) -> list[str]:
+        """Of the axes, in order."""
+        return [state.name for state in self.states]
+
+    async def run(self) -> None:
+        """Take what is new and wake the browsers, at most 30 times a second; seldom where nobody looks."""
+        looked = 0.0
+        clock = asyncio.get_running_loop().time
+        while True:
+            began = clock()
+            for state in self.states:
+                state.refresh()
+            if self._viewed and began - looked >= _VIEW_EVERY_S:
+                looked = began
+                await self._follow()
+            self.pulse.beat()
+            pause = 1 / UPDATES_PER_S if self.clients else _IDLE_S
+            self._hurry.clear()
+            try:
+                await asyncio.wait_for(self._hurry.wait(), max(0.001, began + pause - clock()))
+            except TimeoutError:
+                continue
+
+    def pulse_now(self) -> None:
+        """Do not wait for the next beat: a person pressed something."""
+        self._hurry.set()
+
+    def health(self, state: State) -> dict[str, Any]:
+        """Of an axis, and of the dashboard itself."""
+        return state.health() | {"browsers": len(self.clients), "refused": self.access.refused}
+
+    async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
+        """The result of a long job, which runs in another thread; InputError where too many wait."""
+        if self._jobs >= _JOBS_MAX:
+            raise InputError("too much of the record is being read; try again in a moment")
+        self._jobs += 1
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._worker, job, *arguments)
+        finally:
+            self._jobs -= 1
+
+    def acknowledge(self, axis: int, key: str) -> None:
+        """Have it recorded that a person has seen an event; InputError where that cannot be."""
+        state = self.states[axis]
+        shown = state.notices.of(key)
+        if shown is None:
+            raise InputError("there is no such event")
+        if state.hub is None or state.finished:
+            raise InputError("the run has ended, and its record is closed; events can be acknowledged while it goes on")
+        if shown["acknowledged"]:
+            return
+        newest = state.newest
+        sample, time_s = (int(newest.sample[0]), float(newest.time_s[0])) if newest is not None else (0, 0.0)
+        if not state.hub.say(acknowledgement(shown, sample, time_s)):
+            raise InputError("too many acknowledgements wait to be recorded; try again in a moment")
+
+    def close(self) -> None:
+        """Let the reading thread go."""
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    async def _follow(self) -> None:
+        """What another process recorded since."""
+        for axis, viewed in list(self._viewed.items()):
+            state = self.states[axis]
+            if viewed.finished:
+                state.finished = True
+                del self._viewed[axis]
+                continue
+            try:
+                items, rows, summary, finished = await self.elsewhere(viewed.more)
+            except InputError:
+                continue  # it is just being closed; the next look reads it
+            state.take(items)
+            for row in rows:
+                state.trends.add(*row)
+            state.renewed(summary, finished)

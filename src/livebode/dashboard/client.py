@@ -1,0 +1,174 @@
+"""One browser's web socket: what is new goes to it at its pace, what it wishes comes from it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import TYPE_CHECKING, Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from livebode.dashboard.asked import Wish, wish
+from livebode.dashboard.frames import frame
+from livebode.dashboard.past import Past
+from livebode.nouns import InputError, Responses
+from livebode.records import to_json
+
+if TYPE_CHECKING:
+    from livebode.dashboard.board import Board
+    from livebode.dashboard.state import State
+
+HEALTH_EVERY_S = 0.5
+ROWS_EVERY_S = 0.1
+TRENDS_EVERY_S = 0.25
+SLOW_S = 20.0
+"""A browser that takes nothing for so long is let go."""
+_ROWS_AT_ONCE = 400
+_WISHES_PER_S = 20
+
+
+class Client:
+    """Sends the newest of what one browser watches; what it is too slow for is skipped, never queued."""
+
+    def __init__(self, board: Board, socket: WebSocket, role: str) -> None:
+        self._board, self._socket, self._role = board, socket, role
+        self._watched = Wish("watch")
+        self._anew = True
+        self._paused = False
+        self._reference: Responses | None = None
+        self._sent: dict[str, Any] = {}
+
+    async def run(self) -> None:
+        """Until the browser goes or breaks a limit."""
+        await self._socket.accept()
+        hearing = asyncio.create_task(self._hear())
+        saying = asyncio.create_task(self._say())
+        try:
+            done, _ = await asyncio.wait({hearing, saying}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        except (TimeoutError, WebSocketDisconnect, RuntimeError, OSError):
+            pass  # it is gone, or too slow
+        finally:
+            for task in (hearing, saying):
+                task.cancel()
+            await asyncio.gather(hearing, saying, return_exceptions=True)
+
+    async def _hear(self) -> None:
+        count, since = 0, time.monotonic()
+        while True:
+            text = await self._socket.receive_text()
+            now = time.monotonic()
+            if now - since > 1:
+                count, since = 0, now
+            count += 1
+            if count > _WISHES_PER_S:
+                await self._socket.close(1008, "too many messages")
+                return
+            try:
+                await self._heed(wish(text, len(self._board.states)))
+            except (InputError, KeyError) as error:
+                await self._tell({"error": str(error)})
+
+    async def _heed(self, asked: Wish) -> None:
+        if asked.kind == "watch":
+            state = self._board.states[asked.axis]
+            if asked.quantity and state.quantities is not None and (why := state.quantities.why_not(asked.quantity)):
+                raise InputError(why)
+            if asked.axis != self._watched.axis:
+                self._reference = None
+            self._watched, self._anew = asked, True
+        elif asked.kind in ("pause", "resume"):
+            self._paused = asked.kind == "pause"
+            self._sent.pop("newest", None)
+        elif asked.kind == "unfreeze":
+            self._reference = None
+        else:
+            self._reference = await self._frozen(asked.time_s)
+            self._sent.pop("reference", None)
+        self._board.pulse_now()
+
+    async def _frozen(self, time_s: float | None) -> Responses | None:
+        state = self._state
+        if time_s is None or state.newest is None:
+            return state.newest
+        return await self._board.elsewhere(Past.of(state).at, time_s)
+
+    @property
+    def _state(self) -> State:
+        return self._board.states[self._watched.axis]
+
+    async def _say(self) -> None:
+        while True:
+            state = self._state
+            if self._anew:
+                self._anew = False
+                self._sent = {"notices": 0, "trends": state.trends.version, "rows": state.recent.count}
+                self._sent |= {"runs": state.runs, "finished": state.finished}
+                facts = state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)}
+                trends = state.trends.plain(whole=True)
+                await self._tell({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
+            elif (self._sent["runs"], self._sent["finished"]) != (state.runs, state.finished):
+                self._anew = True
+                continue
+            await self._update(state)
+            await self._board.pulse.wait_next()
+
+    async def _update(self, state: State) -> None:
+        """Everything that changed, in at most two messages."""
+        news: dict[str, Any] = {}
+        if state.notices.version != self._sent["notices"]:
+            news["notices"] = state.notices.since(self._sent["notices"])
+            self._sent["notices"] = state.notices.version
+        if self._due("health", HEALTH_EVERY_S):
+            news |= {"health": self._board.health(state), "span": state.span()}
+        if state.trends.version != self._sent["trends"] and self._due("trend", TRENDS_EVERY_S):
+            news["newest"] = state.trends.plain(whole=False)
+            self._sent["trends"] = state.trends.version
+        if news:
+            await self._tell(news)
+        if data := self._frames(state):
+            await asyncio.wait_for(self._socket.send_bytes(data), SLOW_S)
+
+    def _frames(self, state: State) -> bytes:
+        if state.quantities is None or state.newest is None:
+            return b""
+        quantity, found = state.shown(self._watched.quantity), b""
+        if not self._paused and self._sent.get("newest") != state.version:
+            self._sent["newest"] = state.version
+            found += state.newest_frames(quantity)
+        if self._reference is not None and "reference" not in self._sent:
+            self._sent["reference"] = True
+            found += frame("reference", state.axis, state.quantities.of_responses(self._reference, quantity))
+        if state.recent.count > self._sent["rows"] and self._due("row", ROWS_EVERY_S):
+            rows = state.rows(self._sent["rows"], _ROWS_AT_ONCE)
+            self._sent["rows"] = state.recent.count
+            if rows is not None:
+                found += frame("rows", state.axis, state.quantities.of_responses(rows, quantity))
+        return found
+
+    def _due(self, what: str, every_s: float) -> bool:
+        now = time.monotonic()
+        if now - self._sent.get(f"{what}_at", -every_s) < every_s:
+            return False
+        self._sent[f"{what}_at"] = now
+        return True
+
+    async def _tell(self, news: dict[str, Any]) -> None:
+        await asyncio.wait_for(self._socket.send_text(to_json(news)), SLOW_S)
+
+
+class Pulse:
+    """Wakes everybody that waits for the next update."""
+
+    def __init__(self) -> None:
+        self._next = asyncio.Event()
+
+    async def wait_next(self) -> None:
+        """Until the next beat."""
+        await self._next.wait()
+
+    def beat(self) -> None:
+        """Wake those that wait now."""
+        before, self._next = self._next, asyncio.Event()
+        before.set()

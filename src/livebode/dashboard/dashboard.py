@@ -1,0 +1,178 @@
+"""Dashboard: the server in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+from livebode.dashboard.access import Access
+from livebode.dashboard.hub import Hub
+from livebode.dashboard.settings import Serving
+from livebode.dashboard.state import State
+from livebode.dashboard.viewed import Viewed
+from livebode.nouns import InputError
+
+HEADER_BYTES_MAX = 16 << 10
+_CONNECTIONS_MAX = 128
+_START_S = 30.0
+_END_S = 2
+
+
+class Dashboard:
+    """Serves the page of one or several axes while it is used as a context manager.
+
+    Parameters
+    ----------
+    serving
+        Where, and who may.
+    tell
+        Hears what a person should know of the server: that somebody sent a wrong token.
+
+    Raises
+    ------
+    InputError
+        On entering, where the address cannot be listened on or the packages of the extra `dashboard` are missing.
+    """
+
+    def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
+        self._serving, self._tell = serving, tell
+        self._states: list[State] = []
+        self._viewed: dict[int, Viewed] = {}
+        self._server: Any = None
+        self._thread: threading.Thread | None = None
+        self._socket: socket.socket | None = None
+
+    def hub(self, name: str) -> Hub:
+        """The audience for the runs of the axis of this name.
+
+        A page that is open does not know of an axis that comes later, until it is loaded again.
+        """
+        for state in self._states:
+            if state.name == name and state.hub is not None:
+                return state.hub
+        hub = Hub(name)
+        self._states.append(State(name, len(self._states), hub))
+        return hub
+
+    def view(self, directory: Path) -> None:
+        """Show a run that was recorded, or that another process records; InputError where it cannot be read."""
+        state, viewed = State(directory.resolve().name, len(self._states)), Viewed(directory)
+        viewed.fill(state)
+        self._viewed[len(self._states)] = viewed
+        self._states.append(state)
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        assert self._socket is not None
+        host, port = self._socket.getsockname()[:2]
+        host = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
+        return f"{'https' if self._serving.tls else 'http'}://{f'[{host}]' if ':' in host else host}:{port}/"
+
+    @property
+    def cpu_s(self) -> float:
+        """Processor time that the server's thread has taken, s."""
+        assert self._thread is not None
+        assert self._thread.ident is not None
+        return time.clock_gettime(time.pthread_getcpuclockid(self._thread.ident))
+
+    def __enter__(self) -> Self:
+        try:
+            import uvicorn
+
+            from livebode.dashboard.patience import PatientProtocol
+        except ImportError as error:
+            raise InputError(
+                f"the dashboard needs {error.name}, which is not installed; pip install 'livebode[dashboard]'"
+            ) from None
+        self._socket = _listening(self._serving)
+        tls = self._serving.tls or (None, None)
+        config = uvicorn.Config(
+            self._serve,
+            loop="asyncio",
+            interface="asgi3",
+            http=PatientProtocol,
+            ws="websockets-sansio",
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            ws_max_size=2048,
+            ws_max_queue=8,
+            ws_per_message_deflate=False,
+            limit_concurrency=_CONNECTIONS_MAX,
+            h11_max_incomplete_event_size=HEADER_BYTES_MAX,
+            timeout_keep_alive=30,
+            timeout_graceful_shutdown=_END_S,
+            ssl_certfile=tls[0],
+            ssl_keyfile=tls[1],
+        )
+        # What strangers send is no news; a fault of ours is.
+        logging.getLogger("uvicorn").setLevel(logging.ERROR)
+        logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=self._run, name="livebode dashboard", daemon=True)
+        self._thread.start()
+        until = time.monotonic() + _START_S
+        while not self._server.started:
+            if not self._thread.is_alive() or time.monotonic() > until:
+                raise InputError(f"the dashboard did not start at {self.url}")
+            time.sleep(0.005)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._thread is not None
+        assert self._socket is not None
+        self._server.should_exit = True
+        self._thread.join(_END_S + 8)
+        self._socket.close()
+
+    def _run(self) -> None:
+        asyncio.run(self._work())
+
+    async def _work(self) -> None:
+        from livebode.dashboard.app import application
+        from livebode.dashboard.board import Board
+
+        board = Board(self._states, self._viewed, Access(self._serving, self._tell))
+        self._application = application(board, self._serving)
+        beating = asyncio.create_task(board.run())
+        beating.add_done_callback(self._stopped)
+        assert self._socket is not None
+        try:
+            await self._server.serve(sockets=[self._socket])
+        finally:
+            beating.cancel()
+            board.close()
+
+    def _stopped(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._tell(f"the dashboard stands still by a fault of its own, the run goes on: {error!r}")
+
+    async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
+        await self._application(scope, receive, send)
+
+
+def _listening(serving: Serving) -> socket.socket:
+    family = socket.AF_INET6 if ":" in serving.address else socket.AF_INET
+    found = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        found.bind((serving.address, serving.port))
+        found.listen(128)
+    except OSError as error:
+        found.close()
+        if error.errno == errno.EADDRINUSE:
+            raise InputError(
+                f"port {serving.port} is taken; give another with --port, or --port 0 for a free one"
+            ) from None
+        raise InputError(f"{serving.address} port {serving.port} cannot be listened on: {error.strerror}") from None
+    return found

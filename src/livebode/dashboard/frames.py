@@ -1,0 +1,74 @@
+"""Frames: curves for the page as bytes that a browser lays typed arrays over.
+
+| byte | type | what |
+|---|---|---|
+| 0 | 4 bytes | `LBCV` |
+| 4 | u8 | version, 1 |
+| 5 | u8 | kind, an index into `KINDS` |
+| 6 | u8 | quantity, an index into plant, open loop, closed loop, sensitivity |
+| 7 | u8 | axis |
+| 8 | u32 | rows |
+| 12 | u32 | columns: lines, or points of the model's grid |
+| 16 | f64 × rows, each | time in s, schedule, dof |
+| then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, coherence |
+| end | | zeros up to a multiple of 8 bytes, where the next frame may begin |
+
+Numbers are little endian, rows one behind the other. `reach` is 3σ/|value|: the edges of the ±3σ band are
+magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), none where reach ≥ 1. NaN is what is not known.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+
+from livebode.dashboard.quantities import QUANTITIES
+from livebode.nouns import Quantity, Responses
+from livebode.report.summary import unwrapped
+
+KINDS = ("newest", "moment", "reference", "baseline", "model", "rows", "history")
+SIGMAS = 3.0
+_HEADER = struct.Struct("<4sBBBBII")
+_MAGIC, _VERSION = b"LBCV", 1
+_WHOLE_PHASE_ROWS = 8  # up to so many rows the phase is unwrapped over frequency
+
+
+def frame(kind: str, axis: int, responses: Responses) -> bytes:
+    """Responses, already as the quantity that is to be shown."""
+    rows, columns = responses.value.shape
+    use = responses.valid & np.isfinite(responses.value) & (responses.value != 0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        size = np.where(use, np.abs(responses.value), np.nan)
+        magnitude = 20 * np.log10(size)
+        reach = SIGMAS * responses.sigma / size
+        phase = np.where(use, np.degrees(np.angle(responses.value)), np.nan)
+    if rows <= _WHOLE_PHASE_ROWS:
+        phase = np.array([unwrapped(p, np.nan_to_num(r) >= 1) for p, r in zip(phase, reach)]).reshape(rows, columns)
+    head = header(kind, axis, responses.quantity, rows, columns)
+    times = (responses.time_s, responses.schedule, responses.dof)
+    curves = (magnitude, phase, reach, np.where(use, responses.coherence, np.nan))
+    return _packed(head, times, curves)
+
+
+def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.ndarray[Any, Any]) -> bytes:
+    """One curve without bounds on another grid: a fitted model, shape (points,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        magnitude = 20 * np.log10(np.abs(value))
+    phase = unwrapped(np.degrees(np.angle(value)), np.zeros(len(value), dtype=bool))
+    nothing = np.full(len(value), np.nan)
+    one = np.array([np.nan])
+    head = header(kind, axis, quantity, 1, len(value))
+    return _packed(head, (np.array([time_s]), one, one), (magnitude, phase, nothing, nothing))
+
+
+def header(kind: str, axis: int, quantity: Quantity, rows: int, columns: int) -> bytes:
+    """The first 16 bytes."""
+    return _HEADER.pack(_MAGIC, _VERSION, KINDS.index(kind), QUANTITIES.index(quantity), axis, rows, columns)
+
+
+def _packed(head: bytes, times: tuple[Any, ...], curves: tuple[Any, ...]) -> bytes:
+    parts = [head, *(np.asarray(x, "<f8").tobytes() for x in times), *(np.asarray(x, "<f4").tobytes() for x in curves)]
+    data = b"".join(parts)
+    return data + bytes(-len(data) % 8)

@@ -1,0 +1,117 @@
+"""Guard: what every request must be before anything looks at it, and what every answer says to the browser."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import Any
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+BODY_BYTES_MAX = 4096
+_QUERY_MAX = 1024
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_SAID = {
+    "content-security-policy": _POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+class Guard:
+    """Refuses other hosts' names and other origins, long queries and bodies; sets the headers of every answer.
+
+    A page of another origin may send requests here with the browser's cookie, and one whose name was bound anew to
+    this address may even read the answers: the first has the wrong Origin, the second the wrong Host.
+    """
+
+    def __init__(self, app: ASGIApp, names: tuple[str, ...] = (), tls: bool = False) -> None:
+        self._app = app
+        self._names = {name.casefold() for name in (*names, "localhost")}
+        self._scheme = "https" if tls else "http"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        why = self._wrong(scope)
+        if why:
+            await _refuse(scope, receive, send, *why)
+            return
+        await self._app(scope, receive, _speaking(send))
+
+    def _wrong(self, scope: Scope) -> tuple[int, str] | None:
+        headers = Headers(scope=scope)
+        host = headers.get("host", "")
+        if len(headers.getlist("host")) != 1 or not self._known(host):
+            return 421, "this host name is not served here; add it to serve.names"
+        if len(scope.get("query_string", b"")) > _QUERY_MAX:
+            return 414, "the query is too long"
+        changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        origin = headers.get("origin")
+        if origin is None:
+            # A browser names the origin wherever it matters; a program with a token of its own carries no cookie.
+            allowed = not changes or headers.get("authorization", "") != ""
+        else:
+            allowed = origin == f"{self._scheme}://{host}"
+        if not allowed or headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+            if changes or origin is not None:
+                return 403, "requests from other origins are refused"
+            # A link from another page leads here; the page itself asks for everything else.
+            if headers.get("sec-fetch-mode") != "navigate":
+                return 403, "requests from other origins are refused"
+        return None
+
+    def _known(self, host: str) -> bool:
+        """Whether a browser may mean us by this: a number cannot be bound anew, a name can."""
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            _ = urlsplit(f"//{host}").port
+        except ValueError:
+            return False
+        if any(c in host for c in "/@?#\\ "):
+            return False
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return name.casefold() in self._names
+        return True
+
+
+def _speaking(send: Send) -> Send:
+    async def say(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in _SAID.items():
+                headers[name] = value
+            headers.setdefault("cache-control", "no-store")
+        await send(message)
+
+    return say
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: str) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
+        return
+    await PlainTextResponse(why + "\n", status, headers=dict(_SAID))(scope, receive, send)
+
+
+async def body(request: Any) -> bytes | None:
+    """The body of a request; None where it is longer than any that the page sends."""
+    data = b""
+    async for part in request.stream():
+        data += part
+        if len(data) > BODY_BYTES_MAX:
+            return None
+    return data

@@ -1,0 +1,104 @@
+"""Hub: the mailbox between the thread that tracks and the dashboard."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.session import Audience
+from livebode.sources.live import Health, LiveBlock
+
+Item = Responses | tuple[Parameters, ...] | Event
+
+VALUES_MAX = 1 << 20
+"""Most values (responses times lines) that wait for the dashboard: some 40 MB; older ones are given up."""
+EVENTS_MAX = 4096
+_SAYINGS_MAX = 64
+_DELAYS = 1024
+
+
+class Hub(Audience):
+    """Keeps what one axis publishes until the dashboard takes it, at its own pace.
+
+    Every method of an Audience only appends to a list, under a lock that nobody holds for longer than that. What the
+    dashboard does not take in time is given up, oldest first, so that memory stays bounded.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.directory: Path | None = None
+        self.begun: Mapping[str, Any] | None = None
+        self.ended: Mapping[str, Any] | None = None
+        self.health: Callable[[], Health] | None = None
+        self.samples = self.gaps = self.given_up = 0
+        self.delays_s: deque[float] = deque(maxlen=_DELAYS)
+        self._lock = threading.Lock()
+        self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
+        self._values = 0
+        self._events: deque[Event] = deque(maxlen=EVENTS_MAX)
+        self._sayings: list[Event] = []
+
+    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
+        with self._lock:  # what waits is of a run before, whose lines may be others
+            self._rows, self._values = deque(), 0
+        self.directory, self.health, self.ended = directory, health, None
+        self.begun = summary
+
+    def write(self, responses: Responses) -> None:
+        self._keep(responses, responses.value.size)
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        self._keep(parts, sum(part.value.size for part in parts))
+
+    def write_event(self, event: Event) -> None:
+        with self._lock:
+            self._events.append(event)
+
+    def drain_events(self) -> list[Event]:
+        if not self._sayings:
+            return []
+        with self._lock:
+            sayings, self._sayings = self._sayings, []
+        return sayings
+
+    def followed(self, block: Block) -> None:
+        self.samples = block.stop
+        self.gaps += block.gap
+        if isinstance(block, LiveBlock):
+            self.delays_s.append(time.monotonic() - block.arrived_s)
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self.ended = summary
+
+    def say(self, event: Event) -> bool:
+        """Have an event recorded; False where the run has ended or too many wait."""
+        with self._lock:
+            taken = self.ended is None and len(self._sayings) < _SAYINGS_MAX
+            if taken:
+                self._sayings.append(event)
+        return taken
+
+    def take(self) -> list[Item]:
+        """What came since the last call, events behind the rest."""
+        with self._lock:
+            rows, self._rows, self._values = self._rows, deque(), 0
+            events, self._events = self._events, deque(maxlen=EVENTS_MAX)
+        return [*rows, *events]
+
+    def _keep(self, item: Responses | tuple[Parameters, ...], values: int) -> None:
+        with self._lock:
+            self._rows.append(item)
+            self._values += values
+            while self._values > VALUES_MAX and len(self._rows) > 1:
+                old = self._rows.popleft()
+                self._values -= _size(old)
+                self.given_up += 1
+
+
+def _size(item: Responses | tuple[Parameters, ...]) -> int:
+    return item.value.size if isinstance(item, Responses) else sum(part.value.size for part in item)

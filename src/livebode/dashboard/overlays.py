@@ -1,0 +1,155 @@
+"""What is drawn over the measured curve: the fitted model and the healthy machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.dashboard.quantities import Quantities
+from livebode.dashboard.trends import Trends
+from livebode.fitting import Grid, PhysicalModel
+from livebode.nouns import InputError, Lines, Quantity, Responses
+from livebode.session.axis import FitSection
+from livebode.session.fits import chosen_model
+from livebode.session.said import said
+
+if TYPE_CHECKING:
+    from livebode.monitoring import Table
+
+Floats = NDArray[np.float64]
+_GRID_POINTS = 240
+
+
+def grid_hz(lines: Lines) -> Floats:
+    """The lines and points between them, where a model is drawn."""
+    f = lines.frequency_hz
+    return np.asarray(np.union1d(np.geomspace(f[0], f[-1], _GRID_POINTS), f))
+
+
+class Fitted:
+    """The fitted model of a run as a curve, from the parameters that it published."""
+
+    def __init__(self, quantities: Quantities, section: FitSection) -> None:
+        self._quantities = quantities
+        self.model: PhysicalModel = chosen_model(section, quantities.unit)
+        self._newest: tuple[float, Floats] | None = None
+        self._grid = Grid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any], quantities: Quantities) -> Fitted | None:
+        """As the configuration asks for it; None where it does not, or for what is no plant."""
+        words = said(dict(summary)).get("fit")
+        if words is None or quantities.own != "plant":
+            return None
+        return cls(quantities, FitSection.model_validate(words))
+
+    def curve(self, trends: Trends, quantity: Quantity, time_s: float | None) -> tuple[float, Any] | None:
+        """Time and values on the grid of the newest fit that holds, or of the one nearest to a moment."""
+        found = self._parameters(trends, time_s)
+        if found is None:
+            return None
+        at_s, values = found
+        plant = self.model.at(values, self._grid)
+        if quantity == "plant":
+            return at_s, plant
+        return at_s, self._quantities.converted(plant, quantity, self._feedback)[0]
+
+    @cached_property
+    def _feedback(self) -> Any:
+        assert self._quantities.loop is not None
+        return self._quantities.loop.feedback_at(self._grid.frequency_hz)
+
+    def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
+        """Time and values of one fit that holds."""
+        found = [trends.by_name.get((self.model.name, name)) for name in self.model.names]
+        rows = [t.newest if time_s is None else t.rows() for t in found if t is not None and t.newest is not None]
+        if len(rows) < len(found) or any(len(r) != len(rows[0]) for r in rows if r is not None):
+            return None
+        values = np.stack([r.value for r in rows if r is not None], axis=1)
+        at_s = rows[0].time_s if rows[0] is not None else np.zeros(0)
+        good = np.flatnonzero(np.isfinite(values).all(axis=1))
+        if time_s is not None and good.size:
+            at = good[np.argmin(np.abs(at_s[good] - time_s))]
+            return float(at_s[at]), values[at]
+        if time_s is None and good.size:
+            self._newest = float(at_s[-1]), values[-1]
+        return self._newest if time_s is None else None
+
+
+class Healthy:
+    """The baseline that a run is held against, where the machine now is."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
+        """As the configuration names it; None where it names none. InputError where the file cannot be read."""
+        path = said(dict(summary)).get("monitoring", {}).get("baseline")
+        if path is None:
+            return None
+        from livebode.monitoring import Baseline  # with the simulation
+
+        tables = [table for table in Baseline.load(Path(path)).tables if table.what == "lines"]
+        return cls(tables[0]) if tables else None
+
+    def response(self, beside: Responses, before: float) -> Responses | None:
+        """What the healthy machine shows where `beside` (one row) was measured, as a response with sigma.
+
+        `before` is the schedule a moment earlier, which tells the way that the machine goes. None where nothing was
+        learned there.
+        """
+        t = self._table
+        place = 0.0 if t.step == 0 else (float(beside.schedule[0]) - t.low) / t.step
+        if not 0 <= place < len(t.count):  # nor NaN
+            return None
+        bin = int(place)
+        way = _way(float(beside.schedule[0]) - before, t.still)
+        known = np.where(np.isfinite(t.mean[bin]).all(axis=1), t.count[bin], 0)
+        if not known.any():
+            return None
+        way = way if known[way] else int(np.argmax(known))
+        mean = t.mean[bin, way]
+        sigma = np.abs(mean) * np.sqrt(np.einsum("lii->l", t.covariance[bin, way]))
+        only = np.ones((1, len(mean)), dtype=bool)
+        return Responses(
+            lines=beside.lines,
+            value=mean[np.newaxis],
+            sigma=sigma[np.newaxis],
+            dof=np.array([float(known[way])]),
+            coherence=np.full((1, len(mean)), np.nan),
+            valid=only,
+            first=beside.first,
+            sample=beside.sample,
+            time_s=beside.time_s,
+            schedule=beside.schedule,
+            quantity=beside.quantity,
+            unit=beside.unit,
+        )
+
+
+def _way(step: float, still: float) -> int:
+    from livebode.monitoring.table import BACK, FORTH, STILL
+
+    return FORTH if step > still else BACK if step < -still else STILL
+
+
+def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[Fitted | None, Healthy | None, str]:
+    """Both, and why one of them is missing that was asked for."""
+    remarks = []
+    fitted: Fitted | None = None
+    healthy: Healthy | None = None
+    try:
+        fitted = Fitted.of(summary, quantities)
+    except (InputError, ValueError) as error:
+        remarks.append(f"the fitted model cannot be drawn: {error}")
+    try:
+        healthy = Healthy.of(summary)
+    except InputError as error:
+        remarks.append(f"the baseline cannot be drawn: {error}")
+    return fitted, healthy, "; ".join(remarks)

@@ -1,0 +1,116 @@
+"""The past of a run: responses of a span of time or at a moment, from its record or from what is in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from livebode.dashboard.state import State
+from livebode.nouns import InputError, Responses
+from livebode.records import Run
+from livebode.session.overview import Overview
+
+ROWS_MAX = 2000
+_WHOLE = 0.95  # of the run: from then on the thinned copy in memory says the same
+
+
+@dataclass(frozen=True)
+class Past:
+    """A copy of what the server's thread knows, to be asked in another thread.
+
+    Attributes
+    ----------
+    directory
+        Of the run.
+    recent, overview
+        The newest responses, and every n-th of the whole run; None before the first.
+    first_s, last_s
+        When the run began, and its newest response.
+    shown
+        The newest responses that were sent to browsers.
+    readable
+        Whether the record can be read: not that of a run in one piece while it goes on.
+    """
+
+    directory: Path
+    recent: Responses | None
+    overview: Responses | None
+    first_s: float
+    last_s: float
+    readable: bool
+    shown: tuple[Responses, ...]
+
+    @classmethod
+    def of(cls, state: State) -> Past:
+        """Of an axis; in the server's thread."""
+        assert state.directory is not None
+        overview = None if state.newest is None else state.overview.responses()
+        return cls(
+            state.directory,
+            state.recent.all(),
+            overview,
+            state.first_s,
+            state.last_s,
+            state.readable,
+            tuple(state.sent),
+        )
+
+    def between(self, from_s: float, to_s: float, rows: int) -> Responses:
+        """Every n-th response of a span, at most `rows`; InputError before the first response."""
+        if self.overview is None:
+            raise InputError("there is no response yet; wait for the first window")
+        rows = max(1, min(rows, ROWS_MAX))
+        within = _within(self.overview, from_s, to_s)
+        if (to_s - from_s) >= _WHOLE * (self.last_s - self.first_s):
+            return _thinned(within, rows)
+        if self.recent is not None and len(self.recent) and from_s >= self.recent.time_s[0]:
+            return _thinned(_within(self.recent, from_s, to_s), rows)
+        if not self.readable:
+            return _thinned(within, rows)
+        found = Overview()
+        found.add(within[0:0])
+        for part in Run.open(self.directory).between(from_s, to_s):
+            found.add(part)
+        recorded = found.responses()
+        return _thinned(recorded if len(recorded) else within, rows)
+
+    def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
+        """Every response of a span, in parts: from the record where it can be read, else those that are in memory."""
+        if self.readable:
+            yield from Run.open(self.directory).between(from_s, to_s)
+        elif self.recent is None or self.overview is None:
+            raise InputError("there is no response yet; wait for the first window")
+        else:
+            yield _within(self.recent if from_s >= self.recent.time_s[0] else self.overview, from_s, to_s)
+
+    def at(self, time_s: float) -> Responses:
+        """The response with a valid line nearest to a moment, one row, as exactly as it is known."""
+        found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
+        if self.readable and self.overview is not None:
+            reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz
+            found += Run.open(self.directory).between(time_s - reach_s, time_s + reach_s)
+        best = _nearest(found, time_s)
+        if best is None:
+            raise InputError("no response has a valid line yet; wait for the first window")
+        return best
+
+
+def _within(responses: Responses, from_s: float, to_s: float) -> Responses:
+    return responses[np.flatnonzero((responses.time_s >= from_s) & (responses.time_s <= to_s))]
+
+
+def _thinned(responses: Responses, rows: int) -> Responses:
+    return responses[:: max(1, -(-len(responses) // rows))]
+
+
+def _nearest(parts: list[Responses], time_s: float) -> Responses | None:
+    found: list[Responses] = []
+    for part in parts:
+        use = np.flatnonzero(part.valid.any(axis=1))
+        if use.size:
+            at = int(use[np.argmin(np.abs(part.time_s[use] - time_s))])
+            found.append(part[at : at + 1])
+    return min(found, key=lambda one: abs(float(one.time_s[0]) - time_s), default=None)

@@ -1,0 +1,115 @@
+"""Where the dashboard listens, and who may look and acknowledge: checked before anything starts."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import ssl
+from dataclasses import dataclass
+from pathlib import Path
+
+from livebode.nouns import InputError
+from livebode.session.axis import ServeSection
+from livebode.sources.live.secret import secret_file
+
+TOKEN_LETTERS_MIN = 32
+_MAKE = 'python -c "import secrets; print(secrets.token_urlsafe(32))"'
+
+
+@dataclass(frozen=True, repr=False)
+class Serving:
+    """A ServeSection whose secrets were read.
+
+    Attributes
+    ----------
+    address, port
+        Where to listen; port 0 takes a free one.
+    names
+        Host names, besides numbers and localhost, by which a browser may call the page.
+    token, viewer_token
+        Who has the first may acknowledge, who has the second may look; None where there is none.
+    tls
+        With certificate and key; None for plain HTTP.
+    read_only
+        Whether nobody may acknowledge.
+    """
+
+    address: str
+    port: int
+    names: tuple[str, ...] = ()
+    token: str | None = None
+    viewer_token: str | None = None
+    tls: tuple[Path, Path] | None = None
+    read_only: bool = False
+
+    @classmethod
+    def of(cls, section: ServeSection) -> Serving:
+        """From the configuration.
+
+        Raises
+        ------
+        InputError
+            Where a secret or file is missing, a token is short, or another address than the loopback is to be served
+            without token and TLS.
+        """
+        token = _token("token", section.token_env, section.token_file)
+        viewer = _token("viewer_token", section.viewer_token_env, section.viewer_token_file)
+        if viewer is not None and viewer == token:
+            raise InputError("serve.token and serve.viewer_token are the same; a viewer would be an operator")
+        tls = _tls(section)
+        if not _loopback(section.address):
+            if token is None and viewer is None:
+                raise InputError(
+                    f"serve.address = {section.address!r} is open to others, which needs a token; make one with "
+                    f"`{_MAKE}`, put it in a file or the environment, and name that as serve.token_file or token_env"
+                )
+            if tls is None:
+                raise InputError(
+                    f"serve.address = {section.address!r} is open to others, which needs TLS; give "
+                    "serve.certificate_file and serve.key_file"
+                )
+        return cls(section.address, section.port, tuple(section.names), token, viewer, tls, section.read_only)
+
+
+def _loopback(address: str) -> bool:
+    if address == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        raise InputError(f"serve.address = {address!r} is no IP address; 127.0.0.1 is this computer alone") from None
+
+
+def _token(key: str, variable: str | None, path: Path | None) -> str | None:
+    if variable is None and path is None:
+        return None
+    if variable is not None and path is not None:
+        raise InputError(f"serve has both {key}_env and {key}_file; leave out one of them")
+    if variable is not None:
+        token = os.environ.get(variable)
+        if token is None:
+            raise InputError(f"the environment has no {variable!r}, which serve.{key}_env names; set it")
+    else:
+        assert path is not None
+        token = secret_file(path)
+    if len(token) < TOKEN_LETTERS_MIN or not token.isascii() or not token.isprintable() or " " in token:
+        raise InputError(
+            f"serve.{key} is no token of at least {TOKEN_LETTERS_MIN} letters and digits; make one with `{_MAKE}`"
+        )
+    return token
+
+
+def _tls(section: ServeSection) -> tuple[Path, Path] | None:
+    certificate, key = section.certificate_file, section.key_file
+    if certificate is None and key is None:
+        return None
+    if certificate is None or key is None:
+        raise InputError("serve.certificate_file and serve.key_file go together; give both or none")
+    for path, name in ((certificate, "certificate_file"), (key, "key_file")):
+        if not path.is_file():
+            raise InputError(f"there is no file {path} for serve.{name}; check the name")
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
+    except (ssl.SSLError, OSError, ValueError) as error:
+        raise InputError(f"{certificate} and {key} are no certificate and its key in PEM: {error}") from None
+    return certificate, key

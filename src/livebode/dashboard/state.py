@@ -1,0 +1,251 @@
+"""State: what the server knows of one axis, live or from its record."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.dashboard.frames import curve, frame
+from livebode.dashboard.hub import Hub, Item
+from livebode.dashboard.notices import Notices
+from livebode.dashboard.overlays import Fitted, Healthy, grid_hz, overlays_of
+from livebode.dashboard.quantities import QUANTITIES, Quantities
+from livebode.dashboard.recent import Recent
+from livebode.dashboard.trends import Trends
+from livebode.margins import peak_sensitivity_at_lines
+from livebode.nouns import Event, InputError, Quantity, Responses
+from livebode.records import Run, to_json
+from livebode.session.overview import Overview
+from livebode.session.said import said
+
+_SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
+_PACE_S = 3.0
+_GROWS_S = 10.0
+_SENT = 90  # three seconds of what browsers were sent: what a person freezes is among them
+
+
+class State:
+    """Newest, recent and thinned responses of an axis, its parameters and events, and how its source is doing.
+
+    Belongs to the server's thread; what it is told comes from a Hub (`refresh`) or from a record (`take`).
+    """
+
+    def __init__(self, name: str, axis: int, hub: Hub | None = None) -> None:
+        self.name, self.axis, self.hub = name, axis, hub
+        self.directory: Path | None = None
+        self.quantities: Quantities | None = None
+        self.version = self.runs = 0
+        self._begun: Mapping[str, Any] | None = None
+        self._empty()
+        self._summary: Mapping[str, Any] = {}
+        self._fitted: Fitted | None = None
+        self._healthy: Healthy | None = None
+        self._remark = ""
+        self._grew = float("-inf")
+        self._made: dict[tuple[str, Quantity, float], bytes] = {}
+
+    def _empty(self) -> None:
+        self.newest: Responses | None = None
+        self.recent, self.overview = Recent(), Overview()
+        self.trends, self.notices = Trends(), Notices()
+        self.first_s = self.last_s = float("nan")
+        self.finished = False
+        self._seen = 0
+        self._pace: deque[tuple[float, int]] = deque(maxlen=128)
+        self.sent: deque[Responses] = deque(maxlen=_SENT)
+
+    @property
+    def live(self) -> bool:
+        """Whether a run in this process goes on."""
+        return self.hub is not None and not self.finished
+
+    @property
+    def growing(self) -> bool:
+        """Whether another process records it: something came just now."""
+        return self.hub is None and not self.finished and time.monotonic() - self._grew < _GROWS_S
+
+    def read(self) -> None:
+        """All that came until now was there before."""
+        self._grew = float("-inf")
+
+    @property
+    def readable(self) -> bool:
+        """Whether the record can be read: in segments at any time, in one piece when the run is done."""
+        return not self.live or "record" in self._summary
+
+    def begin(self, directory: Path, summary: Mapping[str, Any]) -> None:
+        """Where it is recorded, and run.json; `runs` counts how often an axis began."""
+        self.runs += 1
+        self.directory, self._summary = directory, json.loads(to_json(dict(summary)))  # as it is read back
+        self.quantities = Quantities.of(self._summary)
+        self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
+
+    def refresh(self) -> None:
+        """Take what the hub has."""
+        hub = self.hub
+        if hub is None:
+            return
+        if hub.begun is not self._begun and hub.begun is not None and hub.directory is not None:
+            self._begun = hub.begun
+            self._empty()
+            self.begin(hub.directory, hub.begun)
+            self._before()
+        ended = hub.ended
+        self.take(hub.take())
+        if ended is not None and not self.finished:
+            self.finished, self._summary = True, json.loads(to_json(dict(ended)))
+
+    def _before(self) -> None:
+        """The events of a run that is gone on with."""
+        if "record" not in self._summary or self.directory is None:
+            return
+        with suppress(InputError):  # it has just begun
+            self.take(list(Run.open(self.directory).events()))
+
+    def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
+        """run.json as it is now."""
+        self._summary, self.finished = summary, finished
+
+    def take(self, items: list[Item]) -> None:
+        """Responses, parameters and events in the order in which they came."""
+        for item in items:
+            if isinstance(item, Responses):
+                self._take_responses(item)
+            elif isinstance(item, Event):
+                self.notices.take(item)
+            else:
+                self.trends.take(item)
+
+    def _take_responses(self, responses: Responses) -> None:
+        if not len(responses):
+            return
+        self._seen += len(responses)
+        self._grew = time.monotonic()
+        self.overview.add(responses)
+        self.recent.add(responses)
+        use = np.flatnonzero(responses.valid.any(axis=1))
+        at = int(use[-1]) if use.size else len(responses) - 1
+        self.newest = responses[at : at + 1]
+        self.version += 1
+        if not np.isfinite(self.first_s):
+            self.first_s = float(responses.time_s[0])
+        self.last_s = float(responses.time_s[-1])
+
+    def shown(self, quantity: Quantity | None) -> Quantity:
+        """The quantity that is wished for where the run permits it, else its own."""
+        if self.quantities is None:
+            return quantity or "plant"
+        return quantity if quantity and not self.quantities.why_not(quantity) else self.quantities.own
+
+    def newest_frames(self, quantity: Quantity) -> bytes:
+        """The newest response, and the model and the healthy machine beside it."""
+        assert self.quantities is not None
+        if self.newest is None:
+            return b""
+        if not self.sent or self.sent[-1] is not self.newest:
+            self.sent.append(self.newest)
+        return self.frames_of("newest", self.newest, quantity, newest=True)
+
+    def frames_of(self, kind: str, one: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
+        """One response as `kind`, and what is drawn over it at that moment; the newest is kept for other browsers."""
+        key = (kind, quantity, float(self.version))
+        if newest and key in self._made:
+            return self._made[key]
+        assert self.quantities is not None
+        parts = [frame(kind, self.axis, self.quantities.of_responses(one, quantity))]
+        moment = None if newest else float(one.time_s[0])
+        if self._fitted is not None and (found := self._fitted.curve(self.trends, quantity, moment)) is not None:
+            parts.append(curve("model", self.axis, quantity, *found))
+        if self._healthy is not None:
+            near = self._healthy.response(one, self._schedule_before(one))
+            if near is not None:
+                parts.append(frame("baseline", self.axis, self.quantities.of_responses(near, quantity)))
+        made = b"".join(parts)
+        if newest:
+            self._made = {k: v for k, v in self._made.items() if k[2] == key[2]} | {key: made}
+        return made
+
+    def rows(self, after: int, most: int) -> Responses | None:
+        """Of the recent responses those behind the first `after`, the newest `most`."""
+        return self.recent.newest(min(self.recent.count - after, most))
+
+    def _schedule_before(self, one: Responses) -> float:
+        recent = self.recent.newest(64)
+        if recent is None:
+            return float("nan")
+        window_s = one.lines.window / one.lines.rate_hz
+        before = np.flatnonzero(recent.time_s <= one.time_s[0] - window_s)
+        return float(recent.schedule[before[-1]]) if before.size else float("nan")
+
+    def facts(self) -> dict[str, Any]:
+        """What the page must know before it draws."""
+        facts: dict[str, Any] = {"axis": self.axis, "name": self.name, "live": self.live, "begun": False}
+        q = self.quantities
+        if q is None:
+            return facts
+        words = said(dict(self._summary))
+        found = self._summary["found"]
+        return facts | {
+            "begun": True,
+            "directory": str(self.directory),
+            "frequency_hz": q.lines.frequency_hz.tolist(),
+            "grid_hz": grid_hz(q.lines).tolist(),
+            "rate_hz": q.lines.rate_hz,
+            "window": q.lines.window,
+            "format": found.get("format", ""),
+            "quantity": q.own,
+            "quantities": [
+                {"name": name, "symbol": _SYMBOLS[name], "unit": q.unit_of(name), "why_not": q.why_not(name)}
+                for name in QUANTITIES
+            ],
+            "signals": words.get("signals", {}),
+            "schedule": found.get("schedule") or words.get("signals", {}).get("schedule", ""),
+            "model": self._fitted.model.name if self._fitted else "",
+            "baseline": self._healthy is not None,
+            "remark": self._remark,
+        }
+
+    def span(self) -> dict[str, Any]:
+        """From when to when there is something to see."""
+        return {"first_s": self.first_s, "last_s": self.last_s, "live": self.live, "growing": self.growing}
+
+    def health(self) -> dict[str, Any]:
+        """How source and tracking are doing."""
+        now = time.monotonic()
+        self._pace.append((now, self._seen))
+        while len(self._pace) > 2 and self._pace[0][0] < now - _PACE_S:
+            self._pace.popleft()
+        (then, before), gone = self._pace[0], self._seen - self._pace[0][1]
+        found: dict[str, Any] = {
+            "responses": self._seen,
+            "responses_per_s": gone / (now - then) if now > then and before >= 0 else None,
+            "events": self.notices.counts,
+            "ms_at_lines": self._largest_sensitivity(),
+        }
+        hub = self.hub
+        if hub is None:
+            return found | {"counts": self._summary.get("counts"), "source": self._summary.get("source")}
+        delays = np.array(hub.delays_s) * 1e3
+        found |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
+        if delays.size:
+            found |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
+        if hub.health is not None:
+            found["source"] = asdict(hub.health())
+        return found
+
+    def _largest_sensitivity(self) -> dict[str, float] | None:
+        """|S| where it is largest at a line, without any model."""
+        q = self.quantities
+        if q is None or self.newest is None or q.why_not("sensitivity") or q.loop is None or q.loop.feedback is None:
+            return None
+        plant = q.of_responses(self.newest, "plant")
+        value, bound, at_hz = (float(x[0]) for x in peak_sensitivity_at_lines(plant, q.loop))
+        return {"value": value, "bound": bound, "frequency_hz": at_hz}

@@ -1,0 +1,65 @@
+// The curves of a Bode plot on one grid of frequencies: the lines and the points of the model between them.
+import { halfDeg, highDb, lowDb } from "./frames.js";
+
+export const NAMES = ["measured", "reference", "baseline", "model"];
+
+// From a frame at the lines or on the grid to arrays over the grid; between lines `undefined` (spanned), where a line
+// is not valid `null` (a gap).
+export function overGrid(frame, grid, at) {
+  const whole = frame.columns === grid.length && frame.kind === "model";
+  const spread = (of) => {
+    const found = new Array(grid.length).fill(undefined);
+    for (let i = 0; i < frame.columns; i++) {
+      const value = of(i);
+      found[whole ? i : at[i]] = Number.isNaN(value) ? null : value;
+    }
+    return found;
+  };
+  const { magnitude, phase, reach, coherence } = frame;
+  return {
+    db: spread((i) => magnitude[i]),
+    dbHigh: spread((i) => highDb(magnitude[i], reach[i])),
+    dbLow: spread((i) => lowDb(magnitude[i], reach[i])),
+    deg: spread((i) => phase[i]),
+    degHigh: spread((i) => phase[i] + halfDeg(reach[i])),
+    degLow: spread((i) => phase[i] - halfDeg(reach[i])),
+    coherence: spread((i) => coherence[i]),
+    frame,
+  };
+}
+
+// Whole turns by which a curve's phase is to be moved so that it lies beside another one, degrees.
+export function turns(curve, beside) {
+  const away = [];
+  for (let i = 0; i < curve.deg.length; i++) {
+    const a = curve.deg[i],
+      b = beside.deg[i];
+    if (Number.isFinite(a) && Number.isFinite(b)) away.push((b - a) / 360);
+  }
+  away.sort((x, y) => x - y);
+  return away.length ? 360 * Math.round(away[away.length >> 1]) : 0;
+}
+
+export const moved = (values, by) => (by === 0 ? values : values.map((v) => (Number.isFinite(v) ? v + by : v)));
+
+// Lowest and highest of what is drawn, and of its bounds as far as they do not squeeze the rest to a stripe.
+export function extent(curves, edges, room) {
+  let low = Infinity,
+    high = -Infinity;
+  for (const curve of curves)
+    for (const v of curve)
+      if (Number.isFinite(v)) {
+        low = Math.min(low, v);
+        high = Math.max(high, v);
+      }
+  const reach = Math.max(0.35 * (high - low), room),
+    least = low - reach,
+    most = high + reach;
+  for (const edge of edges)
+    for (const v of edge)
+      if (Number.isFinite(v)) {
+        low = Math.min(low, Math.max(v, least));
+        high = Math.max(high, Math.min(v, most));
+      }
+  return [low, high];
+}

@@ -1,0 +1,47 @@
+// Frames from the server as typed arrays; the layout is written down in frames.py.
+const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history"];
+export const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
+
+// All frames in a message, one behind the other.
+export function* framesOf(buffer) {
+  const view = new DataView(buffer);
+  let at = 0;
+  while (at + 16 <= buffer.byteLength) {
+    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1) throw new Error("this is no frame of curves");
+    const rows = view.getUint32(at + 8, true),
+      columns = view.getUint32(at + 12, true),
+      cells = rows * columns;
+    let next = at + 16;
+    const doubles = () => {
+      const a = new Float64Array(buffer, next, rows);
+      next += 8 * rows;
+      return a;
+    };
+    const frame = {
+      kind: KINDS[view.getUint8(at + 5)],
+      quantity: QUANTITIES[view.getUint8(at + 6)],
+      axis: view.getUint8(at + 7),
+      rows,
+      columns,
+      timeS: doubles(),
+      schedule: doubles(),
+      dof: doubles(),
+    };
+    const floats = () => {
+      const a = new Float32Array(buffer, next, cells);
+      next += 4 * cells;
+      return a;
+    };
+    Object.assign(frame, { magnitude: floats(), phase: floats(), reach: floats(), coherence: floats() });
+    yield frame;
+    at = (next + 7) & ~7;
+  }
+}
+
+// Edges of the band of ±3σ around a magnitude in dB or a phase in degrees; see frames.py.
+const FLOOR_DB = -1000;
+export const lowDb = (db, reach) => (reach < 1 ? db + 20 * Math.log10(1 - reach) : reach >= 1 ? FLOOR_DB : NaN);
+export const highDb = (db, reach) => db + 20 * Math.log10(1 + reach);
+export const halfDeg = (reach) => (reach < 1 ? (180 / Math.PI) * Math.asin(reach) : reach >= 1 ? 180 : NaN);
+// The probability that the band holds the truth: |error|²/σ² follows F(2, 2·dof).
+export const holds = (dof) => (Number.isFinite(dof) ? 1 - (1 + 9 / dof) ** -dof : 1 - Math.exp(-9));

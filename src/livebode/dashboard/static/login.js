@@ -1,0 +1,18 @@
+// The token goes once, in the body of a POST; what comes back is a cookie that scripts cannot read.
+import { applyTheme } from "./theme.js";
+
+applyTheme();
+const form = document.getElementById("form"),
+  wrong = document.getElementById("wrong");
+form.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const token = document.getElementById("token");
+  const answer = await fetch("/login", {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify({ token: token.value }),
+  }).catch(() => null);
+  token.value = "";
+  if (answer?.ok) location.replace("/");
+  else wrong.textContent = answer ? (await answer.json()).error : "there is no answer";
+});

@@ -1,0 +1,56 @@
+// The moment that is shown: the newest one, or one of the record.
+import { moment } from "./words.js";
+
+export class Timeline {
+  constructor({ slider, pause, from, to, now }, { onMoment, onLive }) {
+    Object.assign(this, { slider, pause, from, to, now, onMoment, onLive });
+    this.span = { first_s: NaN, last_s: NaN };
+    this.atS = null; // null follows the newest
+    slider.addEventListener("input", () => this.go(this.value()));
+    pause.addEventListener("click", () => this.toggle());
+  }
+
+  value() {
+    const { first_s: first, last_s: last } = this.span;
+    return first + (Number(this.slider.value) / 1000) * (last - first);
+  }
+
+  take(span) {
+    this.span = { ...span, first_s: span.first_s ?? NaN, last_s: span.last_s ?? NaN };
+    this.draw();
+  }
+
+  // Show a moment of the record.
+  go(timeS) {
+    const { first_s: first, last_s: last } = this.span;
+    if (!Number.isFinite(first)) return;
+    this.atS = Math.min(last, Math.max(first, timeS));
+    this.draw();
+    this.onMoment(this.atS);
+  }
+
+  step(byS) {
+    this.go((this.atS ?? this.span.last_s) + byS);
+  }
+
+  toggle() {
+    if (this.atS === null) this.go(this.span.last_s);
+    else {
+      this.atS = null;
+      this.draw();
+      this.onLive();
+    }
+  }
+
+  draw() {
+    const { first_s: first, last_s: last, live } = this.span,
+      paused = this.atS !== null;
+    this.slider.value = paused && last > first ? (1000 * (this.atS - first)) / (last - first) : 1000;
+    this.slider.setAttribute("aria-valuetext", moment(paused ? this.atS : last));
+    this.from.textContent = moment(first);
+    this.to.textContent = moment(last);
+    this.now.textContent = paused ? `shown: ${moment(this.atS)}` : live ? "the newest" : "the end";
+    this.pause.textContent = paused ? (live ? "Live" : "The end") : "Pause";
+    this.pause.classList.toggle("primary", paused);
+  }
+}

@@ -1,0 +1,104 @@
+"""Trends: fitted parameters and margins over the whole run in bounded memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import Parameters
+
+Floats = NDArray[np.float64]
+
+POINTS_MAX = 1024
+TRENDS_MAX = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """One parameter at some moments, arrays of one length."""
+
+    time_s: Floats
+    schedule: Floats
+    value: Floats
+    sigma: Floats
+    status: NDArray[Any]
+
+    def __getitem__(self, at: slice) -> Rows:
+        return Rows(self.time_s[at], self.schedule[at], self.value[at], self.sigma[at], self.status[at])
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+class Trend:
+    """Every n-th row of one parameter, n doubled whenever there are too many, and the newest row."""
+
+    def __init__(self, model: str, name: str, unit: str) -> None:
+        self.model, self.name, self.unit = model, name, unit
+        self.newest: Rows | None = None
+        self._rows: list[Rows] = []
+        self._seen, self._stride, self._kept = 0, 1, 0
+
+    def add(self, rows: Rows) -> None:
+        """Rows behind those before."""
+        if not len(rows):
+            return
+        self.newest = rows[-1:]
+        self._keep(rows[-self._seen % self._stride :: self._stride])
+        self._seen += len(rows)
+        while self._kept > POINTS_MAX:
+            whole = self.rows()
+            self._rows, self._kept = [], 0
+            self._keep(whole[::2])
+            self._stride *= 2
+
+    def rows(self) -> Rows:
+        """What was kept."""
+        if len(self._rows) > 1:
+            self._rows = [Rows(*(np.concatenate([getattr(r, n) for r in self._rows]) for n in Rows.__annotations__))]
+        return self._rows[0]
+
+    def plain(self, *, whole: bool) -> dict[str, Any]:
+        """For the page: all that was kept, or only the newest row."""
+        rows = self.rows() if whole else self.newest
+        assert rows is not None
+        found = {"model": self.model, "name": self.name, "unit": self.unit}
+        return found | {name: getattr(rows, name).tolist() for name in Rows.__annotations__}
+
+    def _keep(self, rows: Rows) -> None:
+        if len(rows):
+            self._rows.append(Rows(*(np.array(getattr(rows, name)) for name in Rows.__annotations__)))
+            self._kept += len(rows)
+
+
+class Trends:
+    """Those of one run, by model and name."""
+
+    def __init__(self) -> None:
+        self.by_name: dict[tuple[str, str], Trend] = {}
+        self.version = 0
+
+    def take(self, parts: tuple[Parameters, ...]) -> None:
+        """What a run published."""
+        for part in parts:
+            sigma = part.sigma
+            for i, (name, unit) in enumerate(zip(part.names, part.units)):
+                rows = Rows(part.time_s, part.schedule, part.value[:, i], sigma[:, i], part.status)
+                self.add(part.model, name, unit, rows)
+
+    def add(self, model: str, name: str, unit: str, rows: Rows) -> None:
+        """Rows of one parameter."""
+        key = (model, name)
+        if key not in self.by_name:
+            if len(self.by_name) >= TRENDS_MAX:
+                return
+            self.by_name[key] = Trend(model, name, unit)
+        self.by_name[key].add(rows)
+        self.version += 1
+
+    def plain(self, *, whole: bool) -> list[dict[str, Any]]:
+        """For the page; see `Trend.plain`."""
+        return [trend.plain(whole=whole) for trend in self.by_name.values() if trend.newest is not None]

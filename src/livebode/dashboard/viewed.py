@@ -1,0 +1,87 @@
+"""A run that another process recorded, or is recording: read from its directory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.dashboard.hub import Item
+from livebode.dashboard.state import State
+from livebode.dashboard.trends import Rows
+from livebode.nouns import Responses
+from livebode.records import Run
+
+_NEWEST_BYTES = 64 << 20
+
+
+class Viewed:
+    """Hands the responses, parameters and events of a run's directory to a State."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self._run = Run.open(directory)
+        self._sample = self._parameter_sample = -1
+        self._events = 0
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing more to come."""
+        return self._run.finished
+
+    def fill(self, state: State) -> None:
+        """All that there is."""
+        state.begin(self.directory, self._run.summary)
+        for part in self._run.batches():
+            self._responses(state, part)
+        self._rest(state, None)
+
+    def more(self) -> tuple[list[Item], list[tuple[str, str, str, Rows]], dict[str, Any], bool]:
+        """What came since: responses and events, rows of parameters, run.json, and whether the run has ended."""
+        self._run = Run.open(self.directory)
+        items: list[Item] = [new for part in self._run.batches(_NEWEST_BYTES) if (new := self._new(part)) is not None]
+        rows = list(self._parameters(_NEWEST_BYTES))
+        events = self._run.events()
+        items += events[self._events :]
+        self._events = len(events)
+        return items, rows, self._run.summary, self._run.finished
+
+    def _rest(self, state: State, size_bytes_max: int | None) -> None:
+        for model, name, unit, rows in self._parameters(size_bytes_max):
+            state.trends.add(model, name, unit, rows)
+        events = self._run.events()
+        state.take(list(events))
+        self._events = len(events)
+        state.finished = self._run.finished
+        state.read()
+
+    def _responses(self, state: State, part: Responses) -> None:
+        if (new := self._new(part)) is not None:
+            state.take([new])
+
+    def _new(self, part: Responses) -> Responses | None:
+        behind = np.flatnonzero(part.sample > self._sample)
+        if not behind.size:
+            return None
+        self._sample = int(part.sample[-1])
+        return part[behind]
+
+    def _parameters(self, size_bytes_max: int | None) -> Iterator[tuple[str, str, str, Rows]]:
+        """Model, name, unit and rows of each parameter, table by table."""
+        for table in self._run.tables("parameters", size_bytes_max):
+            sample = table["sample"].to_numpy()
+            new = table.filter(pa.array(sample > self._parameter_sample))
+            if not new.num_rows:
+                continue
+            self._parameter_sample = int(sample[-1])
+            column = {name: new[name].to_numpy() for name in ("time_s", "schedule", "value", "sigma", "status")}
+            model, name, unit = (np.asarray(new[c].to_numpy(), dtype=str) for c in ("model", "name", "unit"))
+            both = np.char.add(np.char.add(model, "\0"), name)
+            _, first = np.unique(both, return_index=True)
+            for at in np.sort(first):
+                use = both == both[at]
+                rows = Rows(*(column[c][use] for c in ("time_s", "schedule", "value", "sigma", "status")))
+                yield str(model[at]), str(name[at]), str(unit[at]), rows

@@ -1,0 +1,84 @@
+"""Chromium without a window, as Debian has it, and a page that keeps what went wrong in it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+DESK = {"width": 1440, "height": 900}
+TABLET = {"width": 768, "height": 1024}
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A browser; without Chromium the test is skipped on a laptop and fails in CI."""
+    path = shutil.which("chromium")
+    if path is None:
+        message = "chromium is not installed: `make system-packages` installs it"
+        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
+    with sync_playwright() as playwright:
+        # Its sandbox does not start for root.
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"] * (os.geteuid() == 0))
+        yield browser
+        browser.close()
+
+
+class Tab:
+    """A page of the dashboard. `wrong` collects what must not happen: errors, refused content, requests elsewhere."""
+
+    def __init__(self, browser: Browser, url: str, wait: bool = True, **options: Any) -> None:
+        self.wrong: list[str] = []
+        self.url = url
+        self.context: BrowserContext = browser.new_context(**({"viewport": DESK} | options))
+        self.context.add_init_script(
+            "addEventListener('securitypolicyviolation', (e) => console.error('CSP', e.violatedDirective))"
+        )
+        self.page: Page = self.context.new_page()
+        self.page.on("console", lambda m: self.wrong.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("request", self._looked)
+        self.page.goto(url)
+        if wait:
+            self.until("window.livebode?.bode.curves.measured")
+
+    def __enter__(self) -> Tab:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+    def until(self, expression: str) -> None:
+        """Wait for JavaScript to become true."""
+        self.page.wait_for_function(f"() => {{ with (window.livebode || {{}}) return Boolean({expression}); }}")
+
+    def js(self, expression: str) -> Any:
+        """The value of JavaScript; NaN and undefined come as null."""
+        return self.page.evaluate(f"() => {{ with (window.livebode || {{}}) return ({expression}); }}")
+
+    def numbers(self, expression: str) -> np.ndarray:
+        """An array of numbers; NaN for what is none."""
+        text = f"Array.from({expression}, (v) => Number.isFinite(v) ? v : null)"
+        return np.array([np.nan if v is None else v for v in self.js(text)], dtype=float)
+
+    def _looked(self, request: Any) -> None:
+        parts = urlsplit(request.url)
+        if parts.scheme not in ("blob", "data") and parts.hostname not in ("127.0.0.1", "localhost"):
+            self.wrong.append(f"a request went to {request.url}")
+
+
+def until(true: Callable[[], bool], what: str, patience_s: float = 30.0) -> None:
+    """Wait for something in this process."""
+    end = time.monotonic() + patience_s
+    while not true():
+        assert time.monotonic() < end, f"waited in vain for {what}"
+        threading.Event().wait(0.01)
