@@ -11,7 +11,7 @@ from livebode.sources.live import encode_layout, encode_samples
 from tests.command import livebode
 from tests.peers.broker import Mosquitto, publisher, stop
 from tests.peers.peer import CHANNELS, RATE_HZ, batches, until
-from tests.session_process import Running
+from tests.session_process import Running, events
 
 SECRET = "hunter2-and-more"
 REST = """
@@ -63,8 +63,10 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
                 sender.publish("t", encode_samples(batch), qos=1).wait_for_publish(10)
             until(lambda: (running.out / "manifest.jsonl").exists(), "the record")
             running.edit(text.replace("mqtt://", f"mqtt://me:{SECRET}@"))
-            for batch in batches(200, first=batches(60)[-1].stop):
+            for batch in batches(5000, first=batches(60)[-1].stop):
                 sender.publish("t", encode_samples(batch), qos=1).wait_for_publish(10)
+                if any(event.kind == "configuration-refused" for event in events(running.out)):
+                    break
             code, out, err = running.end()
         stop(sender)
     assert code == 0, err

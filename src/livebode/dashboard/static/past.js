@@ -11,7 +11,8 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
     const { span } = timeline,
       whole = page.spanS === "whole",
       half = Number(page.spanS) / 2;
-    if (!page.facts?.begun || !Number.isFinite(span.last_s)) {
+    const between = page.facts?.axis !== page.axis || page.quantity === null; // another axis was chosen, and its facts have not come
+    if (between || !page.facts.begun || !Number.isFinite(span.last_s)) {
       setTimeout(fill, 300);
       return;
     }
