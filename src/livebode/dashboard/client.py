@@ -104,13 +104,9 @@ class Client:
             if self._anew:
                 self._anew = False
                 self._sent = {"notices": 0, "trends": -1, "rows": state.recent.count, "finished": state.finished}
-                await self._tell(
-                    {
-                        "facts": state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)},
-                        "axes": self._board.names,
-                    }
-                    | {"span": state.span(), "trends": state.trends.plain(whole=True)}
-                )
+                facts = state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)}
+                trends = state.trends.plain(whole=True)
+                await self._tell({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
                 self._sent["trends"] = state.trends.version
                 self._sent["begun"] = state.quantities is not None
             elif (not self._sent["begun"] and state.quantities is not None) or self._sent["finished"] != state.finished:

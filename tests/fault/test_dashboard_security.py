@@ -1,0 +1,422 @@
+"""Who is refused by the dashboard, and that refusing costs the run nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import re
+import socket
+import ssl
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
+from typing import Any
+
+import pytest
+import websockets
+from websockets.sync.client import ClientConnection, connect
+
+from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard.access import Access, TooManyTriesError
+from livebode.dashboard.app import SOCKETS_MAX
+from livebode.dashboard.guard import Guard
+from livebode.nouns import Event, InputError
+from livebode.session.axis import Axis, ServeSection
+from tests.browser import Tab, chromium, until
+from tests.dashboards import Watched
+from tests.peers.certificates import Authority
+
+TOKEN, VIEWER = "operator-" + "x" * 40, "viewer-" + "y" * 40
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    """With tokens, on the loopback."""
+    serving = Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
+    with Watched(tmp_path_factory.mktemp("guarded") / "run", serving) as found:
+        found.go(2000)
+        yield found
+
+
+def port_of(watched: Watched) -> int:
+    return int(re.search(r":(\d+)/", watched.url).group(1))
+
+
+def ask(
+    watched: Watched, path: str, method: str = "GET", body: Any = None, **headers: str
+) -> tuple[int, dict[str, str], str]:
+    """Status, headers and body; nothing is sent that is not named, but Host."""
+    connection = HTTPConnection("127.0.0.1", port_of(watched), timeout=20)
+    names = {k.replace("_", "-"): v for k, v in headers.items()}
+    data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+    connection.request(method, path, data, names)
+    answer: HTTPResponse = connection.getresponse()
+    found = answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read().decode("utf-8", "replace")
+    connection.close()
+    return found
+
+
+def origin(watched: Watched) -> str:
+    return watched.url.rstrip("/")
+
+
+def login(watched: Watched, token: str) -> tuple[int, str]:
+    status, headers, _ = ask(watched, "/login", "POST", {"token": token}, Origin=origin(watched))
+    return status, headers.get("set-cookie", "")
+
+
+def cookie(watched: Watched, token: str) -> str:
+    status, said = login(watched, token)
+    assert status == 200
+    return said.partition(";")[0]
+
+
+def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
+    assert ask(watched, "/")[:2][0] == 303
+    for path in ("/api/past?axis=0&from=0&to=1", "/api/moment?axis=0&from=0", "/api/export?axis=0&from=0&to=1"):
+        status, _, body = ask(watched, path)
+        assert (status, json.loads(body)) == (401, {"error": "log in first"})
+    assert ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, Origin=origin(watched))[0] == 401
+    with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+        connect(f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched))
+
+
+def test_a_login_gives_a_cookie_that_scripts_and_other_sites_cannot_use(watched: Watched) -> None:
+    status, said = login(watched, TOKEN)
+    assert status == 200
+    assert "HttpOnly" in said
+    assert "SameSite=strict" in said
+    assert TOKEN not in said
+    mine = said.partition(";")[0]
+    assert ask(watched, "/", Cookie=mine)[0] == 200
+    assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
+    assert ask(watched, "/logout", "POST", {}, Origin=origin(watched), Cookie=mine)[0] == 200
+    assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 401
+    # A program may send the token in a header instead, and needs no origin then; never in the address.
+    bearer = f"Bearer {TOKEN}"
+    assert ask(watched, "/api/past?axis=0&from=0&to=1", Authorization=bearer)[0] == 200
+    assert ask(watched, f"/api/past?axis=0&from=0&to=1&token={TOKEN}")[0] == 401
+
+
+def test_a_viewer_may_only_look(watched: Watched) -> None:
+    mine = cookie(watched, VIEWER)
+    assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
+    headers = {"Origin": origin(watched), "Cookie": mine, "Content_Type": "application/json"}
+    status, _, body = ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, **headers)
+    assert (status, json.loads(body)["error"]) == (403, "this session may only look")
+    with connect(
+        f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched), additional_headers={"Cookie": mine}
+    ) as live:
+        assert json.loads(live.recv())["facts"]["role"] == "viewer"
+
+
+@pytest.mark.parametrize("wrong", ["http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}", ""])
+def test_other_origins_are_refused(watched: Watched, wrong: str) -> None:
+    mine, wrong = cookie(watched, TOKEN), wrong.format(port=port_of(watched))
+    body = {"axis": 0, "event": "x"}
+    headers = {"Cookie": mine, "Content_Type": "application/json"} | ({"Origin": wrong} if wrong else {})
+    assert ask(watched, "/api/acknowledge", "POST", body, **headers)[0] == 403
+    assert ask(watched, "/login", "POST", {"token": TOKEN}, **({"Origin": wrong} if wrong else {}))[0] == 403
+    with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+        connect(f"ws://127.0.0.1:{port_of(watched)}/live", origin=wrong or None, additional_headers={"Cookie": mine})
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "localhost.evil.example", "127.0.0.1@evil.example", "a b", "[::1", ""]
+)
+def test_a_name_that_was_bound_anew_is_refused(watched: Watched, host: str) -> None:
+    mine = cookie(watched, TOKEN)
+    assert ask(watched, "/api/past?axis=0&from=0&to=1", Host=host, Cookie=mine)[0] in (400, 421)
+    assert ask(watched, "/", Host=host)[0] in (400, 421)
+
+
+def test_names_that_are_served() -> None:
+    guard = Guard(lambda *_: None, names=("drive-7.plant",))  # type: ignore[arg-type, return-value]
+    for host in ("drive-7.plant", "Drive-7.plant:8765", "localhost:1", "127.0.0.1:8765", "[::1]:8765", "10.1.2.3"):
+        assert guard._known(host), host
+    for host in ("drive-7.plant.evil", "plant", "", "1.2.3.4.evil", "[::1]@x", "x:99999999"):
+        assert not guard._known(host), host
+
+
+def test_no_get_changes_anything(watched: Watched) -> None:
+    mine = cookie(watched, TOKEN)
+    for path in ("/api/acknowledge?axis=0&event=x", "/logout"):
+        assert ask(watched, path, Cookie=mine)[0] == 405
+    assert ask(watched, "/", Cookie=mine)[0] == 200  # still logged in
+    for method in ("PUT", "DELETE", "PATCH"):
+        for path in ("/", "/login", "/api/acknowledge", "/static/main.js"):
+            assert ask(watched, path, method, {}, Origin=origin(watched), Cookie=mine)[0] == 405
+
+
+def test_every_answer_says_what_browsers_must_not_do(watched: Watched) -> None:
+    for path in (
+        "/",
+        "/login",
+        "/static/main.js",
+        "/static/../board.py",
+        "/api/past",
+        "/no/such",
+        "/static/uplot/uPlot.esm.js",
+    ):
+        _, headers, _ = ask(watched, path)
+        policy = headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert "frame-ancestors 'none'" in policy
+        assert headers["x-content-type-options"] == "nosniff"
+        assert "server" not in headers
+    for path in ("/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fapp.py", "/static/uplot/../../app.py"):
+        assert ask(watched, path)[0] == 404, path
+    html = Path(__file__).parents[2] / "src/livebode/dashboard/static/index.html"
+    assert not re.search(r"<script(?![^>]*src=)|\son\w+=|style=|javascript:|https?:", html.read_text())
+
+
+def test_code_of_the_page_never_makes_html_of_data() -> None:
+    for file in (Path(__file__).parents[2] / "src/livebode/dashboard/static").glob("*.js"):
+        assert not re.search(
+            r"innerHTML|outerHTML|insertAdjacent|document\.write|eval\(|new Function", file.read_text()
+        )
+
+
+def test_wrong_tokens_are_refused_slower_and_slower_and_said_once() -> None:
+    now, told = [0.0], list[str]()
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN), told.append, clock=lambda: now[0])
+    for _ in range(5):
+        assert access.login("wrong" * 10, "10.0.0.5") is None
+    waits = []
+    for _ in range(12):
+        with pytest.raises(TooManyTriesError) as stopped:
+            access.login(TOKEN, "10.0.0.5")  # even the right one waits
+        waits.append(stopped.value.args[0])
+        now[0] += waits[-1]
+        assert access.login("wrong", "10.0.0.5") is None
+    assert waits == sorted(waits)
+    assert waits[0] == 1.0
+    assert waits[-1] == 300.0
+    assert access.login(TOKEN, "10.0.0.6"), "others do not wait"
+    now[0] += 300
+    assert access.login(TOKEN, "10.0.0.5")
+    assert told == ["a wrong token came to the dashboard from 10.0.0.5; it was refused"]
+    for i in range(5000):
+        access.login("wrong", f"2001:db8:{i:x}::1")
+    assert len(access._wrong) <= 1024
+    assert len(access._told) <= 1024
+
+
+def test_sessions_end_and_are_few() -> None:
+    now = [0.0]
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN), lambda _: None, clock=lambda: now[0])
+    first = access.login(TOKEN, "::1")
+    assert access.role(f"livebode={first}", "", "::1") == "operator"
+    now[0] = 13 * 3600.0
+    assert access.role(f"livebode={first}", "", "::1") is None
+    for _ in range(100):
+        last = access.login(TOKEN, "::1")
+    assert len(access._sessions) <= 64
+    assert access.role(f"a=b; livebode={last}", "", "::1") == "operator"
+    for rubbish in ("livebode=", "livebode", ";;=;", "livebode=" + "é" * 500, "\0"):
+        assert access.role(rubbish, "", "::1") is None
+
+
+def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each try compares with both tokens, all of a hash, whatever it is like."""
+    import hmac
+
+    seen: list[tuple[bytes, bytes]] = []
+    real = hmac.compare_digest
+    monkeypatch.setattr(hmac, "compare_digest", lambda a, b: (seen.append((a, b)), real(a, b))[1])
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None)
+    for token in (TOKEN, VIEWER, "", "x", TOKEN + "x"):
+        seen.clear()
+        access.login(token, "::1")
+        assert [len(a) == len(b) == 32 for a, b in seen] == [True, True]
+
+
+def closed(live: ClientConnection) -> bool:
+    """Whether the server closes it, within what it has sent."""
+    try:
+        for _ in range(60):
+            live.recv(timeout=3)
+    except websockets.exceptions.ConnectionClosed:
+        return True
+    except TimeoutError:
+        pass
+    return False
+
+
+def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
+    url, headers = f"ws://127.0.0.1:{port_of(watched)}/live", {"Cookie": cookie(watched, TOKEN)}
+
+    def opened() -> ClientConnection:
+        return connect(url, origin=origin(watched), additional_headers=headers, ping_interval=None, close_timeout=1)
+
+    with contextlib.ExitStack() as stack:
+        for _ in range(SOCKETS_MAX):
+            stack.enter_context(opened())
+        with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+            opened()
+    with opened() as live:
+        with contextlib.suppress(websockets.exceptions.ConnectionClosed):
+            for _ in range(200):
+                live.send('{"kind": "pause"}')
+        assert closed(live)
+    with opened() as live:
+        live.send("x" * 100_000)
+        assert closed(live)
+    with opened() as live:
+        live.send("no json")
+        assert not closed(live), "a message that means nothing is answered, and no more"
+
+
+def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
+    """A socket that is never read fills up; the machine goes on, another browser sees it, memory stays bounded."""
+    mine = cookie(watched, TOKEN)
+    request = (
+        f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port_of(watched)}\r\nOrigin: {origin(watched)}\r\nCookie: {mine}\r\n"
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    with socket.create_connection(("127.0.0.1", port_of(watched))) as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        deaf.sendall(request.encode())
+        with connect(
+            watched.url.replace("http", "ws") + "live", origin=origin(watched), additional_headers={"Cookie": mine}
+        ) as live:
+            live.recv()
+            for samples in range(2200, 6001, 200):
+                watched.go(samples)
+            seen = 0
+            until(lambda: bool(live.recv(timeout=20)), "news")
+            for _ in range(40):
+                seen += isinstance(live.recv(timeout=20), bytes)
+                if seen > 2:
+                    break
+            assert seen > 2
+    assert watched.hub._values < 1 << 20
+
+
+def test_heads_that_never_end_are_refused(watched: Watched) -> None:
+    with socket.create_connection(("127.0.0.1", port_of(watched))) as long:
+        with contextlib.suppress(OSError):
+            long.sendall(b"GET / HTTP/1.1\r\nX: " + b"x" * 200_000)
+        answer = b""
+        with contextlib.suppress(OSError):
+            while part := long.recv(4096):
+                answer += part
+        assert answer == b"" or b" 400 " in answer.split(b"\r\n")[0] + b" "
+    assert ask(watched, "/?" + "x" * 2000)[0] == 414
+    assert ask(watched, "/login", "POST", b"x" * 10_000, Origin=origin(watched))[0] == 400
+
+
+SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spaces " * 4}
+
+
+@pytest.mark.parametrize(
+    ("section", "word"),
+    [
+        ({"address": "0.0.0.0"}, "needs a token; make one with"),
+        ({"address": "192.168.1.5"}, "needs a token"),
+        ({"address": "0.0.0.0", "token_env": "token"}, "needs TLS"),
+        ({"address": "::", "viewer_token_env": "viewer"}, "needs TLS"),
+        ({"address": "plant"}, "is no IP address"),
+        ({"token_env": "nowhere"}, "the environment has no 'nowhere'"),
+        ({"token_env": "short"}, "at least 32"),
+        ({"token_env": "spaces"}, "at least 32"),
+        ({"token_env": "token", "viewer_token_env": "token"}, "are the same"),
+        ({"token_file": "/no/such"}, "cannot be read"),
+        ({"token_env": "token", "token_file": "/no/such"}, "both"),
+        ({"certificate_file": "/no/such"}, "go together"),
+        ({"certificate_file": "/no/such", "key_file": "/no/such"}, "there is no file"),
+        ({"certificate_file": __file__, "key_file": __file__}, "no certificate"),
+    ],
+)
+def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str) -> None:
+    for name, value in SERVE.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(InputError, match=re.escape(word)) as refused:
+        Serving.of(ServeSection.model_validate(section))
+    assert not any(secret in str(refused.value) for secret in SERVE.values() if len(secret) > 5)
+
+
+def test_a_port_that_is_taken_is_said() -> None:
+    with Dashboard(Serving("127.0.0.1", 0)) as first:
+        port = int(first.url.rsplit(":", 1)[1].strip("/"))
+        with pytest.raises(InputError, match=f"port {port} is taken"), Dashboard(Serving("127.0.0.1", port)):
+            pass
+
+
+def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    authority = Authority(tmp_path, "authority")
+    certificate, key = authority.sign("dashboard")
+    monkeypatch.setenv("LIVEBODE_TOKEN", TOKEN)
+    section = ServeSection(
+        address="0.0.0.0", port=0, token_env="LIVEBODE_TOKEN", certificate_file=certificate, key_file=key
+    )
+    with Watched(tmp_path / "run", Serving.of(section)) as watched:
+        watched.go(6000)
+        port = port_of(watched)
+        trust = ssl.create_default_context(cafile=str(authority.file))
+        base = f"https://127.0.0.1:{port}"
+        request = urllib.request.Request(
+            f"{base}/login", json.dumps({"token": TOKEN}).encode(), {"Origin": base, "Content-Type": "application/json"}
+        )
+        with urllib.request.urlopen(request, context=trust) as answer:
+            assert "Secure" in answer.headers["set-cookie"]
+        with pytest.raises((OSError, urllib.error.URLError)):
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
+
+
+def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
+    with chromium() as browser, Tab(browser, watched.url, wait=False) as tab:
+        tab.page.fill("#token", "wrong" * 10)
+        tab.page.keyboard.press("Enter")
+        tab.page.locator("#wrong", has_text="not right").wait_for()
+        tab.page.fill("#token", TOKEN)
+        tab.page.keyboard.press("Enter")
+        tab.until("window.livebode?.bode.curves.measured")
+        assert TOKEN not in tab.page.content()
+        assert TOKEN not in tab.page.url
+        assert tab.page.evaluate("() => document.cookie") == ""
+        assert not any(TOKEN in text for text in tab.wrong)
+        watched.hub.write_event(Event("change", 1, 0.1, "changed", {}))
+    watched.go(6400)
+    assert any("wrong token came" in line for line in watched.told)
+    assert len([line for line in watched.told if "127.0.0.1" in line]) == 1
+    for file in watched.directory.rglob("*"):
+        if file.is_file():
+            assert TOKEN.encode() not in file.read_bytes()
+            assert VIEWER.encode() not in file.read_bytes()
+    assert TOKEN not in repr(Serving("127.0.0.1", 0, token=TOKEN))
+
+
+def test_the_section_of_a_file_is_not_recorded(tmp_path: Path) -> None:
+    (tmp_path / "axis.toml").write_text(
+        '[source]\nlog = "x.csv"\n[signals]\noutput = "y"\n[serve]\ntoken_file = "secret"\nport = 9000\n'
+    )
+    axis = Axis.read(tmp_path / "axis.toml")
+    assert axis.serve.token_file == tmp_path / "secret"
+    assert axis.serve.port == 9000
+    with pytest.raises(InputError, match="did you mean 'token_file'"):
+        Axis.of({"source": {"log": "x"}, "signals": {"output": "y"}, "serve": {"tokenfile": "x"}}, "it")
+
+
+def test_read_only_is_for_everybody() -> None:
+    access = Access(Serving("127.0.0.1", 0, read_only=True), lambda _: None)
+    assert access.role("", "", "::1") == "viewer"
+    access = Access(Serving("127.0.0.1", 0, token=TOKEN, read_only=True), lambda _: None)
+    assert access.role("", f"Bearer {TOKEN}", "::1") == "viewer"
+
+
+def test_the_event_loop_is_quiet() -> None:
+    """Starting and stopping leaves no thread and no loop behind."""
+    import threading
+
+    before = {t.name for t in threading.enumerate()}
+    with Dashboard(Serving("127.0.0.1", 0)):
+        pass
+    until(lambda: {t.name for t in threading.enumerate()} <= before, "the threads to end")
+    with pytest.raises(RuntimeError):
+        asyncio.get_running_loop()
