@@ -17,13 +17,28 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from livebode.dashboard import asked
+from livebode.dashboard import Dashboard, Serving, asked
 from livebode.nouns import InputError
 from tests.dashboards import Watched
 
 CASES = int(os.environ.get("LIVEBODE_DASHBOARD_FUZZ", "4000"))
-_WORDS = ["watch", "freeze", "pause", "plant", "open loop", "kind", "axis", "quantity", "time_s", "null", "NaN", "Infinity",
-          "-1", "1e999", "1e-400", "9" * 400, "0x10", "²", "\0", "\ud800", "é", "true", "[]", "{}", "csv", "mat", " ", ""]  # fmt: skip
+_WORDS = [
+    *(
+        "watch",
+        "freeze",
+        "pause",
+        "plant",
+        "open loop",
+        "kind",
+        "axis",
+        "quantity",
+        "time_s",
+        "null",
+        "NaN",
+        "Infinity",
+    ),
+    *("-1", "1e999", "1e-400", "9" * 400, "0x10", "²", "\0", "\ud800", "é", "true", "[]", "{}", "csv", "mat", " ", ""),
+]
 
 
 @pytest.fixture(scope="module")
@@ -107,26 +122,15 @@ def port_of(watched: Watched) -> int:
 
 def head(rng: random.Random, port: int) -> bytes:
     """A request that is nearly right."""
-    paths = [
-        "/",
-        "/api/past",
-        "/api/moment",
-        "/api/export",
-        "/api/acknowledge",
-        "/live",
-        "/login",
-        "/static/",
-        "/static/x",
-        "*",
-    ]
-    query = "&".join(
-        f"{rng.choice(['axis', 'from', 'to', 'quantity', 'rows', 'format'])}={rng.choice(_WORDS)}" for _ in range(4)
-    )
+    paths = ["/", "/api/past", "/api/moment", "/api/export", "/api/acknowledge", "/live", "/login", "/static/x", "*"]
+    names = ["axis", "from", "to", "quantity", "rows", "format"]
+    query = "&".join(f"{rng.choice(names)}={rng.choice(_WORDS)}" for _ in range(rng.randrange(4)))
+    method, version = rng.choice(["GET", "GET", "POST", "HEAD", "PUT", "X"]), rng.choice(["1.1", "1.1", "1.0", "9", ""])
     lines = [
-        f"{rng.choice(['GET', 'POST', 'HEAD', 'PUT', 'X', ''])} {rng.choice(paths)}?{query} HTTP/{rng.choice(['1.1', '1.0', '9', ''])}",
-        f"Host: {rng.choice([f'127.0.0.1:{port}', f'127.0.0.1:{port}', f'127.0.0.1:{port}', 'evil', '', '[', 'a:b:c'])}",
+        f"{method} {rng.choice(paths)}?{query} HTTP/{version}",
+        f"Host: {rng.choice([f'127.0.0.1:{port}'] * 4 + ['evil', '', '[', 'a:b:c'])}",
         f"Origin: {rng.choice([f'http://127.0.0.1:{port}', 'null', ''])}",
-        f"Content-Length: {rng.choice(['0', '5', '-1', 'x', '99999999999'])}",
+        f"Content-Length: {rng.choice(['0', '0', '5', '-1', 'x', '99999999999'])}",
         f"Content-Type: {rng.choice(['application/json', '', 'x' * 50])}",
         f"Cookie: {rng.choice(['livebode=x', ';;;', '=', 'a' * 300])}",
         f"Authorization: {rng.choice(['Bearer x', 'Bearer', 'Basic eDp4', ''])}",
@@ -135,7 +139,7 @@ def head(rng: random.Random, port: int) -> bytes:
         f"Sec-WebSocket-Version: {rng.choice(['13', '8', ''])}",
         f"Sec-WebSocket-Key: {rng.choice(['dGhlIHNhbXBsZSBub25jZQ==', 'x', ''])}",
     ]
-    chosen = [lines[0], *(line for line in lines[1:] if rng.random() < 0.7)]
+    chosen = [lines[0], *(line for line in lines[1:] if rng.random() < 0.6)]
     data = "\r\n".join(chosen).encode("utf-8", "replace") + b"\r\n\r\n" + rng.randbytes(rng.randrange(40))
     if rng.random() < 0.3:
         at = rng.randrange(len(data))
@@ -173,8 +177,6 @@ def test_messages_leave_the_socket_or_close_it(watched: Watched, capfd: pytest.C
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_a_record_that_cannot_be_read_is_a_sentence(watched: Watched, tmp_path: Path) -> None:
-    from livebode.dashboard import Dashboard, Serving
-
+def test_a_record_that_cannot_be_read_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not the directory of a run"):
         Dashboard(Serving("127.0.0.1", 0)).view(tmp_path)

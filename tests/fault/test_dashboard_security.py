@@ -37,7 +37,7 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
     """With tokens, on the loopback."""
     serving = Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
     with Watched(tmp_path_factory.mktemp("guarded") / "run", serving) as found:
-        found.go(2000)
+        found.go(6000)
         yield found
 
 
@@ -286,7 +286,7 @@ def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
             watched.url.replace("http", "ws") + "live", origin=origin(watched), additional_headers={"Cookie": mine}
         ) as live:
             live.recv()
-            for samples in range(2200, 6001, 200):
+            for samples in range(6200, 10_001, 200):
                 watched.go(samples)
             seen = 0
             until(lambda: bool(live.recv(timeout=20)), "news")
@@ -382,7 +382,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         assert tab.page.evaluate("() => document.cookie") == ""
         assert not any(TOKEN in text for text in tab.wrong)
         watched.hub.write_event(Event("change", 1, 0.1, "changed", {}))
-    watched.go(6400)
+    watched.go(11_000)
     assert any("wrong token came" in line for line in watched.told)
     assert len([line for line in watched.told if "127.0.0.1" in line]) == 1
     for file in watched.directory.rglob("*"):

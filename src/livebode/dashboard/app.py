@@ -166,6 +166,7 @@ class _Pages:
         if self._role(request) is None:
             return None
         state = self._board.states[asked.span(request.query_params, len(self._board.states)).axis]
+        state.refresh()
         if state.quantities is None:
             raise InputError("the run has not begun; wait for its first samples")
         return state
