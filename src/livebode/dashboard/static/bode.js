@@ -30,7 +30,7 @@ export class Bode {
     this.charts = [
       this.panel(0, `|${symbol}| in dB${unit ? ` re 1 ${unit}` : ""}`, { range: () => this.limits(0) }, false),
       this.panel(1, "phase in °", { range: () => this.limits(1) }, false, { splits: degreeTicks }),
-      this.panel(2, "coherence γ²", { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
+      this.panel(2, "coherence", { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
     ];
   }
 

@@ -7,7 +7,7 @@ import { moment } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = [["map", "Map"], ["parameters", "Parameters"], ["margins", "Margins"]];
-const SPANS = [["20", "20 s"], ["120", "2 min"], ["whole", "whole run"]];
+const SPANS = [["20", "20 s"], ["120", "2 min"], ["whole", "whole"]];
 
 export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain }) {
   function tab(name) {
@@ -22,7 +22,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   $("tabs").append(...TABS.map(([value, text]) => element("button", { type: "button", role: "tab", id: `tab-${value}`, "aria-controls": `pane-${value}`, "data-value": value, onclick: () => tab(value) }, text)));
   const option = (id, choices, chosen, act) => segments($(id), choices.map(([value, text]) => ({ value, text })), chosen, (value) => { choose($(id), value); act(value); });
   option("tracking-what", [["magnitude", "dB"], ["phase", "°"]], "magnitude", (value) => { tracking.what = value; tracking.build(); page.dirty.add("rows"); });
-  option("tracking-over", [["time", "over time"], ["position", "over position"]], "time", (value) => { tracking.over = value; tracking.build(); page.dirty.add("rows"); });
+  option("tracking-over", [["time", "time"], ["position", "position"]], "time", (value) => { tracking.over = value; tracking.build(); page.dirty.add("rows"); });
   option("tracking-span", SPANS, page.spanS, (value) => { page.spanS = value; page.rows.clear(); fill(); });
   option("map-what", [["level", "level"], ["change", "change"]], "level", (value) => { map.what = value; map.paint(); });
   tab("map");

@@ -118,6 +118,7 @@ export class Tracking {
     ctx.save();
     ctx.strokeStyle = colour("ink"); ctx.fillStyle = colour("ink"); ctx.lineWidth = 1.5 * devicePixelRatio;
     ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+    ctx.textAlign = "left";
     ctx.font = `${11 * devicePixelRatio}px system-ui`;
     ctx.fillText(moment(this.marked), Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 60 * devicePixelRatio), bbox.top + 12 * devicePixelRatio);
     ctx.restore();

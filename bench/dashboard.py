@@ -1,0 +1,147 @@
+"""The dashboard under load: 101 lines, 30 updates a second, one browser that looks.
+
+    python -m bench.dashboard [--seconds 20] [--lines 101] [--browsers 1]
+
+Publishes made-up responses from a thread as a tracker does, and measures what publishing costs that thread, what
+processor time the server's thread takes, and how many frames a second Chromium paints, without a window and without a
+graphics card: it draws with the processor, on the same cores. It prints what else ran.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.nouns import Block, Lines, Parameters, Responses
+
+RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
+FRAMES_MIN, CPU_MAX = 50.0, 0.10
+_COUNT = "window.frames_ = 0; const tick = () => { window.frames_++; requestAnimationFrame(tick); }; tick();"
+
+
+def responses(lines: Lines, rows: int, seed: int) -> Responses:
+    """Two masses with noise, rows one after the other."""
+    rng, f = np.random.default_rng(seed), lines.frequency_hz
+    s = 2j * np.pi * f
+    plant = (s**2 + 20 * s + 2e5) / (s * (s**2 + 25 * s + 4e5)) * 400
+    shape = rows, len(f)
+    noise = 0.03 * np.abs(plant) * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
+    sample = WINDOW + np.arange(rows)
+    return Responses(
+        lines=lines,
+        value=plant + noise,
+        sigma=np.broadcast_to(0.04 * np.abs(plant), shape).copy(),
+        dof=np.full(rows, 8.0),
+        coherence=rng.uniform(0.9, 1.0, shape),
+        valid=np.ones(shape, dtype=bool),
+        first=sample - WINDOW,
+        sample=sample,
+        time_s=np.zeros(rows),
+        schedule=np.zeros(rows),
+        unit="rad/s/(N m)",
+    )
+
+
+def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]) -> None:
+    """At the pace of `UPDATES_PER_S`; `costs` takes the seconds that each update cost this thread."""
+    n, began = 0, time.perf_counter()
+    names = ("Js", "mL", "Keff", "bs")
+    while not stop.is_set():
+        at, now_s = n % len(made), n / UPDATES_PER_S
+        row = made[at : at + 1]
+        one = Responses(**{**vars(row), "time_s": np.array([now_s]), "schedule": np.array([0.9 + 0.6 * np.sin(now_s)])})
+        fit = Parameters(
+            "two-mass", names, ("kg m²", "kg", "N/m", "N s/m"), np.ones((1, 4)) + 0.01 * np.sin(now_s), 1e-4 * np.eye(4)[None],
+            np.array(["ok"]), np.zeros(1), np.ones(1), np.ones(1), one.sample, one.time_s, one.schedule,
+        )  # fmt: skip
+        block = Block(np.zeros((1, 10)), ("y",), RATE_HZ, start=n * 10)
+        before = time.perf_counter()
+        hub.write(one)
+        hub.write_parameters(fit)
+        hub.drain_events()
+        hub.followed(block)
+        costs.append(time.perf_counter() - before)
+        n += 1
+        stop.wait(max(0.0, began + n / UPDATES_PER_S - time.perf_counter()))
+
+
+def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
+    """Figures of one run."""
+    from playwright.sync_api import sync_playwright
+
+    dashboard, stop, costs = Dashboard(Serving("127.0.0.1", 0)), threading.Event(), list[float]()
+    hub = dashboard.hub("bench")
+    found = {
+        "bins": list(lines.bins), "quiet_bins": [], "window": WINDOW, "rate_hz": RATE_HZ, "quantity": "plant",
+        "unit": "rad/s/(N m)", "schedule": "x in m",
+    }  # fmt: skip
+    loop = {"velocity": {"gain": 0.2, "integral_time_s": 0.2, "rate_hz": RATE_HZ}}
+    with tempfile.TemporaryDirectory() as folder, dashboard, sync_playwright() as playwright:
+        hub.begin(Path(folder), {"found": found, "configuration": {"loop": loop}}, None)
+        worker = threading.Thread(target=publish, args=(hub, responses(lines, 64, 0), stop, costs))
+        worker.start()
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox"] * (os.geteuid() == 0)
+        )
+        pages = [browser.new_page(viewport={"width": 1440, "height": 900}) for _ in range(browsers)]
+        for page in pages:
+            page.goto(dashboard.url)
+            page.wait_for_function("() => window.livebode?.bode.curves.measured")
+            page.evaluate(f"() => {{ {_COUNT} window.draws_ = 0; const b = livebode.bode, d = b.draw.bind(b);"
+                          " b.draw = () => { window.draws_++; d(); }; }")  # fmt: skip
+        time.sleep(2)
+        before = [page.evaluate("() => [performance.now(), window.frames_, window.draws_]") for page in pages]
+        cpu, began, first = dashboard.cpu_s, time.perf_counter(), len(costs)
+        time.sleep(seconds)
+        took, cpu, last = time.perf_counter() - began, dashboard.cpu_s - cpu, len(costs)
+        after = [page.evaluate("() => [performance.now(), window.frames_, window.draws_]") for page in pages]
+        browser.close()
+        stop.set()
+        worker.join()
+    rates = [[(b[i] - a[i]) / (b[0] - a[0]) * 1e3 for a, b in zip(before, after)] for i in (1, 2)]
+    cost = np.array(costs[first:last]) * 1e6
+    return {
+        "frames": min(rates[0]), "draws": min(rates[1]), "cpu": cpu / took, "updates": (last - first) / took,
+        "median_us": float(np.median(cost)), "p99_us": float(np.quantile(cost, 0.99)), "most_us": float(cost.max()),
+    }  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--lines", type=int, default=101)
+    parser.add_argument("--browsers", type=int, default=1)
+    asked = parser.parse_args()
+    lines = Lines(tuple(range(5, 5 + asked.lines)), WINDOW, RATE_HZ)
+    print(
+        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} before; {asked.lines} lines, {asked.browsers} browsers"
+    )
+    got = measured(asked.seconds, lines, asked.browsers)
+    print(f"published               {got['updates']:8.1f} updates/s")
+    print(
+        f"frames of the browser   {got['frames']:8.1f} /s      target ≥ {FRAMES_MIN:.0f}   {_verdict(got['frames'] >= FRAMES_MIN)}"
+    )
+    print(f"Bode plots drawn        {got['draws']:8.1f} /s")
+    print(
+        f"server's thread         {100 * got['cpu']:8.1f} %       target ≤ {100 * CPU_MAX:.0f} % of a core   {_verdict(got['cpu'] <= CPU_MAX)}"
+    )
+    print(
+        f"cost to the tracker     {got['median_us']:8.1f} µs an update, p99 {got['p99_us']:.0f} µs, at most {got['most_us']:.0f} µs"
+    )
+    print(f"load {os.getloadavg()[0]:.1f} behind")
+
+
+def _verdict(met: bool) -> str:
+    return "met" if met else "SHORT"
+
+
+if __name__ == "__main__":
+    main()
