@@ -39,6 +39,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.fits
+	$(BIN)/python -m bench.dashboard
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
 	$(BIN)/python -m studies.peers
@@ -49,9 +50,10 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
-fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources
+fuzz: $(BUILT)   ## long campaigns against the readers and the parsers of live sources and the dashboard
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
+	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py

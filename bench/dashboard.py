@@ -24,6 +24,7 @@ from livebode.nouns import Block, Lines, Parameters, Responses
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
 FRAMES_MIN, CPU_MAX = 50.0, 0.10
+NAMES, UNITS = ("Js", "mL", "Keff", "bs"), ("kg m²", "kg", "N/m", "N s/m")
 _COUNT = "window.frames_ = 0; const tick = () => { window.frames_++; requestAnimationFrame(tick); }; tick();"
 
 
@@ -53,14 +54,14 @@ def responses(lines: Lines, rows: int, seed: int) -> Responses:
 def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]) -> None:
     """At the pace of `UPDATES_PER_S`; `costs` takes the seconds that each update cost this thread."""
     n, began = 0, time.perf_counter()
-    names = ("Js", "mL", "Keff", "bs")
     while not stop.is_set():
         at, now_s = n % len(made), n / UPDATES_PER_S
         row = made[at : at + 1]
         one = Responses(**{**vars(row), "time_s": np.array([now_s]), "schedule": np.array([0.9 + 0.6 * np.sin(now_s)])})
+        value = np.ones((1, 4)) + 0.01 * np.sin(now_s)
         fit = Parameters(
-            "two-mass", names, ("kg m²", "kg", "N/m", "N s/m"), np.ones((1, 4)) + 0.01 * np.sin(now_s), 1e-4 * np.eye(4)[None],
-            np.array(["ok"]), np.zeros(1), np.ones(1), np.ones(1), one.sample, one.time_s, one.schedule,
+            "two-mass", NAMES, UNITS, value, 1e-4 * np.eye(4)[None], np.array(["ok"]), np.zeros(1), np.ones(1),
+            np.ones(1), one.sample, one.time_s, one.schedule,
         )  # fmt: skip
         block = Block(np.zeros((1, 10)), ("y",), RATE_HZ, start=n * 10)
         before = time.perf_counter()
@@ -121,26 +122,17 @@ def main() -> None:
     parser.add_argument("--browsers", type=int, default=1)
     asked = parser.parse_args()
     lines = Lines(tuple(range(5, 5 + asked.lines)), WINDOW, RATE_HZ)
-    print(
-        f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} before; {asked.lines} lines, {asked.browsers} browsers"
-    )
+    load, met = os.getloadavg()[0], {True: "met", False: "SHORT"}
+    print(f"{os.cpu_count()} cores, load {load:.1f} before; {asked.lines} lines, browsers: {asked.browsers}")
     got = measured(asked.seconds, lines, asked.browsers)
-    print(f"published               {got['updates']:8.1f} updates/s")
-    print(
-        f"frames of the browser   {got['frames']:8.1f} /s      target ≥ {FRAMES_MIN:.0f}   {_verdict(got['frames'] >= FRAMES_MIN)}"
-    )
-    print(f"Bode plots drawn        {got['draws']:8.1f} /s")
-    print(
-        f"server's thread         {100 * got['cpu']:8.1f} %       target ≤ {100 * CPU_MAX:.0f} % of a core   {_verdict(got['cpu'] <= CPU_MAX)}"
-    )
-    print(
-        f"cost to the tracker     {got['median_us']:8.1f} µs an update, p99 {got['p99_us']:.0f} µs, at most {got['most_us']:.0f} µs"
-    )
+    frames, cpu = got["frames"], got["cpu"]
+    print(f"published              {got['updates']:7.1f} updates/s")
+    print(f"frames of the browser  {frames:7.1f} /s, target ≥ {FRAMES_MIN:.0f}: {met[frames >= FRAMES_MIN]}")
+    print(f"Bode plots drawn       {got['draws']:7.1f} /s")
+    print(f"server's thread        {100 * cpu:7.1f} % of a core, target ≤ {100 * CPU_MAX:.0f} %: {met[cpu <= CPU_MAX]}")
+    cost, p99, most = (got[name] for name in ("median_us", "p99_us", "most_us"))
+    print(f"cost to the tracker    {cost:7.1f} µs an update, p99 {p99:.0f} µs, at most {most:.0f} µs")
     print(f"load {os.getloadavg()[0]:.1f} behind")
-
-
-def _verdict(met: bool) -> str:
-    return "met" if met else "SHORT"
 
 
 if __name__ == "__main__":

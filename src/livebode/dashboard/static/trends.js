@@ -57,7 +57,7 @@ export class Trends {
   draw(atS = NaN) {
     if (this.host.hidden) return;
     for (const item of this.items.values()) {
-      if (item.s.every((s) => s === 0)) continue; // it is held at a value
+      if (item.s.every((s) => s === 0 || Number.isNaN(s)) && item.s.some((s) => s === 0)) continue; // it is held at a value
       if (!item.made) this.build(item);
       const at = nearest(item, atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);

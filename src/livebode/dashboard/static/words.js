@@ -3,7 +3,7 @@ export function plain(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const text = Math.abs(value) >= 1e6 || (value !== 0 && Math.abs(value) < 1e-3)
-    ? value.toExponential(digits - 1).replace("e+", "e")
+    ? Number(value.toPrecision(digits)).toExponential().replace("e+", "e")
     : Number(value.toPrecision(digits)).toString();
   return text.replace("-", "−");
 }
