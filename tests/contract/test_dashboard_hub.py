@@ -200,6 +200,20 @@ def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Pat
     assert len(next(Past.of(state).all_between(-10, 10))) > 50
 
 
+def test_an_axis_that_begins_anew_has_other_lines(tmp_path: Path) -> None:
+    hub = Hub("axis")
+    state = State("axis", 0, hub)
+    for lines in (LINES, Lines((2, 5), 60, 1000.0)):
+        found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
+        hub.begin(tmp_path, {"found": found | {"quantity": "plant", "unit": ""}, "configuration": {}}, None)
+        hub.write(made(30, lines, hole=0.0, unit=""))
+        state.refresh()
+        assert state.facts()["frequency_hz"] == lines.frequency_hz.tolist()
+        assert decoded(state.newest_frames("plant"))[0]["magnitude"].shape == (1, len(lines))  # type: ignore[attr-defined]
+        hub.write(made(1, lines, hole=0.0, unit=""))  # that nobody takes before it begins anew
+    assert state.runs == 2
+
+
 def test_a_span_reads_only_its_segments(tmp_path: Path) -> None:
     with Watched(tmp_path / "run") as watched:
         watched.go(12_000)

@@ -103,13 +103,12 @@ class Client:
             state = self._state
             if self._anew:
                 self._anew = False
-                self._sent = {"notices": 0, "trends": -1, "rows": state.recent.count, "finished": state.finished}
+                self._sent = {"notices": 0, "trends": state.trends.version, "rows": state.recent.count}
+                self._sent |= {"runs": state.runs, "finished": state.finished}
                 facts = state.facts() | {"role": self._role, "watched": state.shown(self._watched.quantity)}
                 trends = state.trends.plain(whole=True)
                 await self._tell({"facts": facts, "axes": self._board.names, "span": state.span(), "trends": trends})
-                self._sent["trends"] = state.trends.version
-                self._sent["begun"] = state.quantities is not None
-            elif (not self._sent["begun"] and state.quantities is not None) or self._sent["finished"] != state.finished:
+            elif (self._sent["runs"], self._sent["finished"]) != (state.runs, state.finished):
                 self._anew = True
                 continue
             await self._update(state)

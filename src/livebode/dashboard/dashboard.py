@@ -139,12 +139,17 @@ class Dashboard:
         board = Board(self._states, self._viewed, Access(self._serving, self._tell))
         self._application = application(board, self._serving)
         beating = asyncio.create_task(board.run())
+        beating.add_done_callback(self._stopped)
         assert self._socket is not None
         try:
             await self._server.serve(sockets=[self._socket])
         finally:
             beating.cancel()
             board.close()
+
+    def _stopped(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._tell(f"the dashboard stands still by a fault of its own, the run goes on: {error!r}")
 
     async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
         await self._application(scope, receive, send)

@@ -44,7 +44,9 @@ class Hub(Audience):
         self._sayings: list[Event] = []
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
-        self.directory, self.health = directory, health
+        with self._lock:  # what waits is of a run before, whose lines may be others
+            self._rows, self._values = deque(), 0
+        self.directory, self.health, self.ended = directory, health, None
         self.begun = summary
 
     def write(self, responses: Responses) -> None:

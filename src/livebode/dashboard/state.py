@@ -42,20 +42,25 @@ class State:
         self.name, self.axis, self.hub = name, axis, hub
         self.directory: Path | None = None
         self.quantities: Quantities | None = None
-        self.version = 0
+        self.version = self.runs = 0
+        self._begun: Mapping[str, Any] | None = None
+        self._empty()
+        self._summary: Mapping[str, Any] = {}
+        self._fitted: Fitted | None = None
+        self._healthy: Healthy | None = None
+        self._remark = ""
+        self._grew = float("-inf")
+        self._made: dict[tuple[str, Quantity, float], bytes] = {}
+
+    def _empty(self) -> None:
         self.newest: Responses | None = None
         self.recent, self.overview = Recent(), Overview()
         self.trends, self.notices = Trends(), Notices()
         self.first_s = self.last_s = float("nan")
         self.finished = False
-        self._summary: Mapping[str, Any] = {}
-        self._fitted: Fitted | None = None
-        self._healthy: Healthy | None = None
-        self._remark = ""
-        self._seen, self._grew = 0, float("-inf")
+        self._seen = 0
         self._pace: deque[tuple[float, int]] = deque(maxlen=128)
         self.sent: deque[Responses] = deque(maxlen=_SENT)
-        self._made: dict[tuple[str, Quantity, float], bytes] = {}
 
     @property
     def live(self) -> bool:
@@ -77,7 +82,8 @@ class State:
         return not self.live or "record" in self._summary
 
     def begin(self, directory: Path, summary: Mapping[str, Any]) -> None:
-        """Where it is recorded, and run.json."""
+        """Where it is recorded, and run.json; `runs` counts how often an axis began."""
+        self.runs += 1
         self.directory, self._summary = directory, json.loads(to_json(dict(summary)))  # as it is read back
         self.quantities = Quantities.of(self._summary)
         self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
@@ -87,7 +93,9 @@ class State:
         hub = self.hub
         if hub is None:
             return
-        if self.quantities is None and hub.begun is not None and hub.directory is not None:
+        if hub.begun is not self._begun and hub.begun is not None and hub.directory is not None:
+            self._begun = hub.begun
+            self._empty()
             self.begin(hub.directory, hub.begun)
             self._before()
         ended = hub.ended

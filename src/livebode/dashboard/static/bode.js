@@ -21,7 +21,9 @@ export class Bode {
     this.curves = {};
     this.lines = facts.frequency_hz;
     this.grid = facts.grid_hz;
-    this.at = this.lines.map((f) => this.grid.reduce((best, g, i) => (Math.abs(g - f) < Math.abs(this.grid[best] - f) ? i : best), 0));
+    this.at = this.lines.map((f) =>
+      this.grid.reduce((best, g, i) => (Math.abs(g - f) < Math.abs(this.grid[best] - f) ? i : best), 0),
+    );
     this.line = Math.min(this.line, this.lines.length - 1);
     this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
     const pad = (this.grid.at(-1) / this.grid[0]) ** 0.03 || 1.1;
@@ -37,44 +39,81 @@ export class Bode {
   panel(index, label, y, last, more = {}) {
     const lines = () => this.lines;
     const few = this.lines.length <= FEW_LINES;
-    const series = [{ label: "frequency" }], bands = [];
+    const series = [{ label: "frequency" }],
+      bands = [];
     for (const name of NAMES) {
       const show = this.shown.has(name);
       const first = series.length;
-      const points = { show: name === "measured" && few, size: 7, fill: () => colour("measured"), stroke: () => colour("measured") };
-      series.push({ label: name, show, stroke: () => colour(name), width: name === "measured" ? 2 : 1.6, dash: DASHES[name], points });
+      const points = {
+        show: name === "measured" && few,
+        size: 7,
+        fill: () => colour("measured"),
+        stroke: () => colour("measured"),
+      };
+      series.push({
+        label: name,
+        show,
+        stroke: () => colour(name),
+        width: name === "measured" ? 2 : 1.6,
+        dash: DASHES[name],
+        points,
+      });
       if (index === 2 || name === "model") continue;
-      for (const edge of ["high", "low"]) series.push({ label: `${name} ${edge}`, show, stroke: () => "transparent", width: 0, points: { show: false } });
+      for (const edge of ["high", "low"])
+        series.push({ label: `${name} ${edge}`, show, stroke: () => "transparent", width: 0, points: { show: false } });
       bands.push({ series: [first + 1, first + 2], fill: () => `${colour(name)}${name === "measured" ? "38" : "24"}` });
     }
-    return chart(this.hosts[index], {
-      scales: { x: { distr: 3, time: false, range: () => this.sight }, y },
-      axes: [frequencyAxis(lines, last ? "frequency in Hz" : ""), axis(label, { size: 44, values: (_u, s) => s.map((v) => String(v).replace("-", "−")), ...more })],
-      series, bands,
-      cursor: {
-        sync: { key: "bode" }, points: { show: false }, drag: { x: true, y: false, setScale: false }, y: false,
-        bind: { dblclick: () => () => { this.zoom(this.whole); return null; } },
+    return chart(
+      this.hosts[index],
+      {
+        scales: { x: { distr: 3, time: false, range: () => this.sight }, y },
+        axes: [
+          frequencyAxis(lines, last ? "frequency in Hz" : ""),
+          axis(label, { size: 44, values: (_u, s) => s.map((v) => String(v).replace("-", "−")), ...more }),
+        ],
+        series,
+        bands,
+        cursor: {
+          sync: { key: "bode" },
+          points: { show: false },
+          drag: { x: true, y: false, setScale: false },
+          y: false,
+          bind: {
+            dblclick: () => () => {
+              this.zoom(this.whole);
+              return null;
+            },
+          },
+        },
+        hooks: { setCursor: [(u) => this.follow(u)], setSelect: [(u) => this.select(u)], draw: [(u) => this.mark(u)] },
       },
-      hooks: { setCursor: [(u) => this.follow(u)], setSelect: [(u) => this.select(u)], draw: [(u) => this.mark(u)] },
-    }, this.data(index));
+      this.data(index),
+    );
   }
 
   data(index) {
-    const key = ["db", "deg", "coherence"][index], found = [this.grid];
-    const nothing = this.nothing ||= new Array(1).fill(null);
-    const empty = nothing.length === this.grid.length ? nothing : (this.nothing = new Array(this.grid.length).fill(null));
+    const key = ["db", "deg", "coherence"][index],
+      found = [this.grid];
+    const nothing = (this.nothing ||= new Array(1).fill(null));
+    const empty =
+      nothing.length === this.grid.length ? nothing : (this.nothing = new Array(this.grid.length).fill(null));
     for (const name of NAMES) {
-      const curve = this.curves[name], by = index === 1 ? curve?.turns || 0 : 0;
+      const curve = this.curves[name],
+        by = index === 1 ? curve?.turns || 0 : 0;
       found.push(curve ? moved(curve[key], by) : empty);
-      if (index < 2 && name !== "model") for (const edge of ["High", "Low"]) found.push(curve ? moved(curve[key + edge], by) : empty);
+      if (index < 2 && name !== "model")
+        for (const edge of ["High", "Low"]) found.push(curve ? moved(curve[key + edge], by) : empty);
     }
     return found;
   }
 
   limits(index) {
-    const key = ["db", "deg"][index], drawn = NAMES.filter((n) => this.shown.has(n) && this.curves[n]);
+    const key = ["db", "deg"][index],
+      drawn = NAMES.filter((n) => this.shown.has(n) && this.curves[n]);
     const firm = drawn.map((n) => moved(this.curves[n][key], index ? this.curves[n].turns : 0));
-    const edges = drawn.filter((n) => n !== "model").flatMap((n) => ["High", "Low"].map((e) => moved(this.curves[n][key + e], index ? this.curves[n].turns : 0)));
+    const edges = drawn
+      .filter((n) => n !== "model")
+      .flatMap((n) => ["High", "Low"].map((e) => moved(this.curves[n][key + e], index ? this.curves[n].turns : 0)));
     return this.ranges[index](...extent(firm, edges, index ? 10 : 3));
   }
 
@@ -84,7 +123,9 @@ export class Bode {
     this.curves[name] = overGrid(frame, this.grid, this.at);
   }
 
-  drop(name) { delete this.curves[name]; }
+  drop(name) {
+    delete this.curves[name];
+  }
 
   draw() {
     const measured = this.curves.measured;
@@ -97,9 +138,12 @@ export class Bode {
   }
 
   toggle(name, show) {
-    if (show) this.shown.add(name); else this.shown.delete(name);
+    if (show) this.shown.add(name);
+    else this.shown.delete(name);
     this.charts.forEach((made, index) => {
-      made.series.forEach((s, i) => { if (i && s.label.split(" ")[0] === name && s.show !== show) made.setSeries(i, { show }); });
+      made.series.forEach((s, i) => {
+        if (i && s.label.split(" ")[0] === name && s.show !== show) made.setSeries(i, { show });
+      });
     });
     this.draw();
   }
@@ -119,7 +163,10 @@ export class Bode {
     const { left } = u.cursor;
     if (left === undefined || left < 0 || this.placing) return;
     const f = u.posToVal(left, "x");
-    this.line = this.lines.reduce((best, g, i) => (Math.abs(Math.log(g / f)) < Math.abs(Math.log(this.lines[best] / f)) ? i : best), 0);
+    this.line = this.lines.reduce(
+      (best, g, i) => (Math.abs(Math.log(g / f)) < Math.abs(Math.log(this.lines[best] / f)) ? i : best),
+      0,
+    );
     this.tell();
     this.ring();
   }
@@ -131,34 +178,51 @@ export class Bode {
     this.ring();
   }
 
-  ring() { for (const made of this.charts) made.redraw(false, false); }
+  ring() {
+    for (const made of this.charts) made.redraw(false, false);
+  }
 
   // A ring around each curve's value at the line under the cursor.
   mark(u) {
-    const index = this.charts.indexOf(u), at = this.at[this.line], f = this.lines[this.line];
+    const index = this.charts.indexOf(u),
+      at = this.at[this.line],
+      f = this.lines[this.line];
     if (index < 0 || f < this.sight[0] || f > this.sight[1]) return;
-    const x = u.valToPos(f, "x", true), ctx = u.ctx;
+    const x = u.valToPos(f, "x", true),
+      ctx = u.ctx;
     ctx.save();
     ctx.strokeStyle = colour("muted");
     ctx.setLineDash([3, 4]);
-    ctx.beginPath(); ctx.moveTo(x, u.bbox.top); ctx.lineTo(x, u.bbox.top + u.bbox.height); ctx.stroke();
+    ctx.beginPath();
+    ctx.moveTo(x, u.bbox.top);
+    ctx.lineTo(x, u.bbox.top + u.bbox.height);
+    ctx.stroke();
     ctx.setLineDash([]);
     ctx.lineWidth = 2 * devicePixelRatio;
     const value = u.data[1][at];
     if (Number.isFinite(value) && this.shown.has("measured")) {
       ctx.strokeStyle = colour("ink");
-      ctx.beginPath(); ctx.arc(x, u.valToPos(value, "y", true), 6.5 * devicePixelRatio, 0, 7); ctx.stroke();
+      ctx.beginPath();
+      ctx.arc(x, u.valToPos(value, "y", true), 6.5 * devicePixelRatio, 0, 7);
+      ctx.stroke();
     }
     ctx.restore();
   }
 
   tell() {
-    const at = this.at[this.line], found = {};
+    const at = this.at[this.line],
+      found = {};
     for (const name of NAMES) {
       const curve = this.curves[name];
       if (!curve || !this.shown.has(name)) continue;
       const i = curve.frame.columns === this.grid.length && name === "model" ? at : this.line;
-      found[name] = { db: curve.frame.magnitude[i], deg: curve.frame.phase[i] + (curve.turns || 0), reach: curve.frame.reach[i], coherence: curve.frame.coherence[i], frame: curve.frame };
+      found[name] = {
+        db: curve.frame.magnitude[i],
+        deg: curve.frame.phase[i] + (curve.turns || 0),
+        reach: curve.frame.reach[i],
+        coherence: curve.frame.coherence[i],
+        frame: curve.frame,
+      };
     }
     this.onCursor(this.lines[this.line], found);
   }

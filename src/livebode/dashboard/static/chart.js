@@ -5,13 +5,23 @@ import { hertz } from "./words.js";
 
 const FONT = '12px system-ui, "DejaVu Sans", sans-serif';
 const charts = new Set();
-onTheme(() => { for (const chart of charts) chart.redraw(false, true); });
+onTheme(() => {
+  for (const chart of charts) chart.redraw(false, true);
+});
 
 export function axis(label, more = {}) {
   return {
-    label, labelFont: FONT, font: FONT, labelSize: label ? 18 : 0, labelGap: 2, gap: 4, size: 46,
-    stroke: () => colour("muted"), grid: { stroke: () => colour("grid"), width: 1 },
-    ticks: { stroke: () => colour("edge"), width: 1, size: 4 }, ...more,
+    label,
+    labelFont: FONT,
+    font: FONT,
+    labelSize: label ? 18 : 0,
+    labelGap: 2,
+    gap: 4,
+    size: 46,
+    stroke: () => colour("muted"),
+    grid: { stroke: () => colour("grid"), width: 1 },
+    ticks: { stroke: () => colour("edge"), width: 1, size: 4 },
+    ...more,
   };
 }
 
@@ -23,44 +33,61 @@ export function frequencyTicks(lines) {
     const apart = inside.every((f, i) => i === 0 || Math.log(f / inside[i - 1]) / Math.log(high / low) > 1 / room);
     if (inside.length && inside.length <= Math.min(12, room) && apart) return inside;
     const found = [];
-    const mantissas = high / low < 3 ? [1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8, 9] : high / low < 30 ? [1, 2, 3, 5, 7] : [1, 2, 5];
+    const mantissas =
+      high / low < 3 ? [1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8, 9] : high / low < 30 ? [1, 2, 3, 5, 7] : [1, 2, 5];
     for (let d = Math.floor(Math.log10(low)); d <= Math.ceil(Math.log10(high)); d++)
-      for (const m of mantissas) { const f = m * 10 ** d; if (f >= low && f <= high) found.push(f); }
+      for (const m of mantissas) {
+        const f = m * 10 ** d;
+        if (f >= low && f <= high) found.push(f);
+      }
     return found;
   };
 }
 
-export const frequencyAxis = (lines, label) => axis(label, {
-  size: label ? 26 : 8, labelSize: label ? 18 : 0, splits: frequencyTicks(lines), filter: (_u, splits) => splits,
-  values: (_u, splits) => splits.map((f) => (label ? hertz(f) : "")),
-});
+export const frequencyAxis = (lines, label) =>
+  axis(label, {
+    size: label ? 26 : 8,
+    labelSize: label ? 18 : 0,
+    splits: frequencyTicks(lines),
+    filter: (_u, splits) => splits,
+    values: (_u, splits) => splits.map((f) => (label ? hertz(f) : "")),
+  });
 
 // A range that grows at once and shrinks only after a while, so that the eye can rest.
 export function steady({ step, least, holdMs = 4000 }) {
-  let kept = null, since = 0;
+  let kept = null,
+    since = 0;
   const round = (low, high) => {
-    const middle = (low + high) / 2, half = Math.max((high - low) * 0.54, least / 2);
+    const middle = (low + high) / 2,
+      half = Math.max((high - low) * 0.54, least / 2);
     const s = half > 12 * step ? 2 * step : step;
     return [Math.floor((middle - half) / s) * s, Math.ceil((middle + half) / s) * s];
   };
   const range = (low, high) => {
     if (!(high >= low)) return kept || [-least / 2, least / 2];
-    const wanted = round(low, high), now = performance.now();
+    const wanted = round(low, high),
+      now = performance.now();
     if (!kept || low < kept[0] || high > kept[1]) {
       kept = kept ? [Math.min(kept[0], wanted[0]), Math.max(kept[1], wanted[1])] : wanted;
       if (kept[1] - kept[0] > 1.7 * (wanted[1] - wanted[0])) kept = wanted;
       since = now;
     } else if (wanted[1] - wanted[0] > 0.7 * (kept[1] - kept[0])) since = now;
-    else if (now - since > holdMs) { kept = wanted; since = now; }
+    else if (now - since > holdMs) {
+      kept = wanted;
+      since = now;
+    }
     return kept;
   };
-  range.forget = () => { kept = null; };
+  range.forget = () => {
+    kept = null;
+  };
   return range;
 }
 
 // Round multiples for degrees.
 export function degreeTicks(_u, _axis, low, high, space) {
-  const step = [5, 10, 15, 30, 45, 90, 180, 360].find((s) => ((high - low) / s) * 26 < _u.bbox.height / devicePixelRatio) || 720;
+  const step =
+    [5, 10, 15, 30, 45, 90, 180, 360].find((s) => ((high - low) / s) * 26 < _u.bbox.height / devicePixelRatio) || 720;
   const found = [];
   for (let d = Math.ceil(low / step) * step; d <= high + 1e-9; d += step) found.push(d);
   return found;
@@ -69,11 +96,19 @@ export function degreeTicks(_u, _axis, low, high, space) {
 // A chart in a host element that follows its size.
 export function chart(host, options, data) {
   const size = () => ({ width: Math.max(60, host.clientWidth), height: Math.max(40, host.clientHeight) });
-  const made = new uPlot({ ...size(), legend: { show: false }, padding: [8, 10, 2, 0], pxAlign: 1, ...options }, data, host);
+  const made = new uPlot(
+    { ...size(), legend: { show: false }, padding: [8, 10, 2, 0], pxAlign: 1, ...options },
+    data,
+    host,
+  );
   const watching = new ResizeObserver(() => made.setSize(size()));
   watching.observe(host);
   charts.add(made);
   const destroy = made.destroy.bind(made);
-  made.destroy = () => { charts.delete(made); watching.disconnect(); destroy(); };
+  made.destroy = () => {
+    charts.delete(made);
+    watching.disconnect();
+    destroy();
+  };
   return made;
 }

@@ -6,25 +6,100 @@ import { nextTheme } from "./theme.js";
 import { moment } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
-const TABS = [["map", "Map"], ["parameters", "Parameters"], ["margins", "Margins"]];
-const SPANS = [["20", "20 s"], ["120", "2 min"], ["whole", "whole"]];
+const TABS = [
+  ["map", "Map"],
+  ["parameters", "Parameters"],
+  ["margins", "Margins"],
+];
+const SPANS = [
+  ["20", "20 s"],
+  ["120", "2 min"],
+  ["whole", "whole"],
+];
 
 export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain }) {
   function tab(name) {
     page.tab = name;
     for (const [value] of TABS) $(`pane-${value}`).hidden = value !== name;
-    for (const button of $("tabs").children) { const on = button.dataset.value === name; button.setAttribute("aria-selected", String(on)); button.tabIndex = on ? 0 : -1; }
+    for (const button of $("tabs").children) {
+      const on = button.dataset.value === name;
+      button.setAttribute("aria-selected", String(on));
+      button.tabIndex = on ? 0 : -1;
+    }
     $("map-what").hidden = name !== "map";
     page.dirty.add("trends").add("rows");
     page.last.map = -1e9;
   }
 
-  $("tabs").append(...TABS.map(([value, text]) => element("button", { type: "button", role: "tab", id: `tab-${value}`, "aria-controls": `pane-${value}`, "data-value": value, onclick: () => tab(value) }, text)));
-  const option = (id, choices, chosen, act) => segments($(id), choices.map(([value, text]) => ({ value, text })), chosen, (value) => { choose($(id), value); act(value); });
-  option("tracking-what", [["magnitude", "dB"], ["phase", "°"]], "magnitude", (value) => { tracking.what = value; tracking.build(); page.dirty.add("rows"); });
-  option("tracking-over", [["time", "time"], ["position", "position"]], "time", (value) => { tracking.over = value; tracking.build(); page.dirty.add("rows"); });
-  option("tracking-span", SPANS, page.spanS, (value) => { page.spanS = value; page.rows.clear(); fill(); });
-  option("map-what", [["level", "level"], ["change", "change"]], "level", (value) => { map.what = value; map.paint(); });
+  $("tabs").append(
+    ...TABS.map(([value, text]) =>
+      element(
+        "button",
+        {
+          type: "button",
+          role: "tab",
+          id: `tab-${value}`,
+          "aria-controls": `pane-${value}`,
+          "data-value": value,
+          onclick: () => tab(value),
+        },
+        text,
+      ),
+    ),
+  );
+  const option = (id, choices, chosen, act) =>
+    segments(
+      $(id),
+      choices.map(([value, text]) => ({ value, text })),
+      chosen,
+      (value) => {
+        choose($(id), value);
+        act(value);
+      },
+    );
+  option(
+    "tracking-what",
+    [
+      ["magnitude", "dB"],
+      ["phase", "°"],
+    ],
+    "magnitude",
+    (value) => {
+      tracking.what = value;
+      tracking.build();
+      page.dirty.add("rows");
+    },
+  );
+  option(
+    "tracking-over",
+    [
+      ["time", "time"],
+      ["position", "position"],
+    ],
+    "time",
+    (value) => {
+      tracking.over = value;
+      tracking.build();
+      page.dirty.add("rows");
+    },
+  );
+  option("tracking-span", SPANS, page.spanS, (value) => {
+    page.spanS = value;
+    page.rows.clear();
+    fill();
+  });
+  option(
+    "map-what",
+    [
+      ["level", "level"],
+      ["change", "change"],
+    ],
+    "level",
+    (value) => {
+      map.what = value;
+      map.paint();
+    },
+  );
   tab("map");
 
   const stem = () => `${page.facts.name}-${page.quantity.replace(" ", "-")}`;
@@ -33,28 +108,75 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     const [from, to] = whole ? [tracking.fromS, tracking.toS] : [at, at];
     return { axis: page.axis, quantity: page.quantity, format, from, to };
   };
-  const get = (format, whole) => numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) => complain(error.message));
+  const get = (format, whole) =>
+    numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) =>
+      complain(error.message),
+    );
   const menu = new Menu($("download"), $("download-menu"), [
-    ["Bode plot as PNG", () => picture(`${stem()}.png`, `${page.facts.name}: ${page.quantity}`, `at ${moment(bode.curves.measured?.frame.timeS[0])}, bands are ±3σ`, bode.charts)],
-    ["this response as CSV", () => get("csv", false)], ["this response as .mat", () => get("mat", false)],
-    ["every response in the tracking's span as CSV", () => get("csv", true)], ["every response in the tracking's span as .mat", () => get("mat", true)],
+    [
+      "Bode plot as PNG",
+      () =>
+        picture(
+          `${stem()}.png`,
+          `${page.facts.name}: ${page.quantity}`,
+          `at ${moment(bode.curves.measured?.frame.timeS[0])}, bands are ±3σ`,
+          bode.charts,
+        ),
+    ],
+    ["this response as CSV", () => get("csv", false)],
+    ["this response as .mat", () => get("mat", false)],
+    ["every response in the tracking's span as CSV", () => get("csv", true)],
+    ["every response in the tracking's span as .mat", () => get("mat", true)],
   ]);
-  $("axis").addEventListener("change", () => { page.axis = Number($("axis").value); page.quantity = null; if (page.frozen) freeze(); timeline.atS = null; say(); });
+  $("axis").addEventListener("change", () => {
+    page.axis = Number($("axis").value);
+    page.quantity = null;
+    if (page.frozen) freeze();
+    timeline.atS = null;
+    say();
+  });
   $("freeze").addEventListener("click", freeze);
   $("theme").addEventListener("click", nextTheme);
   $("help").addEventListener("click", () => $("keys").showModal());
-  const nth = (i) => () => { const q = page.facts?.quantities[i]; if (q) watch(q.name, q.why_not); };
-  keys($("keys"), $("keys-list"), [
-    [["?"], "this help", () => $("keys").showModal()],
-    [[" "], "pause, and go on", () => timeline.toggle()],
-    [["←", "→"], "the line under the cursor", null],
-    [[",", "."], "a tenth of a second back and forth in the record", null],
-    [["1", "2", "3", "4"], "plant, open loop, closed loop, sensitivity", null],
-    [["F"], "freeze this curve as a reference, and let it go", freeze],
-    [["M", "P", "G"], "map, parameters, margins", null],
-    [["A"], "alarms only, and to the events", () => { $("alarms-only").click(); $("events").focus(); }],
-    [["D"], "download", () => menu.show(true)],
-    [["0"], "the whole band of frequencies", () => bode.zoom(bode.whole)],
-    [["T"], "light or dark", nextTheme],
-  ], { "←": () => bode.step(-1), "→": () => bode.step(1), ",": () => timeline.step(-0.1), ".": () => timeline.step(0.1), 1: nth(0), 2: nth(1), 3: nth(2), 4: nth(3), M: () => tab("map"), P: () => tab("parameters"), G: () => tab("margins") });
+  const nth = (i) => () => {
+    const q = page.facts?.quantities[i];
+    if (q) watch(q.name, q.why_not);
+  };
+  keys(
+    $("keys"),
+    $("keys-list"),
+    [
+      [["?"], "this help", () => $("keys").showModal()],
+      [[" "], "pause, and go on", () => timeline.toggle()],
+      [["←", "→"], "the line under the cursor", null],
+      [[",", "."], "a tenth of a second back and forth in the record", null],
+      [["1", "2", "3", "4"], "plant, open loop, closed loop, sensitivity", null],
+      [["F"], "freeze this curve as a reference, and let it go", freeze],
+      [["M", "P", "G"], "map, parameters, margins", null],
+      [
+        ["A"],
+        "alarms only, and to the events",
+        () => {
+          $("alarms-only").click();
+          $("events").focus();
+        },
+      ],
+      [["D"], "download", () => menu.show(true)],
+      [["0"], "the whole band of frequencies", () => bode.zoom(bode.whole)],
+      [["T"], "light or dark", nextTheme],
+    ],
+    {
+      "←": () => bode.step(-1),
+      "→": () => bode.step(1),
+      ",": () => timeline.step(-0.1),
+      ".": () => timeline.step(0.1),
+      1: nth(0),
+      2: nth(1),
+      3: nth(2),
+      4: nth(3),
+      M: () => tab("map"),
+      P: () => tab("parameters"),
+      G: () => tab("margins"),
+    },
+  );
 }

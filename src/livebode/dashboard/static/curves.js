@@ -17,9 +17,14 @@ export function overGrid(frame, grid, at) {
   };
   const { magnitude, phase, reach, coherence } = frame;
   return {
-    db: spread((i) => magnitude[i]), dbHigh: spread((i) => highDb(magnitude[i], reach[i])), dbLow: spread((i) => lowDb(magnitude[i], reach[i])),
-    deg: spread((i) => phase[i]), degHigh: spread((i) => phase[i] + halfDeg(reach[i])), degLow: spread((i) => phase[i] - halfDeg(reach[i])),
-    coherence: spread((i) => coherence[i]), frame,
+    db: spread((i) => magnitude[i]),
+    dbHigh: spread((i) => highDb(magnitude[i], reach[i])),
+    dbLow: spread((i) => lowDb(magnitude[i], reach[i])),
+    deg: spread((i) => phase[i]),
+    degHigh: spread((i) => phase[i] + halfDeg(reach[i])),
+    degLow: spread((i) => phase[i] - halfDeg(reach[i])),
+    coherence: spread((i) => coherence[i]),
+    frame,
   };
 }
 
@@ -27,7 +32,8 @@ export function overGrid(frame, grid, at) {
 export function turns(curve, beside) {
   const away = [];
   for (let i = 0; i < curve.deg.length; i++) {
-    const a = curve.deg[i], b = beside.deg[i];
+    const a = curve.deg[i],
+      b = beside.deg[i];
     if (Number.isFinite(a) && Number.isFinite(b)) away.push((b - a) / 360);
   }
   away.sort((x, y) => x - y);
@@ -38,9 +44,22 @@ export const moved = (values, by) => (by === 0 ? values : values.map((v) => (Num
 
 // Lowest and highest of what is drawn, and of its bounds as far as they do not squeeze the rest to a stripe.
 export function extent(curves, edges, room) {
-  let low = Infinity, high = -Infinity;
-  for (const curve of curves) for (const v of curve) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
-  const reach = Math.max(0.35 * (high - low), room), least = low - reach, most = high + reach;
-  for (const edge of edges) for (const v of edge) if (Number.isFinite(v)) { low = Math.min(low, Math.max(v, least)); high = Math.max(high, Math.min(v, most)); }
+  let low = Infinity,
+    high = -Infinity;
+  for (const curve of curves)
+    for (const v of curve)
+      if (Number.isFinite(v)) {
+        low = Math.min(low, v);
+        high = Math.max(high, v);
+      }
+  const reach = Math.max(0.35 * (high - low), room),
+    least = low - reach,
+    most = high + reach;
+  for (const edge of edges)
+    for (const v of edge)
+      if (Number.isFinite(v)) {
+        low = Math.min(low, Math.max(v, least));
+        high = Math.max(high, Math.min(v, most));
+      }
   return [low, high];
 }

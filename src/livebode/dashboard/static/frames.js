@@ -8,14 +8,30 @@ export function* framesOf(buffer) {
   let at = 0;
   while (at + 16 <= buffer.byteLength) {
     if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1) throw new Error("this is no frame of curves");
-    const rows = view.getUint32(at + 8, true), columns = view.getUint32(at + 12, true), cells = rows * columns;
+    const rows = view.getUint32(at + 8, true),
+      columns = view.getUint32(at + 12, true),
+      cells = rows * columns;
     let next = at + 16;
-    const doubles = () => { const a = new Float64Array(buffer, next, rows); next += 8 * rows; return a; };
-    const frame = {
-      kind: KINDS[view.getUint8(at + 5)], quantity: QUANTITIES[view.getUint8(at + 6)], axis: view.getUint8(at + 7),
-      rows, columns, timeS: doubles(), schedule: doubles(), dof: doubles(),
+    const doubles = () => {
+      const a = new Float64Array(buffer, next, rows);
+      next += 8 * rows;
+      return a;
     };
-    const floats = () => { const a = new Float32Array(buffer, next, cells); next += 4 * cells; return a; };
+    const frame = {
+      kind: KINDS[view.getUint8(at + 5)],
+      quantity: QUANTITIES[view.getUint8(at + 6)],
+      axis: view.getUint8(at + 7),
+      rows,
+      columns,
+      timeS: doubles(),
+      schedule: doubles(),
+      dof: doubles(),
+    };
+    const floats = () => {
+      const a = new Float32Array(buffer, next, cells);
+      next += 4 * cells;
+      return a;
+    };
     Object.assign(frame, { magnitude: floats(), phase: floats(), reach: floats(), coherence: floats() });
     yield frame;
     at = (next + 7) & ~7;

@@ -6,29 +6,51 @@ const whole = (n) => (Number.isFinite(n) ? Math.round(n).toLocaleString("en-GB")
 const ms = (v) => (v === null || v === undefined ? "–" : `${v < 10 ? v.toFixed(1) : Math.round(v)} ms`);
 
 export function health(host, found, facts, span) {
-  const { source, counts } = found, live = span.live, tiles = [];
+  const { source, counts } = found,
+    live = span.live,
+    tiles = [];
   const tile = (name, value, bad = false, title = "") => tiles.push([name, value, bad, title]);
   if (live && source) tile("source", source.connected ? "connected" : "not connected", !source.connected);
   const measured = source?.measured_hz;
-  tile("rate", `${plain(facts.rate_hz, 6)} Hz${measured ? `, comes with ${plain(measured, 5)} Hz` : ""}`, measured && Math.abs(measured / facts.rate_hz - 1) > 0.02, "samples per second");
+  tile(
+    "rate",
+    `${plain(facts.rate_hz, 6)} Hz${measured ? `, comes with ${plain(measured, 5)} Hz` : ""}`,
+    measured && Math.abs(measured / facts.rate_hz - 1) > 0.02,
+    "samples per second",
+  );
   if (live) tile("responses", found.responses_per_s === null ? "–" : `${plain(found.responses_per_s, 3)} per s`);
   else tile("responses", whole(found.responses));
-  const samples = found.samples ?? counts?.samples, gaps = found.gaps ?? counts?.gaps;
+  const samples = found.samples ?? counts?.samples,
+    gaps = found.gaps ?? counts?.gaps;
   if (samples !== undefined) tile("samples", whole(samples));
   if (gaps !== undefined) tile("gaps", whole(gaps), gaps > 0);
   if (source) {
     tile("lost", `${whole(source.lost)} samples`, source.lost > 0);
     if (live) {
-      tile("silent", source.silent_s === null ? "–" : ms(1000 * source.silent_s), source.silent_s > 2, "since the last batch came");
-      if (source.latency_s !== null) tile("on the way", ms(1000 * source.latency_s), false, "this computer's clock less the sender's");
+      tile(
+        "silent",
+        source.silent_s === null ? "–" : ms(1000 * source.silent_s),
+        source.silent_s > 2,
+        "since the last batch came",
+      );
+      if (source.latency_s !== null)
+        tile("on the way", ms(1000 * source.latency_s), false, "this computer's clock less the sender's");
       tile("waiting", `${plain(source.waiting_bytes / 1024, 3)} KiB`, source.waiting_bytes > 1 << 20);
     }
   }
-  if (found.behind_ms !== undefined) tile("arrival to response", `${ms(found.behind_ms)}, p99 ${ms(found.behind_p99_ms)}`, found.behind_p99_ms > 1000);
-  if (found.given_up) tile("not shown", whole(found.given_up), true, "updates that came faster than they could be shown; the record has them");
+  if (found.behind_ms !== undefined)
+    tile("arrival to response", `${ms(found.behind_ms)}, p99 ${ms(found.behind_p99_ms)}`, found.behind_p99_ms > 1000);
+  if (found.given_up)
+    tile(
+      "not shown",
+      whole(found.given_up),
+      true,
+      "updates that came faster than they could be shown; the record has them",
+    );
   if (found.refused) tile("wrong tokens", whole(found.refused), true);
   tile("window", `${whole(facts.window)} samples, ${plain((1000 * facts.window) / facts.rate_hz, 4)} ms`);
-  if (host.children.length !== tiles.length) host.replaceChildren(...tiles.map(() => element("div", {}, "", element("b"))));
+  if (host.children.length !== tiles.length)
+    host.replaceChildren(...tiles.map(() => element("div", {}, "", element("b"))));
   tiles.forEach(([name, value, bad, title], i) => {
     const made = host.children[i];
     made.firstChild.textContent = name;

@@ -25,7 +25,10 @@ export class Link {
     };
     this.socket.onclose = (event) => {
       this.onState(false);
-      if (event.code === 1008) { location.reload(); return; }
+      if (event.code === 1008) {
+        location.reload();
+        return;
+      }
       setTimeout(() => this.connect(), this.pauseMs);
       this.pauseMs = Math.min(2 * this.pauseMs, PAUSE_MS_MAX);
     };
@@ -37,7 +40,9 @@ export class Link {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(wish));
   }
 
-  forget(keep) { this.wishes.delete(keep); }
+  forget(keep) {
+    this.wishes.delete(keep);
+  }
 }
 
 export async function ask(path, query) {
@@ -49,7 +54,9 @@ export async function ask(path, query) {
 
 export async function post(path, body) {
   const answer = await fetch(path, {
-    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body),
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
   });
   if (!answer.ok) throw new Error((await answer.json()).error);
 }

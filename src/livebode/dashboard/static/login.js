@@ -2,12 +2,15 @@
 import { applyTheme } from "./theme.js";
 
 applyTheme();
-const form = document.getElementById("form"), wrong = document.getElementById("wrong");
+const form = document.getElementById("form"),
+  wrong = document.getElementById("wrong");
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
   const token = document.getElementById("token");
   const answer = await fetch("/login", {
-    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ token: token.value }),
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify({ token: token.value }),
   }).catch(() => null);
   token.value = "";
   if (answer?.ok) location.replace("/");

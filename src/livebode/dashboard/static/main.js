@@ -2,12 +2,12 @@
 import { Bode } from "./bode.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
-import { framesOf } from "./frames.js";
 import { health } from "./health.js";
-import { ask, Link } from "./link.js";
+import { Link } from "./link.js";
 import { choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { Margins } from "./margins.js";
+import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { Rows } from "./rows.js";
 import { applyTheme } from "./theme.js";
@@ -17,15 +17,29 @@ import { Trends } from "./trends.js";
 import { named } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
-const TEXT_MS = 120, TRACK_MS = 100, MAP_MS = 600, WHOLE_MS = 4000, ROWS = 1000;
-const LEGEND = [["measured", "measured ±3σ", ""], ["reference", "reference", "dashed"], ["baseline", "baseline", "dotted"], ["model", "fitted model", "dashed"]];
+const TEXT_MS = 120,
+  TRACK_MS = 100,
+  MAP_MS = 600;
+const LEGEND = [
+  ["measured", "measured ±3σ", ""],
+  ["reference", "reference", "dashed"],
+  ["baseline", "baseline", "dotted"],
+  ["model", "fitted model", "dashed"],
+];
 
 applyTheme();
 const page = { axis: 0, quantity: null, spanS: "20", dirty: new Set(), last: {}, tab: "map" };
-const bode = new Bode([$("magnitude"), $("phase"), $("coherence")], (hz, found) => { page.read = [hz, found]; page.dirty.add("read"); });
+const bode = new Bode([$("magnitude"), $("phase"), $("coherence")], (hz, found) => {
+  page.read = [hz, found];
+  page.dirty.add("read");
+});
 const tracking = new Tracking($("tracking"), $("tracking-lines"), (timeS) => timeline.go(timeS));
 const map = new LineMap($("map"), $("map-hover"));
-const parameters = new Trends($("pane-parameters"), (t) => t.model !== "margins", "No model is fitted: [fit] in the configuration asks for one.");
+const parameters = new Trends(
+  $("pane-parameters"),
+  (t) => t.model !== "margins",
+  "No model is fitted: [fit] in the configuration asks for one.",
+);
 const margins = new Margins($("pane-margins"));
 const events = new Events($("events"), $("alarms-only"), $("alarm-count"), (text) => complain(text));
 const timeline = new Timeline(
@@ -37,22 +51,44 @@ function complain(text) {
   $("notice").textContent = text;
   $("notice").hidden = !text;
   clearTimeout(page.silence);
-  page.silence = setTimeout(() => { $("notice").hidden = true; }, 8000);
+  page.silence = setTimeout(() => {
+    $("notice").hidden = true;
+  }, 8000);
 }
 
 const link = new Link({
-  onState: (up) => { page.up = up; if (!up) page.facts && status(); },
+  onState: (up) => {
+    page.up = up;
+    if (!up) page.facts && status();
+  },
   onNews: (news) => {
     if (news.error) complain(news.error);
     if (news.facts) begin(news);
-    if (news.span) { timeline.take(news.span); status(); }
-    if (news.health && page.facts?.begun) { health($("health"), news.health, page.facts, timeline.span); margins.lines = news.health.ms_at_lines; if (page.tab === "margins") margins.draw(); }
+    if (news.span) {
+      timeline.take(news.span);
+      status();
+    }
+    if (news.health && page.facts?.begun) {
+      health($("health"), news.health, page.facts, timeline.span);
+      margins.lines = news.health.ms_at_lines;
+      if (page.tab === "margins") margins.draw();
+    }
     if (news.notices) events.take(news.notices);
-    if (news.newest) { for (const trend of news.newest) { parameters.take(trend); margins.take(trend); } page.dirty.add("trends"); }
+    if (news.newest) {
+      for (const trend of news.newest) {
+        parameters.take(trend);
+        margins.take(trend);
+      }
+      page.dirty.add("trends");
+    }
   },
   onFrame: (frame) => {
     if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
-    if (frame.kind === "rows") { page.rows.take(frame); page.dirty.add("rows"); return; }
+    if (frame.kind === "rows") {
+      page.rows.take(frame);
+      page.dirty.add("rows");
+      return;
+    }
     if (frame.kind !== "reference" && timeline.atS !== null) return;
     bode.take(frame);
     page.dirty.add("bode");
@@ -63,15 +99,24 @@ const link = new Link({
 function begin({ facts, axes, trends }) {
   page.facts = facts;
   $("axis-label").hidden = axes.length < 2;
-  if ($("axis").children.length !== axes.length) $("axis").replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
-  if (!facts.begun) { $("status-text").textContent = `${facts.name}: waiting for the first samples`; return; }
+  if ($("axis").children.length !== axes.length)
+    $("axis").replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
+  if (!facts.begun) {
+    $("status-text").textContent = `${facts.name}: waiting for the first samples`;
+    return;
+  }
   const fits = facts.quantities.find((q) => q.name === page.quantity && !q.why_not);
   const key = JSON.stringify([facts.axis, facts.frequency_hz, fits ? page.quantity : facts.quantity]);
   page.quantity = fits ? page.quantity : facts.quantity;
   page.axis = facts.axis;
   page.schedule = named(facts.schedule);
   document.title = `${facts.name} · livebode`;
-  segments($("quantities"), facts.quantities.map(({ name, symbol, why_not: why }) => ({ value: name, text: `${name} ${symbol}`, why })), page.quantity, watch);
+  segments(
+    $("quantities"),
+    facts.quantities.map(({ name, symbol, why_not: why }) => ({ value: name, text: `${name} ${symbol}`, why })),
+    page.quantity,
+    watch,
+  );
   if (page.key !== key) {
     const shown = facts.quantities.find((q) => q.name === page.quantity);
     page.key = key;
@@ -90,12 +135,18 @@ function begin({ facts, axes, trends }) {
   if (facts.watched !== page.quantity) say();
 }
 
-const whyNoMargins = (facts) => (facts.quantities.find((q) => q.name === "open loop").why_not ? "Margins need the loop: describe its controllers under [loop]." : "Margins need a fitted model: add [fit] to the configuration.");
+const whyNoMargins = (facts) =>
+  facts.quantities.find((q) => q.name === "open loop").why_not
+    ? "Margins need the loop: describe its controllers under [loop]."
+    : "Margins need a fitted model: add [fit] to the configuration.";
 
 const say = () => link.wish({ kind: "watch", axis: page.axis, quantity: page.quantity }, "watch");
 
 function watch(quantity, why) {
-  if (why) { complain(`${quantity}: ${why}`); return; }
+  if (why) {
+    complain(`${quantity}: ${why}`);
+    return;
+  }
   if (quantity === page.quantity) return;
   page.quantity = quantity;
   choose($("quantities"), quantity);
@@ -103,77 +154,61 @@ function watch(quantity, why) {
   say();
 }
 
-// What happened before this page came: the recent past at first, the whole run when it is asked for.
-async function fill() {
-  const { span } = timeline, whole = page.spanS === "whole", half = Number(page.spanS) / 2;
-  if (!page.facts?.begun || !Number.isFinite(span.last_s)) { setTimeout(fill, 300); return; }
-  const end = timeline.atS === null ? span.last_s : whole ? span.last_s : Math.min(span.last_s, timeline.atS + half);
-  const from = whole ? span.first_s : Math.max(span.first_s, end - Number(page.spanS));
-  const asked = `${page.key} ${from} ${end}`;
-  page.asked = asked;
-  try {
-    const [frame] = framesOf(await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows: ROWS }));
-    if (page.asked !== asked) return;
-    page.past = { frame, from, to: end };
-    if (!whole && timeline.atS === null) page.rows = page.rows.behind(frame);
-  } catch (error) { complain(error.message); }
-  page.dirty.add("rows");
-}
-
-async function showMoment(timeS) {
-  link.wish({ kind: "pause" }, "pause");
-  status();
-  tracking.marked = timeS;
-  if (page.seeking) { page.next = timeS; return; }
-  page.seeking = true;
-  try {
-    const buffer = await ask("/api/moment", { axis: page.axis, quantity: page.quantity, from: timeS, to: timeS });
-    if (timeline.atS !== null) {
-      for (const name of ["model", "baseline"]) bode.drop(name);
-      for (const frame of framesOf(buffer)) if (frame.quantity === page.quantity) bode.take(frame);
-      page.dirty.add("bode").add("trends");
-    }
-    const { past } = page;
-    if (!past || timeS < past.from || timeS > past.to || page.spanS !== "whole") await fill();
-    page.dirty.add("rows");
-  } catch (error) { complain(error.message); }
-  page.seeking = false;
-  if (page.next !== undefined) { const next = page.next; page.next = undefined; if (timeline.atS !== null) showMoment(next); }
-}
-
-function goLive() {
-  tracking.marked = NaN;
-  link.forget("pause");
-  link.wish({ kind: "resume" });
-  page.rows.clear();
-  fill();
-  status();
-}
-
 function status() {
-  const { live, growing } = timeline.span, paused = timeline.atS !== null;
+  const { live, growing } = timeline.span,
+    paused = timeline.atS !== null;
   const word = !page.up ? "no connection" : paused ? "paused" : live ? "live" : growing ? "being recorded" : "recorded";
   $("lamp").className = `lamp ${!page.up ? "lost" : paused ? "paused" : live ? "live" : ""}`;
   $("status-text").textContent = `${page.facts?.name ?? ""} · ${word}`;
 }
 
 function legend() {
-  $("legend").replaceChildren(...LEGEND.map(([name, words, line]) => {
-    const swatch = element("span", { class: `swatch ${line}`, "aria-hidden": "true" });
-    swatch.style.color = `var(--${name})`;
-    const made = element("button", { type: "button", "aria-pressed": String(bode.shown.has(name)), "data-name": name, onclick: () => { bode.toggle(name, !bode.shown.has(name)); legend(); } }, swatch, words);
-    made.hidden = name === "reference" ? !page.frozen : name === "baseline" ? !page.facts.baseline : name === "model" ? !page.facts.model : false;
-    return made;
-  }));
+  $("legend").replaceChildren(
+    ...LEGEND.map(([name, words, line]) => {
+      const swatch = element("span", { class: `swatch ${line}`, "aria-hidden": "true" });
+      swatch.style.color = `var(--${name})`;
+      const made = element(
+        "button",
+        {
+          type: "button",
+          "aria-pressed": String(bode.shown.has(name)),
+          "data-name": name,
+          onclick: () => {
+            bode.toggle(name, !bode.shown.has(name));
+            legend();
+          },
+        },
+        swatch,
+        words,
+      );
+      made.hidden =
+        name === "reference"
+          ? !page.frozen
+          : name === "baseline"
+            ? !page.facts.baseline
+            : name === "model"
+              ? !page.facts.model
+              : false;
+      return made;
+    }),
+  );
 }
 
 function freeze() {
   page.frozen = !page.frozen;
   if (page.frozen) {
     const timeS = bode.curves.measured?.frame.timeS[0];
-    if (timeS === undefined) { page.frozen = false; return; }
+    if (timeS === undefined) {
+      page.frozen = false;
+      return;
+    }
     link.wish({ kind: "freeze", time_s: timeS }, "freeze");
-  } else { link.forget("freeze"); link.wish({ kind: "unfreeze" }); bode.drop("reference"); page.dirty.add("bode"); }
+  } else {
+    link.forget("freeze");
+    link.wish({ kind: "unfreeze" });
+    bode.drop("reference");
+    page.dirty.add("bode");
+  }
   $("freeze").textContent = page.frozen ? "Unfreeze" : "Freeze";
   $("freeze").classList.toggle("primary", page.frozen);
   legend();
@@ -182,27 +217,26 @@ function freeze() {
 function draw(now) {
   requestAnimationFrame(draw);
   if (!page.facts?.begun || !bode.charts.length) return;
-  const due = (what, ms) => page.dirty.has(what) && now - (page.last[what] ?? -1e9) >= ms && page.dirty.delete(what) && ((page.last[what] = now), true);
+  const due = (what, ms) =>
+    page.dirty.has(what) &&
+    now - (page.last[what] ?? -1e9) >= ms &&
+    page.dirty.delete(what) &&
+    ((page.last[what] = now), true);
   if (due("bode", 0)) bode.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule);
   if (due("rows", TRACK_MS)) drawRows(now);
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
-  if (due("trends", 250)) { if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN); if (page.tab === "margins") margins.draw(); }
+  if (due("trends", 250)) {
+    if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN);
+    if (page.tab === "margins") margins.draw();
+  }
 }
 
-function drawRows(now) {
-  const { span } = timeline, whole = page.spanS === "whole", paused = timeline.atS !== null;
-  const end = Math.max(span.last_s, page.rows.lastS || -Infinity);
-  let rows = page.rows, from = end - Number(page.spanS), to = end;
-  if ((whole || paused) && page.past) {
-    rows = page.past.frame; ({ from, to } = page.past);
-    if (whole && !paused && span.live && now - (page.last.whole ?? -1e9) > WHOLE_MS) { page.last.whole = now; fill(); }
-  } else if (!whole && !paused) from = Math.max(from, Math.min(span.first_s, end));
-  page.seen = [rows, from, to];
-  tracking.draw(...page.seen);
-  page.dirty.add("map");
-}
-
+const { fill, showMoment, goLive, drawRows } = past(
+  page,
+  { bode, tracking, map, timeline, link },
+  { complain, status },
+);
 controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, timeline };
 requestAnimationFrame(draw);

@@ -15,11 +15,21 @@ export function segments(host, choices, chosen, onChoose) {
   const focused = host.contains(document.activeElement);
   host.replaceChildren();
   const buttons = choices.map(({ value, text, title, why }) =>
-    element("button", {
-      type: "button", role: "radio", "aria-checked": String(value === chosen), "aria-disabled": why ? "true" : null,
-      tabindex: value === chosen ? 0 : -1, title: why || title || "", "data-value": value,
-      onclick: () => onChoose(value, why),
-    }, text));
+    element(
+      "button",
+      {
+        type: "button",
+        role: "radio",
+        "aria-checked": String(value === chosen),
+        "aria-disabled": why ? "true" : null,
+        tabindex: value === chosen ? 0 : -1,
+        title: why || title || "",
+        "data-value": value,
+        onclick: () => onChoose(value, why),
+      },
+      text,
+    ),
+  );
   host.append(...buttons);
   if (focused) buttons.find((button) => button.tabIndex === 0)?.focus();
   host.onkeydown = (event) => {

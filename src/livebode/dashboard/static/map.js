@@ -4,46 +4,112 @@ import { hertz, moment, originOf, signed } from "./words.js";
 
 const CELLS = 56;
 // Cividis (Nuñez, Anderton, Renslow 2018), made to read the same with any colour vision; blue to orange for a change.
-const LEVELS = [[0, 32, 76], [0, 48, 111], [57, 71, 108], [87, 93, 109], [112, 115, 115], [138, 138, 121], [166, 161, 118], [196, 186, 107], [228, 213, 86], [255, 234, 70]];
-const CHANGES = { light: [[0, 84, 150], [120, 178, 222], [250, 250, 250], [240, 170, 110], [168, 72, 0]], dark: [[120, 196, 255], [40, 96, 146], [22, 28, 35], [148, 84, 30], [255, 176, 90]] };
+const LEVELS = [
+  [0, 32, 76],
+  [0, 48, 111],
+  [57, 71, 108],
+  [87, 93, 109],
+  [112, 115, 115],
+  [138, 138, 121],
+  [166, 161, 118],
+  [196, 186, 107],
+  [228, 213, 86],
+  [255, 234, 70],
+];
+const CHANGES = {
+  light: [
+    [0, 84, 150],
+    [120, 178, 222],
+    [250, 250, 250],
+    [240, 170, 110],
+    [168, 72, 0],
+  ],
+  dark: [
+    [120, 196, 255],
+    [40, 96, 146],
+    [22, 28, 35],
+    [148, 84, 30],
+    [255, 176, 90],
+  ],
+};
 
 function shade(stops, share) {
-  const x = Math.min(1, Math.max(0, share)) * (stops.length - 1), i = Math.min(stops.length - 2, Math.floor(x)), t = x - i;
+  const x = Math.min(1, Math.max(0, share)) * (stops.length - 1),
+    i = Math.min(stops.length - 2, Math.floor(x)),
+    t = x - i;
   return `rgb(${stops[i].map((c, k) => Math.round(c + t * (stops[i + 1][k] - c))).join(",")})`;
 }
 
-const middle = (values) => { values.sort((a, b) => a - b); const h = values.length >> 1; return values.length % 2 ? values[h] : (values[h - 1] + values[h]) / 2; };
+const middle = (values) => {
+  values.sort((a, b) => a - b);
+  const h = values.length >> 1;
+  return values.length % 2 ? values[h] : (values[h - 1] + values[h]) / 2;
+};
 
 export class LineMap {
   constructor(canvas, hover) {
     Object.assign(this, { canvas, hover, what: "level", cells: null });
     canvas.addEventListener("pointermove", (event) => this.point(event));
     canvas.addEventListener("pointerdown", (event) => this.point(event));
-    canvas.addEventListener("pointerleave", () => { hover.textContent = ""; });
+    canvas.addEventListener("pointerleave", () => {
+      hover.textContent = "";
+    });
     new ResizeObserver(() => this.paint()).observe(canvas);
     onTheme(() => this.paint());
   }
 
-  begin(facts, schedule) { this.lines = facts.frequency_hz; this.schedule = schedule; this.cells = null; this.paint(); }
+  begin(facts, schedule) {
+    this.lines = facts.frequency_hz;
+    this.schedule = schedule;
+    this.cells = null;
+    this.paint();
+  }
 
   // Sort the rows into cells.
   draw(rows, fromS, toS) {
-    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter((r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS);
-    const moving = order.some((r) => Number.isFinite(rows.schedule[r])), x = moving ? rows.schedule : rows.timeS;
+    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter(
+      (r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS,
+    );
+    const moving = order.some((r) => Number.isFinite(rows.schedule[r])),
+      x = moving ? rows.schedule : rows.timeS;
     const known = order.filter((r) => Number.isFinite(x[r]));
-    if (!known.length) { this.cells = null; this.paint(); return; }
-    let low = Infinity, high = -Infinity;
-    for (const r of known) { low = Math.min(low, x[r]); high = Math.max(high, x[r]); }
-    const columns = Math.max(1, Math.min(CELLS, Math.ceil(known.length / 6))), step = (high - low) / columns || 1;
+    if (!known.length) {
+      this.cells = null;
+      this.paint();
+      return;
+    }
+    let low = Infinity,
+      high = -Infinity;
+    for (const r of known) {
+      low = Math.min(low, x[r]);
+      high = Math.max(high, x[r]);
+    }
+    const columns = Math.max(1, Math.min(CELLS, Math.ceil(known.length / 6))),
+      step = (high - low) / columns || 1;
     const bins = Array.from({ length: columns }, () => []);
     for (const r of known) bins[Math.min(columns - 1, Math.floor((x[r] - low) / step))].push(r);
-    const level = bins.map((bin) => this.lines.map((_, line) => {
-      const values = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
-      return values.length ? values.slice(-Math.max(1, values.length >> 2)).reduce((a, b) => a + b, 0) / Math.max(1, values.length >> 2) : NaN;
-    }));
+    const level = bins.map((bin) =>
+      this.lines.map((_, line) => {
+        const values = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
+        return values.length
+          ? values.slice(-Math.max(1, values.length >> 2)).reduce((a, b) => a + b, 0) / Math.max(1, values.length >> 2)
+          : NaN;
+      }),
+    );
     const usual = moving
-      ? bins.map((bin) => this.lines.map((_, line) => { const v = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite); return v.length ? middle(v) : NaN; }))
-      : (() => { const all = this.lines.map((_, line) => { const v = known.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite); return v.length ? middle(v) : NaN; }); return bins.map(() => all); })();
+      ? bins.map((bin) =>
+          this.lines.map((_, line) => {
+            const v = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
+            return v.length ? middle(v) : NaN;
+          }),
+        )
+      : (() => {
+          const all = this.lines.map((_, line) => {
+            const v = known.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
+            return v.length ? middle(v) : NaN;
+          });
+          return bins.map(() => all);
+        })();
     this.cells = { level, change: level.map((c, i) => c.map((v, k) => v - usual[i][k])), low, step, columns, moving };
     this.paint();
   }
@@ -54,66 +120,113 @@ export class LineMap {
   }
 
   edges() {
-    const log = this.lines.map(Math.log), between = log.slice(1).map((v, i) => (v + log[i]) / 2);
+    const log = this.lines.map(Math.log),
+      between = log.slice(1).map((v, i) => (v + log[i]) / 2);
     if (log.length === 1) return [log[0] - 0.1, log[0] + 0.1];
     return [2 * log[0] - between[0], ...between, 2 * log.at(-1) - between.at(-1)];
   }
 
   paint() {
-    const { canvas, cells } = this, { w, h, left, top, right, bottom } = this.box();
+    const { canvas, cells } = this,
+      { w, h, left, top, right, bottom } = this.box();
     if (w < 10 || h < 10 || !this.lines) return;
-    const ratio = devicePixelRatio, ctx = canvas.getContext("2d");
-    canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio);
+    const ratio = devicePixelRatio,
+      ctx = canvas.getContext("2d");
+    canvas.width = Math.round(w * ratio);
+    canvas.height = Math.round(h * ratio);
     ctx.scale(ratio, ratio);
     ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
     ctx.fillStyle = colour("muted");
-    if (!cells) { ctx.fillText("no response yet", left, top + 20); return; }
-    const values = cells[this.what], flat = values.flat().filter(Number.isFinite);
-    const change = this.what === "change", edges = this.edges();
-    const sizes = flat.map(Math.abs).sort((a, b) => a - b), reach = Math.max(0.1, sizes[Math.floor(0.99 * (sizes.length - 1))] || 0);
+    if (!cells) {
+      ctx.fillText("no response yet", left, top + 20);
+      return;
+    }
+    const values = cells[this.what],
+      flat = values.flat().filter(Number.isFinite);
+    const change = this.what === "change",
+      edges = this.edges();
+    const sizes = flat.map(Math.abs).sort((a, b) => a - b),
+      reach = Math.max(0.1, sizes[Math.floor(0.99 * (sizes.length - 1))] || 0);
     const [low, high] = change ? [-reach, reach] : [Math.min(...flat), Math.max(...flat, Math.min(...flat) + 0.1)];
     const stops = change ? CHANGES[document.documentElement.dataset.theme] || CHANGES.light : LEVELS;
-    const yOf = (log) => bottom - ((log - edges[0]) / (edges.at(-1) - edges[0])) * (bottom - top), width = (right - left) / cells.columns;
+    const yOf = (log) => bottom - ((log - edges[0]) / (edges.at(-1) - edges[0])) * (bottom - top),
+      width = (right - left) / cells.columns;
     ctx.fillStyle = colour("nothing");
     ctx.fillRect(left, top, right - left, bottom - top);
-    values.forEach((column, i) => column.forEach((v, k) => {
-      if (!Number.isFinite(v)) return;
-      ctx.fillStyle = shade(stops, (v - low) / (high - low));
-      const y = yOf(edges[k + 1]);
-      ctx.fillRect(left + i * width, y, width + 0.6, yOf(edges[k]) - y + 0.6);
-    }));
+    values.forEach((column, i) =>
+      column.forEach((v, k) => {
+        if (!Number.isFinite(v)) return;
+        ctx.fillStyle = shade(stops, (v - low) / (high - low));
+        const y = yOf(edges[k + 1]);
+        ctx.fillRect(left + i * width, y, width + 0.6, yOf(edges[k]) - y + 0.6);
+      }),
+    );
     this.scales(ctx, { low, high, stops, edges, yOf, change });
   }
 
   scales(ctx, { low, high, stops, yOf, change }) {
-    const { left, top, right, bottom, h } = this.box(), { cells } = this;
+    const { left, top, right, bottom, h } = this.box(),
+      { cells } = this;
     ctx.fillStyle = colour("muted");
-    ctx.textAlign = "right"; ctx.textBaseline = "middle";
+    ctx.textAlign = "right";
+    ctx.textBaseline = "middle";
     let before = Infinity;
-    for (const f of this.lines) { const y = yOf(Math.log(f)); if (before - y >= 16) { ctx.fillText(hertz(f), left - 6, y); before = y; } }
-    ctx.save(); ctx.translate(11, (top + bottom) / 2); ctx.rotate(-Math.PI / 2); ctx.textAlign = "center"; ctx.fillText("frequency in Hz", 0, 0); ctx.restore();
-    ctx.textAlign = "center"; ctx.textBaseline = "top";
-    const origin = cells.moving ? 0 : originOf(cells.low), end = cells.low + cells.step * cells.columns;
+    for (const f of this.lines) {
+      const y = yOf(Math.log(f));
+      if (before - y >= 16) {
+        ctx.fillText(hertz(f), left - 6, y);
+        before = y;
+      }
+    }
+    ctx.save();
+    ctx.translate(11, (top + bottom) / 2);
+    ctx.rotate(-Math.PI / 2);
+    ctx.textAlign = "center";
+    ctx.fillText("frequency in Hz", 0, 0);
+    ctx.restore();
+    ctx.textAlign = "center";
+    ctx.textBaseline = "top";
+    const origin = cells.moving ? 0 : originOf(cells.low),
+      end = cells.low + cells.step * cells.columns;
     for (let i = 0; i <= 4; i++) {
       const value = cells.low + ((end - cells.low) * i) / 4 - origin;
       ctx.fillText(Number(value.toPrecision(3)).toString(), left + ((right - left) * i) / 4, bottom + 4);
     }
     const unit = this.schedule.unit ? ` in ${this.schedule.unit}` : "";
     ctx.fillText(cells.moving ? `${this.schedule.name || "schedule"}${unit}` : "time in s", (left + right) / 2, h - 15);
-    for (let i = 0; i < 60; i++) { ctx.fillStyle = shade(stops, i / 59); ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6); }
-    ctx.fillStyle = colour("muted"); ctx.textAlign = "left"; ctx.textBaseline = "middle";
+    for (let i = 0; i < 60; i++) {
+      ctx.fillStyle = shade(stops, i / 59);
+      ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6);
+    }
+    ctx.fillStyle = colour("muted");
+    ctx.textAlign = "left";
+    ctx.textBaseline = "middle";
     for (const share of [0, 0.5, 1]) {
       const value = low + share * (high - low);
-      ctx.fillText(change ? signed(value, reachDigits(high)) : value.toFixed(high - low < 3 ? 1 : 0).replace("-", "−"), right + 26, bottom - share * (bottom - top));
+      ctx.fillText(
+        change ? signed(value, reachDigits(high)) : value.toFixed(high - low < 3 ? 1 : 0).replace("-", "−"),
+        right + 26,
+        bottom - share * (bottom - top),
+      );
     }
-    ctx.textAlign = "center"; ctx.textBaseline = "top"; ctx.fillText("dB", right + 16, h - 15);
+    ctx.textAlign = "center";
+    ctx.textBaseline = "top";
+    ctx.fillText("dB", right + 16, h - 15);
   }
 
   point(event) {
-    const { left, top, right, bottom } = this.box(), { cells } = this, x = event.offsetX, y = event.offsetY;
-    if (!cells || x < left || x >= right || y < top || y >= bottom) { this.hover.textContent = ""; return; }
-    const edges = this.edges(), log = edges[0] + ((bottom - y) / (bottom - top)) * (edges.at(-1) - edges[0]);
-    const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)), i = Math.floor(((x - left) / (right - left)) * cells.columns);
+    const { left, top, right, bottom } = this.box(),
+      { cells } = this,
+      x = event.offsetX,
+      y = event.offsetY;
+    if (!cells || x < left || x >= right || y < top || y >= bottom) {
+      this.hover.textContent = "";
+      return;
+    }
+    const edges = this.edges(),
+      log = edges[0] + ((bottom - y) / (bottom - top)) * (edges.at(-1) - edges[0]);
+    const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)),
+      i = Math.floor(((x - left) / (right - left)) * cells.columns);
     const place = cells.low + (i + 0.5) * cells.step;
     this.hover.textContent = `${cells.moving ? `${place.toFixed(3)} ${this.schedule.unit}` : moment(place)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
   }

@@ -5,36 +5,90 @@ import { hertz, plain } from "./words.js";
 
 // What is usual for a servo loop: 6 dB, 30°, Ms 2. Below that the number is marked, with a word.
 const ROWS = [
-  ["gain_margin", "gain may rise by", (v) => v < 6], ["gain_reduction", "gain may fall by", (v) => Math.abs(v) < 6],
-  ["phase_margin", "phase margin", (v) => Math.abs(v) < 30], ["delay_margin", "delay margin", () => false],
-  ["peak_sensitivity", "peak sensitivity Ms", (v) => v > 2], ["bandwidth", "bandwidth", () => false],
+  ["gain_margin", "gain may rise by", (v) => v < 6],
+  ["gain_reduction", "gain may fall by", (v) => Math.abs(v) < 6],
+  ["phase_margin", "phase margin", (v) => Math.abs(v) < 30],
+  ["delay_margin", "delay margin", () => false],
+  ["peak_sensitivity", "peak sensitivity Ms", (v) => v > 2],
+  ["bandwidth", "bandwidth", () => false],
 ];
 
 export class Margins {
-  constructor(host, whyNot) { Object.assign(this, { host, whyNot, newest: new Map(), lines: null }); }
+  constructor(host, whyNot) {
+    Object.assign(this, { host, whyNot, newest: new Map(), lines: null });
+  }
 
-  begin(list, why) { this.newest.clear(); this.why = why; for (const trend of list) this.take(trend); this.draw(); }
+  begin(list, why) {
+    this.newest.clear();
+    this.why = why;
+    for (const trend of list) this.take(trend);
+    this.draw();
+  }
 
   take(trend) {
     if (trend.model !== "margins") return;
-    this.newest.set(trend.name, { value: trend.value.at(-1), sigma: trend.sigma.at(-1), unit: trend.unit, status: trend.status.at(-1) });
+    this.newest.set(trend.name, {
+      value: trend.value.at(-1),
+      sigma: trend.sigma.at(-1),
+      unit: trend.unit,
+      status: trend.status.at(-1),
+    });
   }
 
   draw() {
-    const { lines } = this, rows = [];
+    const { lines } = this,
+      rows = [];
     for (const [name, words, small] of ROWS) {
       const found = this.newest.get(name);
       if (!found) continue;
-      const at = this.newest.get(`${name}_frequency`)?.value, value = found.value ?? NaN;
-      const none = found.status === "none", mark = !none && small(value);
-      rows.push(element("tr", { "data-name": name },
-        element("th", { scope: "row" }, words), element("td", { class: mark ? "small" : "" }, none ? "no limit" : `${bounded(value, found.sigma, found.unit)}${mark ? " ⚠ small" : ""}`),
-        element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""), element("td", {}, none ? "no crossing" : found.status)));
+      const at = this.newest.get(`${name}_frequency`)?.value,
+        value = found.value ?? NaN;
+      const none = found.status === "none",
+        mark = !none && small(value);
+      rows.push(
+        element(
+          "tr",
+          { "data-name": name },
+          element("th", { scope: "row" }, words),
+          element(
+            "td",
+            { class: mark ? "small" : "" },
+            none ? "no limit" : `${bounded(value, found.sigma, found.unit)}${mark ? " ⚠ small" : ""}`,
+          ),
+          element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""),
+          element("td", {}, none ? "no crossing" : found.status),
+        ),
+      );
     }
-    if (lines) rows.push(element("tr", { "data-name": "at_lines" }, element("th", { scope: "row" }, "largest |S| at a line"),
-      element("td", { class: lines.value > 2 ? "small" : "" }, `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? " ⚠ large" : ""}`), element("td", {}, `${hertz(lines.frequency_hz)} Hz`), element("td", {}, "measured, no model")));
-    if (!rows.length) { this.host.replaceChildren(element("p", { class: "empty" }, this.why)); return; }
-    const head = ["margin", "value, ± holds 95 %", "at", "how it is known"].map((t) => element("th", { scope: "col" }, t));
-    this.host.replaceChildren(element("table", { class: "margins" }, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)));
+    if (lines)
+      rows.push(
+        element(
+          "tr",
+          { "data-name": "at_lines" },
+          element("th", { scope: "row" }, "largest |S| at a line"),
+          element(
+            "td",
+            { class: lines.value > 2 ? "small" : "" },
+            `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? " ⚠ large" : ""}`,
+          ),
+          element("td", {}, `${hertz(lines.frequency_hz)} Hz`),
+          element("td", {}, "measured, no model"),
+        ),
+      );
+    if (!rows.length) {
+      this.host.replaceChildren(element("p", { class: "empty" }, this.why));
+      return;
+    }
+    const head = ["margin", "value, ± holds 95 %", "at", "how it is known"].map((t) =>
+      element("th", { scope: "col" }, t),
+    );
+    this.host.replaceChildren(
+      element(
+        "table",
+        { class: "margins" },
+        element("thead", {}, element("tr", {}, ...head)),
+        element("tbody", {}, ...rows),
+      ),
+    );
   }
 }

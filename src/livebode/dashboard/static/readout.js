@@ -6,26 +6,38 @@ import { hertz, moment, signed } from "./words.js";
 const WORDS = { measured: "measured", reference: "reference", baseline: "baseline", model: "fitted model" };
 
 function around(low, value, high) {
-  if (!Number.isFinite(value - low) || low <= -999) return Number.isFinite(high) ? "not told from zero" : "bound not known";
+  if (!Number.isFinite(value - low) || low <= -999)
+    return Number.isFinite(high) ? "not told from zero" : "bound not known";
   return `−${(value - low).toFixed(2)} … +${(high - value).toFixed(2)} dB`;
 }
 
 export function readout(host, hz, found, schedule) {
   const rows = Object.entries(found).map(([name, { db, deg, reach, coherence }]) => {
     const away = name !== "measured" && found.measured ? [db - found.measured.db, deg - found.measured.deg] : null;
-    return element("tr", { "data-name": name },
+    return element(
+      "tr",
+      { "data-name": name },
       element("th", { scope: "row" }, WORDS[name]),
-      element("td", {}, `${signed(db, 2)} dB`), element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach))),
-      element("td", {}, `${signed(deg, 1)}°`), element("td", {}, Number.isFinite(reach) ? `± ${halfDeg(reach).toFixed(1)}°` : ""),
+      element("td", {}, `${signed(db, 2)} dB`),
+      element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach))),
+      element("td", {}, `${signed(deg, 1)}°`),
+      element("td", {}, Number.isFinite(reach) ? `± ${halfDeg(reach).toFixed(1)}°` : ""),
       element("td", {}, Number.isFinite(coherence) ? `γ² ${coherence.toFixed(3)}` : ""),
-      element("td", {}, away ? `measured ${signed(-away[0], 2)} dB, ${signed(-away[1], 1)}° off` : ""));
+      element("td", {}, away ? `measured ${signed(-away[0], 2)} dB, ${signed(-away[1], 1)}° off` : ""),
+    );
   });
   const frame = found.measured?.frame;
   const words = frame
     ? `at ${moment(frame.timeS[0])}${Number.isFinite(frame.schedule[0]) ? `, ${schedule.name || "schedule"} ${frame.schedule[0].toFixed(3)} ${schedule.unit}` : ""}` +
       `; bands are ±3σ${Number.isFinite(frame.dof[0]) || frame.dof[0] === Infinity ? ` and hold the truth with ${(100 * holds(frame.dof[0])).toFixed(2)} %` : ""}`
     : "no response yet";
-  host.replaceChildren(element("table", {}, element("caption", {}, words),
-    element("tbody", {}, ...(rows.length ? rows : [element("tr", {}, element("th", {}, "–"))]))));
+  host.replaceChildren(
+    element(
+      "table",
+      {},
+      element("caption", {}, words),
+      element("tbody", {}, ...(rows.length ? rows : [element("tr", {}, element("th", {}, "–"))])),
+    ),
+  );
   host.firstChild.prepend(element("thead", {}, element("tr", {}, element("th", { colspan: 7 }, `${hertz(hz)} Hz`))));
 }

@@ -1,5 +1,6 @@
 // The newest responses in memory: times, schedule, and for each line magnitude, phase and reach; a ring of bounded size.
-const ROWS_MAX = 2400, CELLS_MAX = 1 << 20;
+const ROWS_MAX = 2400,
+  CELLS_MAX = 1 << 20;
 
 export class Rows {
   constructor(columns) {
@@ -9,18 +10,22 @@ export class Rows {
   }
 
   clear() {
-    this.count = 0; this.next = 0;
-    this.timeS = new Float64Array(this.room); this.schedule = new Float64Array(this.room);
+    this.count = 0;
+    this.next = 0;
+    this.timeS = new Float64Array(this.room);
+    this.schedule = new Float64Array(this.room);
     for (const name of ["magnitude", "phase", "reach"]) this[name] = new Float32Array(this.room * this.columns);
   }
 
   take(frame, wanted = () => true) {
-    for (let r = Math.max(0, frame.rows - this.room); r < frame.rows; r++) if (wanted(frame.timeS[r])) this.put(frame, r);
+    for (let r = Math.max(0, frame.rows - this.room); r < frame.rows; r++)
+      if (wanted(frame.timeS[r])) this.put(frame, r);
   }
 
   put(from, r) {
     const at = this.next;
-    this.timeS[at] = from.timeS[r]; this.schedule[at] = from.schedule[r];
+    this.timeS[at] = from.timeS[r];
+    this.schedule[at] = from.schedule[r];
     for (const name of ["magnitude", "phase", "reach"])
       this[name].set(from[name].subarray(r * this.columns, (r + 1) * this.columns), at * this.columns);
     this.next = (at + 1) % this.room;
@@ -29,7 +34,8 @@ export class Rows {
 
   // The same rows with those of a frame before them, as far as they are older.
   behind(frame) {
-    const after = new Rows(this.columns), first = this.count ? this.timeS[this.order()[0]] : Infinity;
+    const after = new Rows(this.columns),
+      first = this.count ? this.timeS[this.order()[0]] : Infinity;
     after.take(frame, (timeS) => timeS < first);
     for (const at of this.order()) after.put(this, at);
     return after;
@@ -41,5 +47,7 @@ export class Rows {
     return Array.from({ length: this.count }, (_, i) => (first + i) % this.room);
   }
 
-  get lastS() { return this.count ? this.timeS[(this.next - 1 + this.room) % this.room] : NaN; }
+  get lastS() {
+    return this.count ? this.timeS[(this.next - 1 + this.room) % this.room] : NaN;
+  }
 }

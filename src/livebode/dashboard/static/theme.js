@@ -4,7 +4,11 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
 
 let word = "auto";
-try { if (WORDS.includes(localStorage.theme)) word = localStorage.theme; } catch { /* a browser that remembers nothing */ }
+try {
+  if (WORDS.includes(localStorage.theme)) word = localStorage.theme;
+} catch {
+  /* a browser that remembers nothing */
+}
 
 export function applyTheme() {
   document.documentElement.dataset.theme = word === "auto" ? (dark.matches ? "dark" : "light") : word;
@@ -14,16 +18,23 @@ export function applyTheme() {
 
 export function nextTheme() {
   word = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-  try { localStorage.theme = word; } catch { /* it is not remembered */ }
+  try {
+    localStorage.theme = word;
+  } catch {
+    /* it is not remembered */
+  }
   applyTheme();
 }
 
-export function onTheme(listener) { listeners.add(listener); }
+export function onTheme(listener) {
+  listeners.add(listener);
+}
 
 const colours = new Map();
 // A colour of look.css, for canvases.
 export function colour(name) {
-  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  if (!colours.has(name))
+    colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
   return colours.get(name);
 }
 

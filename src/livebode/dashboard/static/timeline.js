@@ -29,15 +29,22 @@ export class Timeline {
     this.onMoment(this.atS);
   }
 
-  step(byS) { this.go((this.atS ?? this.span.last_s) + byS); }
+  step(byS) {
+    this.go((this.atS ?? this.span.last_s) + byS);
+  }
 
   toggle() {
     if (this.atS === null) this.go(this.span.last_s);
-    else { this.atS = null; this.draw(); this.onLive(); }
+    else {
+      this.atS = null;
+      this.draw();
+      this.onLive();
+    }
   }
 
   draw() {
-    const { first_s: first, last_s: last, live } = this.span, paused = this.atS !== null;
+    const { first_s: first, last_s: last, live } = this.span,
+      paused = this.atS !== null;
     this.slider.value = paused && last > first ? (1000 * (this.atS - first)) / (last - first) : 1000;
     this.slider.setAttribute("aria-valuetext", moment(paused ? this.atS : last));
     this.from.textContent = moment(first);

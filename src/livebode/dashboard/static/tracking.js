@@ -5,7 +5,10 @@ import { element } from "./make.js";
 import { colour } from "./theme.js";
 import { hertz, moment, originOf } from "./words.js";
 
-const COLOURS = 10, LINES_MAX = 10, AT_FIRST = 6, GAP_S = 2;
+const COLOURS = 10,
+  LINES_MAX = 10,
+  AT_FIRST = 6,
+  GAP_S = 2;
 
 export class Tracking {
   constructor(host, chips, onMoment) {
@@ -17,20 +20,32 @@ export class Tracking {
     this.schedule = schedule;
     const n = Math.min(AT_FIRST, this.lines.length);
     const inside = this.chosen.length && this.chosen.every((i) => i < this.lines.length);
-    if (!inside) this.chosen = Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
+    if (!inside)
+      this.chosen = Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
     this.drawChips();
     this.build();
   }
 
   drawChips() {
-    this.chips.replaceChildren(...this.lines.map((f, i) => {
-      const place = this.chosen.indexOf(i), swatch = element("span", { class: "swatch", "aria-hidden": "true" });
-      if (place >= 0) swatch.style.color = `var(--t${place % COLOURS})`;
-      return element("button", {
-        type: "button", "aria-pressed": String(place >= 0), "data-line": i, onclick: () => this.toggle(i),
-        title: place >= 0 ? "Leave this line out" : "Track this line",
-      }, ...(place >= 0 ? [swatch] : []), `${hertz(f)} Hz`);
-    }));
+    this.chips.replaceChildren(
+      ...this.lines.map((f, i) => {
+        const place = this.chosen.indexOf(i),
+          swatch = element("span", { class: "swatch", "aria-hidden": "true" });
+        if (place >= 0) swatch.style.color = `var(--t${place % COLOURS})`;
+        return element(
+          "button",
+          {
+            type: "button",
+            "aria-pressed": String(place >= 0),
+            "data-line": i,
+            onclick: () => this.toggle(i),
+            title: place >= 0 ? "Leave this line out" : "Track this line",
+          },
+          ...(place >= 0 ? [swatch] : []),
+          `${hertz(f)} Hz`,
+        );
+      }),
+    );
   }
 
   toggle(i) {
@@ -45,48 +60,82 @@ export class Tracking {
 
   build() {
     this.made?.destroy();
-    const deg = this.what === "phase", byPlace = this.over === "position";
+    const deg = this.what === "phase",
+      byPlace = this.over === "position";
     const range = steady(deg ? { step: 15, least: 30 } : { step: 2, least: 4 });
-    const series = [{ label: "x" }], bands = [];
+    const series = [{ label: "x" }],
+      bands = [];
     this.chosen.forEach((line, i) => {
-      const first = series.length, ink = () => colour(`t${i % COLOURS}`);
+      const first = series.length,
+        ink = () => colour(`t${i % COLOURS}`);
       const points = { show: byPlace, size: 4, width: 0, fill: ink };
       const paths = byPlace ? () => null : undefined;
       series.push({ label: `${hertz(this.lines[line])} Hz`, stroke: ink, width: 1.7, points, paths });
       if (byPlace) return;
-      for (const edge of ["high", "low"]) series.push({ label: edge, stroke: () => "transparent", width: 0, points: { show: false } });
+      for (const edge of ["high", "low"])
+        series.push({ label: edge, stroke: () => "transparent", width: 0, points: { show: false } });
       bands.push({ series: [first + 1, first + 2], fill: () => `${ink()}2e` });
     });
-    const label = byPlace ? `${this.schedule.name}${this.schedule.unit ? ` in ${this.schedule.unit}` : ""}` : "time in s";
-    this.made = chart(this.host, {
-      scales: { x: { time: false, range: (_u, low, high) => this.sight(low, high) }, y: { range: () => range(...this.reach()) } },
-      axes: [axis(label, { size: 28, values: (_u, s) => s.map((v) => Number(v.toFixed(6)).toString().replace("-", "−")) }), axis(deg ? "phase in °" : "magnitude in dB", { size: 46, values: (_u, s) => s.map((v) => String(v).replace("-", "−")) })],
-      series, bands,
-      cursor: { drag: { x: false, y: false }, y: false, points: { show: !byPlace, size: 6 } },
-      hooks: { draw: [(u) => this.mark(u)], ready: [(u) => u.over.addEventListener("click", () => this.click(u))] },
-    }, series.map(() => []));
+    const label = byPlace
+      ? `${this.schedule.name}${this.schedule.unit ? ` in ${this.schedule.unit}` : ""}`
+      : "time in s";
+    this.made = chart(
+      this.host,
+      {
+        scales: {
+          x: { time: false, range: (_u, low, high) => this.sight(low, high) },
+          y: { range: () => range(...this.reach()) },
+        },
+        axes: [
+          axis(label, { size: 28, values: (_u, s) => s.map((v) => Number(v.toFixed(6)).toString().replace("-", "−")) }),
+          axis(deg ? "phase in °" : "magnitude in dB", {
+            size: 46,
+            values: (_u, s) => s.map((v) => String(v).replace("-", "−")),
+          }),
+        ],
+        series,
+        bands,
+        cursor: { drag: { x: false, y: false }, y: false, points: { show: !byPlace, size: 6 } },
+        hooks: { draw: [(u) => this.mark(u)], ready: [(u) => u.over.addEventListener("click", () => this.click(u))] },
+      },
+      series.map(() => []),
+    );
   }
 
   sight(low, high) {
-    if (this.over === "position") return low === null ? [0, 1] : high > low ? [low - 0.02 * (high - low), high + 0.02 * (high - low)] : [low - 1, high + 1];
-    return Number.isFinite(this.fromS) && this.toS > this.fromS ? [this.fromS - this.origin, this.toS - this.origin] : [0, 1];
+    if (this.over === "position")
+      return low === null
+        ? [0, 1]
+        : high > low
+          ? [low - 0.02 * (high - low), high + 0.02 * (high - low)]
+          : [low - 1, high + 1];
+    return Number.isFinite(this.fromS) && this.toS > this.fromS
+      ? [this.fromS - this.origin, this.toS - this.origin]
+      : [0, 1];
   }
 
   reach() {
-    let low = Infinity, high = -Infinity;
+    let low = Infinity,
+      high = -Infinity;
     const stride = this.over === "position" ? 1 : 3;
     for (let s = 1; s < this.made.data.length; s += stride)
-      for (const v of this.made.data[s]) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+      for (const v of this.made.data[s])
+        if (Number.isFinite(v)) {
+          low = Math.min(low, v);
+          high = Math.max(high, v);
+        }
     return [low, high];
   }
 
   // The rows between two times; `rows` is a ring or a frame of history.
   draw(rows, fromS, toS) {
     Object.assign(this, { rows, fromS, toS, origin: originOf(fromS) });
-    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i))
-      .filter((r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS);
+    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter(
+      (r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS,
+    );
     const byPlace = this.over === "position";
-    const x = [], at = [];
+    const x = [],
+      at = [];
     if (byPlace) {
       for (const r of order) if (Number.isFinite(rows.schedule[r])) at.push(r);
       at.sort((a, b) => rows.schedule[a] - rows.schedule[b]);
@@ -95,17 +144,28 @@ export class Tracking {
       const usual = order.length > 1 ? (rows.timeS[order.at(-1)] - rows.timeS[order[0]]) / order.length : 0;
       order.forEach((r, i) => {
         // A break in the record is a break in the curve.
-        if (i && rows.timeS[r] - rows.timeS[order[i - 1]] > Math.max(GAP_S, 5 * usual)) { x.push(rows.timeS[r] - this.origin - 1e-3); at.push(-1); }
-        x.push(rows.timeS[r] - this.origin); at.push(r);
+        if (i && rows.timeS[r] - rows.timeS[order[i - 1]] > Math.max(GAP_S, 5 * usual)) {
+          x.push(rows.timeS[r] - this.origin - 1e-3);
+          at.push(-1);
+        }
+        x.push(rows.timeS[r] - this.origin);
+        at.push(r);
       });
     }
-    const data = [x], deg = this.what === "phase";
+    const data = [x],
+      deg = this.what === "phase";
     for (const line of this.chosen) {
       const cell = (r) => r * rows.columns + line;
-      const value = (of) => at.map((r) => { const v = r < 0 ? NaN : of(cell(r)); return Number.isNaN(v) ? null : v; });
+      const value = (of) =>
+        at.map((r) => {
+          const v = r < 0 ? NaN : of(cell(r));
+          return Number.isNaN(v) ? null : v;
+        });
       data.push(value((c) => (deg ? rows.phase[c] : rows.magnitude[c])));
       if (byPlace) continue;
-      data.push(value((c) => (deg ? rows.phase[c] + halfDeg(rows.reach[c]) : highDb(rows.magnitude[c], rows.reach[c]))));
+      data.push(
+        value((c) => (deg ? rows.phase[c] + halfDeg(rows.reach[c]) : highDb(rows.magnitude[c], rows.reach[c]))),
+      );
       data.push(value((c) => (deg ? rows.phase[c] - halfDeg(rows.reach[c]) : lowDb(rows.magnitude[c], rows.reach[c]))));
     }
     this.made.setData(data);
@@ -113,14 +173,24 @@ export class Tracking {
 
   mark(u) {
     if (this.over === "position" || !Number.isFinite(this.marked)) return;
-    const x = u.valToPos(this.marked - this.origin, "x", true), { ctx, bbox } = u;
+    const x = u.valToPos(this.marked - this.origin, "x", true),
+      { ctx, bbox } = u;
     if (x < bbox.left || x > bbox.left + bbox.width) return;
     ctx.save();
-    ctx.strokeStyle = colour("ink"); ctx.fillStyle = colour("ink"); ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+    ctx.strokeStyle = colour("ink");
+    ctx.fillStyle = colour("ink");
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
     ctx.textAlign = "left";
     ctx.font = `${11 * devicePixelRatio}px system-ui`;
-    ctx.fillText(moment(this.marked), Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 60 * devicePixelRatio), bbox.top + 12 * devicePixelRatio);
+    ctx.fillText(
+      moment(this.marked),
+      Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 60 * devicePixelRatio),
+      bbox.top + 12 * devicePixelRatio,
+    );
     ctx.restore();
   }
 

@@ -2,9 +2,10 @@
 export function plain(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-  const text = Math.abs(value) >= 1e6 || (value !== 0 && Math.abs(value) < 1e-3)
-    ? Number(value.toPrecision(digits)).toExponential().replace("e+", "e")
-    : Number(value.toPrecision(digits)).toString();
+  const text =
+    Math.abs(value) >= 1e6 || (value !== 0 && Math.abs(value) < 1e-3)
+      ? Number(value.toPrecision(digits)).toExponential().replace("e+", "e")
+      : Number(value.toPrecision(digits)).toString();
   return text.replace("-", "−");
 }
 
@@ -23,8 +24,10 @@ export function moment(timeS) {
   if (!Number.isFinite(timeS)) return "–";
   if (Math.abs(timeS) > 1e8) return new Date(timeS * 1000).toISOString().slice(0, 19).replace("T", " ");
   if (Math.abs(timeS) < 120) return `${timeS.toFixed(2).replace("-", "−")} s`;
-  const sign = timeS < 0 ? "−" : "", whole = Math.floor(Math.abs(timeS));
-  const two = (n) => String(n).padStart(2, "0"), hours = Math.floor(whole / 3600);
+  const sign = timeS < 0 ? "−" : "",
+    whole = Math.floor(Math.abs(timeS));
+  const two = (n) => String(n).padStart(2, "0"),
+    hours = Math.floor(whole / 3600);
   return `${sign}${hours ? `${hours}:` : ""}${hours ? two(Math.floor(whole / 60) % 60) : Math.floor(whole / 60)}:${two(whole % 60)}`;
 }
 

@@ -1,0 +1,96 @@
+// The past on the page: what was before it came, moments of the record, and what of it is tracked and mapped.
+import { framesOf } from "./frames.js";
+import { ask } from "./link.js";
+
+const WHOLE_MS = 4000,
+  ROWS = 1000;
+
+export function past(page, { bode, tracking, map, timeline, link }, { complain, status }) {
+  // What happened before this page came: the recent past at first, the whole run when it is asked for.
+  async function fill() {
+    const { span } = timeline,
+      whole = page.spanS === "whole",
+      half = Number(page.spanS) / 2;
+    if (!page.facts?.begun || !Number.isFinite(span.last_s)) {
+      setTimeout(fill, 300);
+      return;
+    }
+    const end = timeline.atS === null ? span.last_s : whole ? span.last_s : Math.min(span.last_s, timeline.atS + half);
+    const from = whole ? span.first_s : Math.max(span.first_s, end - Number(page.spanS));
+    const asked = `${page.key} ${from} ${end}`;
+    page.asked = asked;
+    try {
+      const [frame] = framesOf(
+        await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows: ROWS }),
+      );
+      if (page.asked !== asked) return;
+      page.past = { frame, from, to: end };
+      if (!whole && timeline.atS === null) page.rows = page.rows.behind(frame);
+    } catch (error) {
+      complain(error.message);
+    }
+    page.dirty.add("rows");
+  }
+
+  async function showMoment(timeS) {
+    link.wish({ kind: "pause" }, "pause");
+    status();
+    tracking.marked = timeS;
+    if (page.seeking) {
+      page.next = timeS;
+      return;
+    }
+    page.seeking = true;
+    try {
+      const buffer = await ask("/api/moment", { axis: page.axis, quantity: page.quantity, from: timeS, to: timeS });
+      if (timeline.atS !== null) {
+        for (const name of ["model", "baseline"]) bode.drop(name);
+        for (const frame of framesOf(buffer)) if (frame.quantity === page.quantity) bode.take(frame);
+        page.dirty.add("bode").add("trends");
+      }
+      const { past } = page;
+      if (!past || timeS < past.from || timeS > past.to || page.spanS !== "whole") await fill();
+      page.dirty.add("rows");
+    } catch (error) {
+      complain(error.message);
+    }
+    page.seeking = false;
+    if (page.next !== undefined) {
+      const next = page.next;
+      page.next = undefined;
+      if (timeline.atS !== null) showMoment(next);
+    }
+  }
+
+  function goLive() {
+    tracking.marked = NaN;
+    link.forget("pause");
+    link.wish({ kind: "resume" });
+    page.rows.clear();
+    fill();
+    status();
+  }
+
+  function drawRows(now) {
+    const { span } = timeline,
+      whole = page.spanS === "whole",
+      paused = timeline.atS !== null;
+    const end = Math.max(span.last_s, page.rows.lastS || -Infinity);
+    let rows = page.rows,
+      from = end - Number(page.spanS),
+      to = end;
+    if ((whole || paused) && page.past) {
+      rows = page.past.frame;
+      ({ from, to } = page.past);
+      if (whole && !paused && span.live && now - (page.last.whole ?? -1e9) > WHOLE_MS) {
+        page.last.whole = now;
+        fill();
+      }
+    } else if (!whole && !paused) from = Math.max(from, Math.min(span.first_s, end));
+    page.seen = [rows, from, to];
+    tracking.draw(...page.seen);
+    page.dirty.add("map");
+  }
+
+  return { fill, showMoment, goLive, drawRows };
+}
