@@ -168,6 +168,24 @@ def test_a_finger_on_a_tablet(browser: Browser, whole: Path) -> None:
         x = tab.js("bode.charts[0].valToPos(100, 'x')")
         tab.page.touchscreen.tap(box["x"] + x, box["y"] + box["height"] / 2)
         tab.until("document.querySelector('#readout th').textContent === '100 Hz'")
+        before = tab.js("bode.sight")
+        cdp = tab.context.new_cdp_session(tab.page)
+
+        def finger(kind: str, share: float) -> None:
+            at = {"x": box["x"] + share * box["width"], "y": box["y"] + 60}
+            cdp.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [] if kind == "touchEnd" else [at]})
+
+        finger("touchStart", 0.3)
+        for share in (0.4, 0.5, 0.6):
+            finger("touchMove", share)
+        wanted = [tab.js(f"bode.charts[0].posToVal({share} * {box['width']}, 'x')") for share in (0.3, 0.6)]
+        finger("touchEnd", 0.6)
+        tab.until("bode.sight !== bode.whole")
+        assert tab.js("bode.sight") == pytest.approx(wanted, rel=0.03)
+        for _ in range(2):
+            tab.page.touchscreen.tap(box["x"] + x, box["y"] + 40)
+        tab.until("bode.sight === bode.whole")
+        assert tab.js("bode.sight") == before
         tab.page.locator("#tracking").scroll_into_view_if_needed()
         tab.until("tracking.made.data[0].length > 20")
         box = tab.page.locator("#tracking .u-over").bounding_box()
@@ -213,7 +231,6 @@ def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) 
         rows = list(csv.DictReader(io.StringIO(get(tab, "this response as CSV").read_text())))
         found = np.array([float(r["magnitude [dB]"]) for r in rows])
         assert np.allclose(found, tab.numbers("bode.curves.measured.frame.magnitude"), atol=2e-5)
-        tab.page.locator("#legend [data-name=model]").click()  # it is drawn over the points
         tab.page.locator("#legend [data-name=model]").click()  # it is drawn over the points
         tab.page.wait_for_timeout(200)
         with Image.open(get(tab, "Bode plot as PNG")) as picture:

@@ -1,6 +1,7 @@
 // Magnitude, phase and coherence over logarithmic frequency: measured with its band, reference, baseline, model.
 import { axis, chart, degreeTicks, frequencyAxis, steady } from "./chart.js";
 import { NAMES, extent, moved, overGrid, turns } from "./curves.js";
+import { byFinger } from "./finger.js";
 import { colour } from "./theme.js";
 
 const FEW_LINES = 40;
@@ -85,7 +86,19 @@ export class Bode {
             },
           },
         },
-        hooks: { setCursor: [(u) => this.follow(u)], setSelect: [(u) => this.select(u)], draw: [(u) => this.mark(u)] },
+        hooks: {
+          ready: [
+            (u) =>
+              byFinger(
+                u,
+                () => this.select(u),
+                () => this.zoom(this.whole),
+              ),
+          ],
+          setCursor: [(u) => this.follow(u)],
+          setSelect: [(u) => this.select(u)],
+          draw: [(u) => this.mark(u)],
+        },
       },
       this.data(index),
     );
@@ -108,13 +121,14 @@ export class Bode {
   }
 
   limits(index) {
-    const key = ["db", "deg"][index],
-      drawn = NAMES.filter((n) => this.shown.has(n) && this.curves[n]);
-    const firm = drawn.map((n) => moved(this.curves[n][key], index ? this.curves[n].turns : 0));
-    const edges = drawn
-      .filter((n) => n !== "model")
-      .flatMap((n) => ["High", "Low"].map((e) => moved(this.curves[n][key + e], index ? this.curves[n].turns : 0)));
-    return this.ranges[index](...extent(firm, edges, index ? 10 : 3));
+    const key = ["db", "deg"][index];
+    const drawn = NAMES.filter((n) => this.shown.has(n) && this.curves[n]).map((n) => this.curves[n]);
+    const by = (curve, values) => moved(values, index ? curve.turns : 0);
+    const sure = drawn.map((curve) => by(curve, curve[`${key}Sure`]));
+    const known = sure.some((values) => values.some(Number.isFinite));
+    const edges = drawn.flatMap((curve) => [`${key}High`, `${key}Low`].map((edge) => by(curve, curve[edge])));
+    const all = drawn.map((curve) => by(curve, curve[key]));
+    return this.ranges[index](...extent(known ? sure : all, [...edges, ...all], index ? 10 : 3));
   }
 
   // A frame of a curve; drawn at the next `draw`.

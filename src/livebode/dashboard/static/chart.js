@@ -54,7 +54,7 @@ export const frequencyAxis = (lines, label) =>
   });
 
 // A range that grows at once and shrinks only after a while, so that the eye can rest.
-export function steady({ step, least, holdMs = 4000 }) {
+export function steady({ step, least, holdMs = 2500 }) {
   let kept = null,
     since = 0;
   const round = (low, high) => {

@@ -23,12 +23,13 @@ export const originOf = (firstS) => (Math.abs(firstS) >= 1e5 ? Math.floor(firstS
 export function moment(timeS) {
   if (!Number.isFinite(timeS)) return "–";
   if (Math.abs(timeS) > 1e8) return new Date(timeS * 1000).toISOString().slice(0, 19).replace("T", " ");
-  if (Math.abs(timeS) < 120) return `${timeS.toFixed(2).replace("-", "−")} s`;
   const sign = timeS < 0 ? "−" : "",
-    whole = Math.floor(Math.abs(timeS));
-  const two = (n) => String(n).padStart(2, "0"),
-    hours = Math.floor(whole / 3600);
-  return `${sign}${hours ? `${hours}:` : ""}${hours ? two(Math.floor(whole / 60) % 60) : Math.floor(whole / 60)}:${two(whole % 60)}`;
+    size = Math.abs(timeS);
+  if (size < 120) return `${sign}${size.toFixed(2)} s`;
+  const whole = Math.floor(size),
+    hours = Math.floor(whole / 3600),
+    minutes = Math.floor(whole / 60) % 60;
+  return `${sign}${hours ? `${hours} h ` : ""}${minutes} min ${whole % 60} s`;
 }
 
 // "x in m" → name and unit.

@@ -1,0 +1,23 @@
+// A finger that goes across a chart chooses a band; two taps show the whole.
+export function byFinger(u, choose, whole) {
+  let from = null,
+    tapped = -1e9;
+  const x = (event) => event.clientX - u.over.getBoundingClientRect().left;
+  u.over.addEventListener("pointerdown", (event) => {
+    if (event.pointerType === "touch") from = x(event);
+  });
+  u.over.addEventListener("pointermove", (event) => {
+    if (from === null || event.pointerType !== "touch") return;
+    const [left, width] = [Math.min(from, x(event)), Math.abs(x(event) - from)];
+    u.setSelect({ left, width, top: 0, height: u.over.clientHeight }, false);
+  });
+  u.over.addEventListener("pointercancel", () => (from = null));
+  u.over.addEventListener("pointerup", (event) => {
+    if (from === null || event.pointerType !== "touch") return;
+    const across = Math.abs(x(event) - from) > 24;
+    if (across) choose();
+    else if (event.timeStamp - tapped < 350) whole();
+    tapped = across ? -1e9 : event.timeStamp;
+    from = null;
+  });
+}
