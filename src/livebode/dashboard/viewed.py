@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,6 @@ from livebode.dashboard.trends import Rows
 from livebode.nouns import Responses
 from livebode.records import Run
 
-_NEWEST_BYTES = 64 << 20
-
 
 class Viewed:
     """Hands the responses, parameters and events of a run's directory to a State."""
@@ -25,6 +24,7 @@ class Viewed:
         self.directory = directory
         self._run = Run.open(directory)
         self._sample = self._parameter_sample = -1
+        self._last_s = -inf
         self._events = 0
 
     @property
@@ -37,20 +37,21 @@ class Viewed:
         state.begin(self.directory, self._run.summary)
         for part in self._run.batches():
             self._responses(state, part)
-        self._rest(state, None)
+        self._rest(state)
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, Rows]], dict[str, Any], bool]:
         """What came since: responses and events, rows of parameters, run.json, and whether the run has ended."""
         self._run = Run.open(self.directory)
-        items: list[Item] = [new for part in self._run.batches(_NEWEST_BYTES) if (new := self._new(part)) is not None]
-        rows = list(self._parameters(_NEWEST_BYTES))
+        behind_s = self._last_s, inf  # segments before that are not read again
+        items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
+        rows = list(self._parameters(behind_s))
         events = self._run.events()
         items += events[self._events :]
         self._events = len(events)
         return items, rows, self._run.summary, self._run.finished
 
-    def _rest(self, state: State, size_bytes_max: int | None) -> None:
-        for model, name, unit, rows in self._parameters(size_bytes_max):
+    def _rest(self, state: State) -> None:
+        for model, name, unit, rows in self._parameters(None):
             state.trends.add(model, name, unit, rows)
         events = self._run.events()
         state.take(list(events))
@@ -66,12 +67,12 @@ class Viewed:
         behind = np.flatnonzero(part.sample > self._sample)
         if not behind.size:
             return None
-        self._sample = int(part.sample[-1])
+        self._sample, self._last_s = int(part.sample[-1]), float(part.time_s[-1])
         return part[behind]
 
-    def _parameters(self, size_bytes_max: int | None) -> Iterator[tuple[str, str, str, Rows]]:
+    def _parameters(self, span_s: tuple[float, float] | None) -> Iterator[tuple[str, str, str, Rows]]:
         """Model, name, unit and rows of each parameter, table by table."""
-        for table in self._run.tables("parameters", size_bytes_max):
+        for table in self._run.tables("parameters", span_s=span_s):
             sample = table["sample"].to_numpy()
             new = table.filter(pa.array(sample > self._parameter_sample))
             if not new.num_rows:
