@@ -306,7 +306,7 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
         tab.page.locator("#notice", has_text="does not say what feeds back").wait_for()
         assert tab.js("page.quantity") == "plant"
         tab.page.locator("#tab-margins").click()
-        assert "describe its controllers" in tab.page.locator("#pane-margins").inner_text()
+        tab.page.locator("#pane-margins", has_text="describe its controllers").wait_for()
         assert tab.wrong == []
 
 
