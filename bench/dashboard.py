@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import tempfile
 import threading
 import time
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.browser import chromium
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.nouns import Block, Lines, Parameters, Responses
 
@@ -76,8 +76,6 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
 
 def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
     """Figures of one run."""
-    from playwright.sync_api import sync_playwright
-
     dashboard, stop, costs = Dashboard(Serving("127.0.0.1", 0)), threading.Event(), list[float]()
     hub = dashboard.hub("bench")
     found = {
@@ -85,13 +83,10 @@ def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
         "unit": "rad/s/(N m)", "schedule": "x in m",
     }  # fmt: skip
     loop = {"velocity": {"gain": 0.2, "integral_time_s": 0.2, "rate_hz": RATE_HZ}}
-    with tempfile.TemporaryDirectory() as folder, dashboard, sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as folder, dashboard, chromium() as browser:
         hub.begin(Path(folder), {"found": found, "configuration": {"loop": loop}}, None)
         worker = threading.Thread(target=publish, args=(hub, responses(lines, 64, 0), stop, costs))
         worker.start()
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox"] * (os.geteuid() == 0)
-        )
         pages = [browser.new_page(viewport={"width": 1440, "height": 900}) for _ in range(browsers)]
         for page in pages:
             page.goto(dashboard.url)
@@ -104,7 +99,6 @@ def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
         time.sleep(seconds)
         took, cpu, last = time.perf_counter() - began, dashboard.cpu_s - cpu, len(costs)
         after = [page.evaluate("() => [performance.now(), window.frames_, window.draws_]") for page in pages]
-        browser.close()
         stop.set()
         worker.join()
     rates = [[(b[i] - a[i]) / (b[0] - a[0]) * 1e3 for a, b in zip(before, after)] for i in (1, 2)]

@@ -10,11 +10,11 @@ batches to put them in order.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import multiprocessing
 import socket
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event as Flag
@@ -22,7 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.browser import chromium
 from bench.job import LINES, RATE_HZ, WINDOW, signals
+from livebode.dashboard import Dashboard, Serving
 from livebode.nouns import Block, Channel, Responses
 from livebode.session import Audience, Axis, Destination, Session
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
@@ -33,7 +35,6 @@ SECONDS = 75.0
 WAKE_S = 0.01
 TARGET_S = 0.020
 CORES = 2
-MakeAudience = Callable[[str], Audience]
 
 
 class Clock(Audience):
@@ -74,13 +75,16 @@ class Timed(Clock):
 class Scenario:
     name: str
     axes: int = 1
+    dashboard: bool = False
     record: dict[str, object] = field(default_factory=dict)
 
 
 SCENARIOS = (
     Scenario("one axis"),
+    Scenario("one axis, the dashboard open", dashboard=True),
     Scenario("one axis, samples kept, a segment closed every 2 s", record={"samples": True, "segment_s": 2.0}),
     Scenario("16 axes", axes=16),
+    Scenario("16 axes, the dashboard open", axes=16, dashboard=True),
     Scenario(
         "16 axes, samples kept, a segment closed every 10 s", axes=16, record={"samples": True, "segment_s": 10.0}
     ),
@@ -132,13 +136,34 @@ def wake(end: Flag, said: Connection) -> None:
     said.send([float(np.quantile(late_s, 0.99)), max(late_s)])
 
 
-def measure(scenario: Scenario, seconds: float, audience: MakeAudience | None = None) -> dict[str, float]:
-    """Latency, losses and processor time of a scenario; `audience` makes what looks on at each axis."""
+def look_on(url: str, end: Flag) -> None:
+    """A person's browser, at the first axis."""
+    with chromium() as browser:
+        shown = browser.new_page(viewport={"width": 1440, "height": 900})
+        shown.goto(url)
+        while not end.is_set():
+            shown.wait_for_timeout(200)
+
+
+def measure(scenario: Scenario, seconds: float) -> dict[str, float]:
+    """Latency, losses and processor time of a scenario."""
+    with contextlib.ExitStack() as served:
+        clocks: dict[str, Clock] = {f"x{i}": Clock() for i in range(scenario.axes)}
+        url = None
+        if scenario.dashboard:
+            dashboard = Dashboard(Serving("127.0.0.1", 0))
+            clocks = {name: Timed(dashboard.hub(name)) for name in clocks}
+            url = served.enter_context(dashboard).url
+        return _measured(scenario, seconds, clocks, url)
+
+
+def _measured(scenario: Scenario, seconds: float, clocks: dict[str, Clock], url: str | None) -> dict[str, float]:
     context = multiprocessing.get_context("spawn")
     ports, end = _free_ports(scenario.axes), context.Event()
     said, say = context.Pipe(duplex=False)
     beside = [context.Process(target=send, args=(ports, end)), context.Process(target=wake, args=(end, say))]
-    clocks = {f"x{i}": Clock() if audience is None else Timed(audience(f"x{i}")) for i in range(scenario.axes)}
+    if url is not None:
+        beside.append(context.Process(target=look_on, args=(url, end)))
     with tempfile.TemporaryDirectory() as folder:
         session = Session(
             {name: axis(port, scenario) for name, port in zip(clocks, ports)},
