@@ -10,21 +10,13 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import margins_in_short
+from livebode.margins.words import WORDS
 from livebode.records import to_json
 from livebode.session import Axis
 
 if TYPE_CHECKING:
     from livebode.margins import Margins, Proposal, Tuning
     from livebode.session.loop_report import LoopReport
-
-_WORDS = {
-    "gain_margin": "gain may rise by",
-    "gain_reduction": "gain may fall by",
-    "phase_margin": "phase margin",
-    "delay_margin": "delay margin",
-    "peak_sensitivity": "peak sensitivity Ms",
-    "bandwidth": "bandwidth",
-}
 
 
 def margins_command(
@@ -78,11 +70,11 @@ def _show_margins(margins: Margins) -> None:
     for i, (name, unit) in enumerate(zip(margins.names, margins.units)):
         value, f = margins.value[0, i], margins.frequency_hz[0, i]
         if np.isnan(f):
-            print(f"  {_WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
+            print(f"  {WORDS[name]:22}{'any amount' if np.isinf(value) else 'none':>16}   (no crossing)")
             continue
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
         known = "" if bound[i] < abs(value) else ", not known"
-        print(f"  {_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
+        print(f"  {WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
     print("  ± holds 95 % of what noise does to the fit; where EXTRAPOLATED, no line checks the model")
 
 

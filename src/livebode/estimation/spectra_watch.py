@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Event, InputError, Spectra
+from livebode.estimation.counted import Counted
+from livebode.nouns import InputError, Spectra
 
 _KINDS = {
     "not-whole": "a window is not whole (the drive says so, or its sums are not finite)",
@@ -14,31 +15,12 @@ _KINDS = {
 }
 
 
-class SpectraWatch:
+class SpectraWatch(Counted):
     """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
 
     def __init__(self, window: int) -> None:
+        super().__init__(_KINDS, -(1 << 62), also=("spectra",))
         self._window = window
-        self._next = -1
-        self._last = dict.fromkeys(_KINDS, -(1 << 62))
-        self.counts = {"samples": 0, "gaps": 0, "missing": 0, "spectra": 0} | dict.fromkeys(_KINDS, 0)
-        self._events: list[Event] = []
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {
-            "next": np.array([self._next]),
-            "last": np.array(list(self._last.values())),
-            "counts": np.array(list(self.counts.values())),
-        }
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._next = int(state["next"][0])
-        self._last = dict(zip(_KINDS, (int(n) for n in state["last"])))
-        self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
-
-    def drain(self) -> list[Event]:
-        events, self._events = self._events, []
-        return events
 
     def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
         """Count these, of each kind those that are `marked`; InputError where they do not follow the ones before."""
@@ -53,7 +35,9 @@ class SpectraWatch:
             self.counts["gaps"] += 1
             self.counts["missing"] += missing
             many = f"spectra of {missing} samples are" if missing else "an unknown number of spectra is"
-            self._say("gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing)
+            self._tell(
+                "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
+            )
         if first:
             # A stream that begins with the drive is not whole at first, which is nothing to tell.
             self._last["not-whole"] = int(block.sample[0]) - block.layout.hop
@@ -67,7 +51,7 @@ class SpectraWatch:
             self.counts[kind] += sample.size
             self._last[kind] = int(sample[-1]) if sample.size else self._last[kind]
         for number, kind in sorted(begins):
-            self._say(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
+            self._tell(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
 
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples that these windows hold and those before did not; `new` since the window before."""
@@ -75,6 +59,3 @@ class SpectraWatch:
             new = self._window
         self.counts["samples"] += min(new, self._window) + (len(block) - 1) * min(block.layout.hop, self._window)
         self.counts["spectra"] += len(block)
-
-    def _say(self, kind: str, block: Spectra, sample: int, message: str, **details: int) -> None:
-        self._events.append(Event(kind, sample, block.origin_s + sample / block.rate_hz, message, dict(details)))

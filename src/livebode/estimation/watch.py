@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
-from livebode.nouns import Block, Event, InputError
+from livebode.nouns import Block, InputError
 
 _KINDS = {
     "non-finite": "a sample is not finite",
@@ -15,31 +15,12 @@ _KINDS = {
 }
 
 
-class Watch:
+class Watch(Counted):
     """Counts and Events of a stream of Blocks."""
 
     def __init__(self, window: int) -> None:
+        super().__init__(_KINDS, -window)
         self._window = window
-        self._next = -1
-        self._last = dict.fromkeys(_KINDS, -window)
-        self.counts = {"samples": 0, "gaps": 0, "missing": 0} | dict.fromkeys(_KINDS, 0)
-        self._events: list[Event] = []
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {
-            "next": np.array([self._next]),
-            "last": np.array(list(self._last.values())),
-            "counts": np.array(list(self.counts.values())),
-        }
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._next = int(state["next"][0])
-        self._last = dict(zip(_KINDS, (int(n) for n in state["last"])))
-        self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
-
-    def drain(self) -> list[Event]:
-        events, self._events = self._events, []
-        return events
 
     def starts(self, block: Block) -> bool:
         """Whether this block does not follow the samples before it; says so where something is missing."""
@@ -76,6 +57,5 @@ class Watch:
             self._say(kind, block, sample, _KINDS[kind])
 
     def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
-        time_s = block.origin_s + sample / block.rate_hz
         message = f"{what}; responses are invalid until a window of {self._window} samples is whole again"
-        self._events.append(Event(kind, sample, time_s, message, dict(details)))
+        self._tell(kind, block, sample, message, **details)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from livebode.margins.words import WORDS
 from livebode.nouns.document import Listing, Paragraph, Part, Picture, Section, Table
 from livebode.session.reporting.material import Material, by_schedule
 from livebode.session.reporting.parameter_track import MARGINS, Track
@@ -22,14 +23,6 @@ from livebode.session.reporting.wording import (
     with_bound,
 )
 
-_MARGINS = {
-    "gain_margin": "gain may rise by",
-    "gain_reduction": "gain may fall by",
-    "phase_margin": "phase margin",
-    "delay_margin": "delay margin",
-    "peak_sensitivity": "peak sensitivity Ms",
-    "bandwidth": "bandwidth",
-}
 _LINES_SHOWN = 60
 _PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses that these can show
 _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and as many responses as these can show
@@ -126,10 +119,10 @@ def margins(of: Material) -> Section | str:
     for i, (name, unit) in enumerate(zip(found.names, found.units)):
         value, at = found.value[0, i], found.frequency_hz[0, i]
         if isnan(at):
-            rows.append((_MARGINS[name], "any amount" if isinf(value) else "none", "", unit, "", "no crossing"))
+            rows.append((WORDS[name], "any amount" if isinf(value) else "none", "", unit, "", "no crossing"))
             continue
         mark = "between the lines" if found.place[0, i] == "interpolated" else "EXTRAPOLATED: no line checks it"
-        rows.append((_MARGINS[name], *with_bound(value, bound[i]), unit, f"{at:.4g}", mark))
+        rows.append((WORDS[name], *with_bound(value, bound[i]), unit, f"{at:.4g}", mark))
     size, around, at_hz = of.loop.at_lines
     note = f"± holds 95 % of noise. At the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
     note += f"(at {at_hz:g} Hz). Tuning {of.loop.tuning.verdict}: {of.loop.tuning.sentence}"

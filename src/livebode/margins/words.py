@@ -1,0 +1,12 @@
+"""What a person calls the margins."""
+
+from __future__ import annotations
+
+WORDS = {
+    "gain_margin": "gain may rise by",
+    "gain_reduction": "gain may fall by",
+    "phase_margin": "phase margin",
+    "delay_margin": "delay margin",
+    "peak_sensitivity": "peak sensitivity Ms",
+    "bandwidth": "bandwidth",
+}
