@@ -10,7 +10,6 @@ batches to put them in order.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import multiprocessing
 import socket
 import tempfile
@@ -26,7 +25,7 @@ from bench.browser import chromium
 from bench.job import LINES, RATE_HZ, WINDOW, signals
 from livebode.dashboard import Dashboard, Serving
 from livebode.nouns import Block, Channel, Responses
-from livebode.session import Audience, Axis, Destination, Session
+from livebode.session import Audience, Axis, Destination, Relay, Session
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
@@ -37,38 +36,23 @@ TARGET_S = 0.020
 CORES = 2
 
 
-class Clock(Audience):
-    """Takes the time of each Block that brought a response."""
+class Clock(Relay):
+    """Takes the time of each Block that brought a response, the audience's own work with it."""
 
-    def __init__(self) -> None:
+    def __init__(self, audience: Audience) -> None:
+        super().__init__(audience)
         self.latency_s: list[float] = []
         self._new = 0
 
     def write(self, responses: Responses) -> None:
+        super().write(responses)
         self._new += len(responses)
 
     def followed(self, block: Block) -> None:
+        super().followed(block)
         if self._new and isinstance(block, LiveBlock) and block.start >= RATE_HZ:
             self.latency_s.append(time.monotonic() - block.arrived_s)
         self._new = 0
-
-
-class Timed(Clock):
-    """The same around another audience, whose work counts."""
-
-    def __init__(self, inner: Audience) -> None:
-        super().__init__()
-        self._inner = inner
-        for name in ("begin", "write_parameters", "write_event", "drain_events", "finish"):
-            setattr(self, name, getattr(inner, name))
-
-    def write(self, responses: Responses) -> None:
-        self._inner.write(responses)
-        super().write(responses)
-
-    def followed(self, block: Block) -> None:
-        self._inner.followed(block)
-        super().followed(block)
 
 
 @dataclass(frozen=True)
@@ -147,14 +131,13 @@ def look_on(url: str, end: Flag) -> None:
 
 def measure(scenario: Scenario, seconds: float) -> dict[str, float]:
     """Latency, losses and processor time of a scenario."""
-    with contextlib.ExitStack() as served:
-        clocks: dict[str, Clock] = {f"x{i}": Clock() for i in range(scenario.axes)}
-        url = None
-        if scenario.dashboard:
-            dashboard = Dashboard(Serving("127.0.0.1", 0))
-            clocks = {name: Timed(dashboard.hub(name)) for name in clocks}
-            url = served.enter_context(dashboard).url
-        return _measured(scenario, seconds, clocks, url)
+    names = [f"x{i}" for i in range(scenario.axes)]
+    if not scenario.dashboard:
+        return _measured(scenario, seconds, {name: Clock(Audience()) for name in names}, None)
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    clocks = {name: Clock(dashboard.hub(name)) for name in names}
+    with dashboard:
+        return _measured(scenario, seconds, clocks, dashboard.url)
 
 
 def _measured(scenario: Scenario, seconds: float, clocks: dict[str, Clock], url: str | None) -> dict[str, float]:

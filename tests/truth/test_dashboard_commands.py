@@ -68,6 +68,13 @@ def test_the_demo_is_shown_while_it_goes_on_and_behind_it(tmp_path: Path) -> Non
     assert "stiffness than before" in (tmp_path / "log.txt").read_text()
 
 
+def test_the_demo_is_shown_unasked_and_ends_by_itself(tmp_path: Path) -> None:
+    with started(tmp_path, "demo", "--seconds", 8, "--out", tmp_path / "demo") as (process, url):
+        assert b"livebode" in urllib.request.urlopen(url).read()
+        assert process.wait(60) == 0
+    assert "stiffness than before" in (tmp_path / "log.txt").read_text()
+
+
 def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
     log = write_parquet(tmp_path / "log.parquet", signals(20_000))
     arguments = [
@@ -87,6 +94,7 @@ def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
     out = tmp_path / "run"
     with started(tmp_path, *arguments, "--serve", "--port", 0, "--out", out) as (_, url):
         until(lambda: (out / "run.json").is_file(), "the end of the run")
+        until(lambda: "until Ctrl-C" in (tmp_path / "log.txt").read_text(), "the end of what it prints")
         until(lambda: b"livebode" in urllib.request.urlopen(url).read(), "the page")
     assert "serve" not in json.loads((out / "run.json").read_text())["configuration"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
 from livebode.nouns import Responses
 from livebode.records import to_json
-from livebode.session import Audience
+from livebode.session import Relay
 from livebode.session.axis import ServeSection
 
 
@@ -37,12 +38,15 @@ def demo_command(
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
-    with served(serve, ServeSection(), port, ["demo"], stays=True) as audience_of:
+    # Whoever tries it is shown the page while the machine works; the port that others expect is left to them.
+    shown = serve or (not fast and find_spec("uvicorn") is not None)
+    with served(shown, ServeSection() if serve else ServeSection(port=0), port, ["demo"], stays=serve) as audience_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
             task = bar.add_task("", total=seconds)
 
-            class Numbers(Audience):
+            class Numbers(Relay):
                 def write(self, responses: Responses) -> None:
+                    super().write(responses)
                     bar.update(task, description=_numbers(responses))
 
             def progress(done: int, total: int | None) -> None:
@@ -54,7 +58,7 @@ def demo_command(
                 seed=seed,
                 real_time=not fast,
                 progress=progress,
-                audience=audience_of("demo") if serve else Numbers(),
+                audience=Numbers(audience_of("demo")),
                 draw=drawing("simulated belt axis", ("u", "velocity")),
             )
         if as_json:

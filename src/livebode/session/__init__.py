@@ -1,6 +1,6 @@
 """From a source to the record: what one run of livebode does."""
 
-from livebode.session.audience import Audience
+from livebode.session.audience import Audience, Relay
 from livebode.session.axis import Axis
 from livebode.session.configuration import Axes, ConfigurationFile
 from livebode.session.destination import Destination, Draw
@@ -19,6 +19,7 @@ __all__ = [
     "Draw",
     "Orders",
     "Outcome",
+    "Relay",
     "Session",
     "StoppedError",
     "run",

@@ -47,6 +47,34 @@ class Audience:
         """The run has ended: run.json as it ends."""
 
 
+class Relay(Audience):
+    """Passes everything on to another audience; a subclass looks at what goes by."""
+
+    def __init__(self, audience: Audience) -> None:
+        self._audience = audience
+
+    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
+        self._audience.begin(directory, summary, health)
+
+    def write(self, responses: Responses) -> None:
+        self._audience.write(responses)
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        self._audience.write_parameters(*parts)
+
+    def write_event(self, event: Event) -> None:
+        self._audience.write_event(event)
+
+    def drain_events(self) -> list[Event]:
+        return self._audience.drain_events()
+
+    def followed(self, block: Block) -> None:
+        self._audience.followed(block)
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self._audience.finish(summary)
+
+
 class Outlet:
     """Where a run puts what comes of its samples: into the record first, then before the audience."""
 

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Block, Event, Parameters, Responses
-from livebode.session.audience import Audience
+from livebode.nouns import Block, Event, Responses
+from livebode.session.audience import Audience, Relay
 from livebode.sources.live import Health, LiveBlock
 
 _LATENCY_OVER_S = 2.0
 
 
-class Status(Audience):
+class Status(Relay):
     """Keeps what a line about the axis needs, and passes everything on to the audience proper.
 
     Attributes
@@ -34,7 +34,7 @@ class Status(Audience):
     """
 
     def __init__(self, audience: Audience) -> None:
-        self._audience = audience
+        super().__init__(audience)
         self.state = "waiting"
         self.directory: Path | None = None
         self.samples = self.responses = 0
@@ -52,21 +52,15 @@ class Status(Audience):
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         self.state, self.directory, self.health = "tracking", directory, health
-        self._audience.begin(directory, summary, health)
+        super().begin(directory, summary, health)
 
     def write(self, responses: Responses) -> None:
         self.responses += len(responses)
-        self._audience.write(responses)
-
-    def write_parameters(self, *parts: Parameters) -> None:
-        self._audience.write_parameters(*parts)
+        super().write(responses)
 
     def write_event(self, event: Event) -> None:
         self.event = event
-        self._audience.write_event(event)
-
-    def drain_events(self) -> list[Event]:
-        return self._audience.drain_events()
+        super().write_event(event)
 
     def followed(self, block: Block) -> None:
         self.samples += len(block)
@@ -76,7 +70,4 @@ class Status(Audience):
             if now - self._since_s > _LATENCY_OVER_S:
                 self._since_s, self._latest = now, (0.0, self._latest[0])
             self._latest = (max(self._latest[0], now - block.arrived_s), self._latest[1])
-        self._audience.followed(block)
-
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        self._audience.finish(summary)
+        super().followed(block)
