@@ -72,7 +72,8 @@ def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
     missing = np.setdiff1d(np.arange(4000), number)
     lost = resumed.details["lost"]["samples"]
     assert lost == {"rows": missing.size, "first_sample": missing[0], "last_sample": missing[-1]}
-    assert 0 < missing.size < 2200
+    # 22 seconds less what memory holds; and what was not synced yet at the pause waits with them: at most the 6 before.
+    assert 0 < missing.size < 2800
     assert paused.sample == 600
     assert [e.sample for e in run.events() if e.kind == "mark"] == list(range(0, 4000, 100))
 
