@@ -13,6 +13,7 @@ import pytest
 from livebode.estimation import Settings, Tracker
 from livebode.nouns import Lines, Responses
 from livebode.records import Run
+from tests.command import livebode
 from tests.peers.machine import Machine
 from tests.peers.peer import until
 from tests.recorded import same
@@ -111,6 +112,35 @@ def test_what_cannot_be_applied_is_refused_once_and_nothing_stops(
     assert err.count(says) == 1
     number = numbers(running.out / "x")
     assert np.array_equal(number, np.arange(number.size))
+
+
+def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
+    silent = '[axes.z.source]\nurl = "tcp://127.0.0.1:1"\ntimeout_s = 3600\n'
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine) + silent) as running:
+        running.tracked("x", 300)
+        running.edit(one(machine) + silent.replace("3600", "1800"))
+        assert "axis z: it has sent no samples yet" in running.told("x", "configuration-refused").message
+        running.edit(one(machine) + FIT + silent)
+        running.tracked("x-2", 300)
+        running.edit(one(machine) + FIT)
+        running.tracked("x-2", 1500)
+        code, out, err = running.end()
+    assert code == 0, err
+    assert "z: the axis was taken out, and ends" in err
+    assert json.loads(out)["axes"]["x"]["counts"]["samples"]
+
+
+def test_a_live_run_with_a_loop_is_reported(tmp_path: Path) -> None:
+    loop = "[loop.velocity]\ngain = 0.01\nrate_hz = 1000\n"
+    text = SHARED.replace("hop = 20", "hop = 20\naverage = true") + loop
+    with Machine(tmp_path) as machine, Running(tmp_path, text + f"[axes.x]\n{source(machine)}") as running:
+        running.tracked("x", 800)
+        assert running.end()[0] == 0
+    result = livebode("report", running.out / "x")
+    assert result.code == 0, result.err
+    page = (running.out / "x" / "report.html").read_text()
+    for words in ("excitation at the plant input", "forgetting 0.8", "joint"):
+        assert words in page, words
 
 
 def test_axes_come_and_go(tmp_path: Path) -> None:

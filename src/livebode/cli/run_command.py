@@ -185,7 +185,7 @@ def _run_axes(
     for thread in session.all:
         if thread.outcome is not None and not as_json:
             print(f"{thread.name}: {counted(thread.outcome.summary)}\n{thread.outcome.directory}/")
-    errors = [thread.error for thread in session.all if thread.error is not None]
+    errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(2 if all(isinstance(error, (InputError, StoppedError)) for error in errors) else 1)
 

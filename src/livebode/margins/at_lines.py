@@ -41,7 +41,8 @@ def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) 
     """
     f = responses.lines.frequency_hz
     behind = loop.feedback_at(f)
-    sensitivity = 1 / (1 + responses.value * behind)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of lines that are not valid
+        sensitivity = 1 / (1 + responses.value * behind)
     size = np.where(responses.valid, np.abs(sensitivity), -np.inf)
     at = np.argmax(size, axis=1)
     row = np.arange(len(size))

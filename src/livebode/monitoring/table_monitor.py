@@ -115,6 +115,9 @@ class TableMonitor:
         sigma = np.where(seen, np.hypot(1 / np.sqrt(np.where(seen, information, 1.0)), accuracy.scatter), np.inf)
         told = (np.abs(amount) >= np.maximum(_TOLD * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
         self._standing, self._found = told, -1
+        if not told.any():  # what had raised it sank again while the window of looking went by
+            self._forget()
+            return []
         moment = self._moment[first:]
         self._seen_in[:] = False
         self._seen_in[moment[:, 3].astype(int)] = True

@@ -26,6 +26,8 @@ class AxisThread:
         How it is doing.
     outcome, error
         What it came to; of both one, once it has ended.
+    ended_early
+        Whether it was told to end before it had anything to leave.
     """
 
     def __init__(self, name: str, axis: Axis, to: Destination, status: Status) -> None:
@@ -33,6 +35,7 @@ class AxisThread:
         self.orders = Orders()
         self.outcome: Outcome | None = None
         self.error: Exception | None = None
+        self.ended_early = False
         self._to = to
         # Not to be waited for at the end of the process: what is recorded is safe, and a second signal means at once.
         self._thread = threading.Thread(target=self._work, name=f"livebode axis {name}", daemon=True)
@@ -43,11 +46,6 @@ class AxisThread:
     @property
     def alive(self) -> bool:
         return self._thread.is_alive()
-
-    @property
-    def ended_early(self) -> bool:
-        """Whether it was told to end before it had anything to leave."""
-        return self.orders.ended and (isinstance(self.error, StoppedError) or self.status.directory is None)
 
     def end(self) -> None:
         """Tell it to end."""
@@ -68,4 +66,6 @@ class AxisThread:
             self.outcome = job(self.axis, self._to, self.orders)
         except Exception as error:  # a sentence for the user, or a fault of ours: the other axes go on
             self.error = error
-        self.status.state = "done" if self.error is None else "refused"
+            nothing = isinstance(error, StoppedError) or self.status.directory is None
+            self.ended_early = self.orders.ended and nothing
+        self.status.state = "done" if self.error is None else "ended" if self.ended_early else "refused"

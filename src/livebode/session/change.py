@@ -48,6 +48,11 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
     if old == new:
         return None
     sections = tuple(name for name in type(new).model_fields if getattr(old, name) != getattr(new, name))
+    if source is None and old.source.live:
+        raise InputError(
+            "it has sent no samples yet, against which its new configuration could be checked; wait for them and save "
+            "the file again, or take the axis out"
+        )
     if source is None:
         raise InputError("a recording is tracked as it was begun; end livebode and start it again")
     if "source" in sections:

@@ -78,7 +78,9 @@ class _Succession:
         axis = pipeline.axis
         assert axis is not None
         about = {
-            "configuration": axis.model_dump(mode="json", exclude_defaults=True, exclude={"serve"}),
+            # Of a source's keys most are another's.
+            "configuration": axis.model_dump(mode="json", exclude={"serve", "source"})
+            | {"source": axis.source.model_dump(mode="json", exclude_defaults=True)},
             "found": {"format": self._source.format, "rate_from": "the sender"},
         }
         return Tracking(

@@ -97,9 +97,6 @@ class Session:
         return self.threads[name]
 
     def _look_at(self, file: ConfigurationFile, asked: bool) -> None:
-        running = [thread for thread in self.threads.values() if thread.alive]
-        if any(thread.axis.source.live and thread.orders.source is None for thread in running):
-            return  # an axis whose channels and rate are not known yet cannot be checked against another configuration
         if not file.changed() and not asked:
             return
         self._reload_asked.clear()

@@ -20,7 +20,7 @@ class Status(Relay):
     Attributes
     ----------
     state
-        "waiting", "tracking", "finishing", "done" or "refused".
+        "waiting", "tracking", "finishing", "done", "refused", or "ended" before it had anything to leave.
     directory
         Where its newest run is recorded.
     samples, responses
