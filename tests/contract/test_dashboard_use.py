@@ -15,11 +15,13 @@ from PIL import Image
 from playwright.sync_api import Browser
 from scipy.io import loadmat
 
-from livebode.dashboard import Dashboard, Serving
-from livebode.nouns import Event
+from examples.closed_loop import RATE_HZ
+from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.nouns import Event, Lines
 from livebode.records import Run
 from tests.browser import TABLET, Tab, chromium, until
-from tests.dashboards import LINES, Watched
+from tests.dashboards import LINES, LOOP, Watched
+from tests.responses import made
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +93,34 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         tab.until("timeline.atS === null && bode.curves.measured.frame.timeS[0] > 2.3")
         page.keyboard.press("f")
         tab.until("!bode.curves.reference")
+        assert tab.wrong == []
+
+
+def begin(hub: Hub, directory: Path, lines: Lines) -> None:
+    """A run on these lines, with its first responses."""
+    found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
+    found |= {"quantity": "plant", "unit": ""}
+    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
+    hub.write(made(30, lines, hole=0.0, unit=""))
+
+
+def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_path: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.page.keyboard.press("f")
+        tab.page.keyboard.press("2")
+        tab.until("bode.curves.reference?.frame.quantity === 'open loop'")
+        begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ))
+        tab.until("bode.curves.measured?.frame.columns === 6")
+        tab.page.locator("#notice", has_text="the frozen reference was let go").wait_for()
+        assert tab.page.locator("#freeze").inner_text() == "Freeze"
+        assert not tab.page.locator("#legend [data-name=reference]").is_visible()
+        tab.page.wait_for_timeout(300)
+        assert tab.js("bode.curves.reference === undefined && page.up")
+        tab.page.keyboard.press("f")
+        tab.until("bode.curves.reference?.frame.columns === 6")
         assert tab.wrong == []
 
 

@@ -20,6 +20,8 @@ const $ = (id) => document.getElementById(id);
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
+const REFERENCE_GONE =
+  "A new run has begun with other lines or another quantity: the frozen reference was let go.";
 const LEGEND = [
   ["measured", "measured ±3σ", ""],
   ["reference", "reference", "dashed"],
@@ -105,6 +107,9 @@ function begin({ facts, axes, trends }) {
     $("status-text").textContent = `${facts.name}: waiting for the first samples`;
     return;
   }
+  const measured = JSON.stringify([facts.frequency_hz, facts.quantity]);
+  const other = page.axis === facts.axis && page.measured !== measured;
+  page.measured = measured;
   const fits = facts.quantities.find((q) => q.name === page.quantity && !q.why_not);
   const key = JSON.stringify([facts.axis, facts.frequency_hz, fits ? page.quantity : facts.quantity]);
   page.quantity = fits ? page.quantity : facts.quantity;
@@ -126,11 +131,14 @@ function begin({ facts, axes, trends }) {
     map.begin(facts, page.schedule);
     fill();
   }
+  const gone = other && page.frozen;
+  if (gone) letGo();
   legend();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   events.begin(facts.axis, facts.role === "operator" && facts.live);
-  if (facts.remark) complain(facts.remark);
+  const remarks = [gone ? REFERENCE_GONE : "", facts.remark].filter(Boolean);
+  if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
   if (facts.watched !== page.quantity) say();
 }
@@ -195,22 +203,28 @@ function legend() {
 }
 
 function freeze() {
-  page.frozen = !page.frozen;
   if (page.frozen) {
-    const timeS = bode.curves.measured?.frame.timeS[0];
-    if (timeS === undefined) {
-      page.frozen = false;
-      return;
-    }
-    link.wish({ kind: "freeze", time_s: timeS }, "freeze");
-  } else {
-    link.forget("freeze");
-    link.wish({ kind: "unfreeze" });
-    bode.drop("reference");
-    page.dirty.add("bode");
+    letGo();
+    return;
   }
-  $("freeze").textContent = page.frozen ? "Unfreeze" : "Freeze";
-  $("freeze").classList.toggle("primary", page.frozen);
+  const timeS = bode.curves.measured?.frame.timeS[0];
+  if (timeS === undefined) return;
+  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
+  frozen(true);
+}
+
+function letGo() {
+  link.forget("freeze");
+  link.wish({ kind: "unfreeze" });
+  bode.drop("reference");
+  page.dirty.add("bode");
+  frozen(false);
+}
+
+function frozen(is) {
+  page.frozen = is;
+  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
+  $("freeze").classList.toggle("primary", is);
   legend();
 }
 
