@@ -153,6 +153,11 @@ def test_the_whole_keyboard(browser: Browser, whole: Path) -> None:
         assert page.locator("#download-menu button").first.is_visible()
         page.keyboard.press("Escape")
         assert not page.locator("#download-menu").is_visible()
+        alarms = page.locator("#alarms-only")
+        alarms.focus()
+        page.keyboard.press("Space")
+        assert alarms.is_checked()
+        assert tab.js("timeline.atS") is None
         # Everything can be reached by Tab, shows that it has the focus, and has a name.
         names = set()
         for _ in range(60):
