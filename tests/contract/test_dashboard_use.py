@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,12 +97,13 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         assert tab.wrong == []
 
 
-def begin(hub: Hub, directory: Path, lines: Lines) -> None:
-    """A run on these lines, with its first responses."""
+def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0) -> None:
+    """A run on these lines, with its first responses, that begins at this time."""
     found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
     found |= {"quantity": "plant", "unit": ""}
     hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
-    hub.write(made(30, lines, hole=0.0, unit=""))
+    rows = made(30, lines, hole=0.0, unit="")
+    hub.write(replace(rows, time_s=rows.time_s + from_s))
 
 
 def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_path: Path) -> None:
@@ -121,6 +123,31 @@ def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_
         assert tab.js("bode.curves.reference === undefined && page.up")
         tab.page.keyboard.press("f")
         tab.until("bode.curves.reference?.frame.columns === 6")
+        assert tab.wrong == []
+
+
+def test_a_pause_goes_into_the_run_that_begins(browser: Browser, tmp_path: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.page.keyboard.press(" ")
+        tab.until("timeline.atS !== null && !page.seeking")
+        begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ), from_s=347.0)
+        tab.until("timeline.span.first_s > 346 && bode.curves.measured?.frame.timeS[0] > 346 && !page.seeking")
+        assert tab.js("timeline.atS === timeline.span.first_s")
+        assert tab.page.locator("#time-now").inner_text() == f"shown: {tab.page.locator('#time-from').inner_text()}"
+        assert tab.wrong == []
+
+
+def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard.view(whole)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        rows = "{ rows: 1, columns: 13, timeS: [347.9], schedule: [NaN], magnitude: Array(13).fill(NaN) }"
+        tab.page.wait_for_timeout(1000)  # the page's own map is drawn
+        assert tab.js("map.cells !== null")
+        assert tab.js(f"(map.draw({rows}, 347, 349), map.cells)") is None
         assert tab.wrong == []
 
 

@@ -126,6 +126,7 @@ function begin({ facts, axes, trends }) {
     const shown = facts.quantities.find((q) => q.name === page.quantity);
     page.key = key;
     page.rows = new Rows(facts.frequency_hz.length);
+    page.past = null;
     bode.begin(facts, shown.unit, shown.symbol);
     tracking.begin(facts, page.schedule);
     map.begin(facts, page.schedule);
