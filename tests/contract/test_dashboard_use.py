@@ -140,6 +140,18 @@ def test_a_pause_goes_into_the_run_that_begins(browser: Browser, tmp_path: Path)
         assert tab.wrong == []
 
 
+def test_the_largest_sensitivity_is_not_shown_of_another_moment(browser: Browser, watched: Watched) -> None:
+    with Tab(browser, watched.url) as tab:
+        row = tab.page.locator("#pane-margins [data-name=at_lines]")
+        tab.page.keyboard.press("g")
+        row.wait_for()
+        tab.page.keyboard.press(" ")
+        row.wait_for(state="detached")
+        tab.page.keyboard.press(" ")
+        row.wait_for()
+        assert tab.wrong == []
+
+
 def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)

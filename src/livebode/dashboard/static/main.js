@@ -73,7 +73,7 @@ const link = new Link({
     if (news.health && page.facts?.begun) {
       health($("health"), news.health, page.facts, timeline.span);
       margins.lines = news.health.ms_at_lines;
-      if (page.tab === "margins") margins.draw();
+      page.dirty.add("trends");
     }
     if (news.notices) events.take(news.notices);
     if (news.newest) {
@@ -243,6 +243,7 @@ function draw(now) {
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
   if (due("trends", 250)) {
     if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN);
+    margins.live = timeline.atS === null;
     if (page.tab === "margins") margins.draw();
   }
 }
