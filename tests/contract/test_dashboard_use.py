@@ -152,6 +152,22 @@ def test_the_largest_sensitivity_is_not_shown_of_another_moment(browser: Browser
         assert tab.wrong == []
 
 
+def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_path: Path) -> None:
+    """Its band reaches to zero, which must not squeeze the other points to a stripe."""
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    rows = made(1, LINES, hole=0.0, unit="")
+    size = np.where(np.arange(len(LINES)) == 4, 1e-3, 1.0)[np.newaxis]
+    hub.write(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.charts[0].data[1][bode.at[4]] < -59")
+        low, high = tab.js("[bode.charts[0].scales.y.min, bode.charts[0].scales.y.max]")
+        assert -120 < low < -60
+        assert 0 < high < 60
+        assert tab.wrong == []
+
+
 def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
