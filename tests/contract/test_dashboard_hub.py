@@ -89,6 +89,13 @@ def test_every_quantity_from_every_other(own: str, wanted: str) -> None:
     assert np.allclose(there.sigma, responses.sigma * slope, rtol=1e-4)
 
 
+def test_responses_of_a_run_before_are_known() -> None:
+    quantities = Quantities("plant", "rad/s", LINES, None)
+    assert quantities.fit(made(1, LINES))
+    assert not quantities.fit(made(1, Lines(LINES.bins[1:], LINES.window, RATE_HZ)))
+    assert not Quantities("sensitivity", "", LINES, None).fit(made(1, LINES))
+
+
 def test_what_cannot_be_shown_says_why() -> None:
     quantities = Quantities("plant", "rad/s", LINES, None)
     assert quantities.why_not("plant") == ""

@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from PIL import Image
 from playwright.sync_api import Browser
 from scipy.io import loadmat
 
-from livebode.dashboard import Dashboard, Serving
-from livebode.nouns import Event
+from examples.closed_loop import RATE_HZ
+from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.nouns import Event, Lines
 from livebode.records import Run
 from tests.browser import TABLET, Tab, chromium, until
-from tests.dashboards import LINES, Watched
+from tests.dashboards import LINES, LOOP, Watched
+from tests.responses import made
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +97,88 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         assert tab.wrong == []
 
 
+def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0) -> None:
+    """A run on these lines, with its first responses, that begins at this time."""
+    found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
+    found |= {"quantity": "plant", "unit": ""}
+    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
+    rows = made(30, lines, hole=0.0, unit="")
+    hub.write(replace(rows, time_s=rows.time_s + from_s))
+
+
+def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_path: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.page.keyboard.press("f")
+        tab.page.keyboard.press("2")
+        tab.until("bode.curves.reference?.frame.quantity === 'open loop'")
+        begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ))
+        tab.until("bode.curves.measured?.frame.columns === 6")
+        tab.page.locator("#notice", has_text="the frozen reference was let go").wait_for()
+        assert tab.page.locator("#freeze").inner_text() == "Freeze"
+        assert not tab.page.locator("#legend [data-name=reference]").is_visible()
+        tab.page.wait_for_timeout(300)
+        assert tab.js("bode.curves.reference === undefined && page.up")
+        tab.page.keyboard.press("f")
+        tab.until("bode.curves.reference?.frame.columns === 6")
+        assert tab.wrong == []
+
+
+def test_a_pause_goes_into_the_run_that_begins(browser: Browser, tmp_path: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.page.keyboard.press(" ")
+        tab.until("timeline.atS !== null && !page.seeking")
+        begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ), from_s=347.0)
+        tab.until("timeline.span.first_s > 346 && bode.curves.measured?.frame.timeS[0] > 346 && !page.seeking")
+        assert tab.js("timeline.atS === timeline.span.first_s")
+        assert tab.page.locator("#time-now").inner_text() == f"shown: {tab.page.locator('#time-from').inner_text()}"
+        assert tab.wrong == []
+
+
+def test_the_largest_sensitivity_is_not_shown_of_another_moment(browser: Browser, watched: Watched) -> None:
+    with Tab(browser, watched.url) as tab:
+        row = tab.page.locator("#pane-margins [data-name=at_lines]")
+        tab.page.keyboard.press("g")
+        row.wait_for()
+        tab.page.keyboard.press(" ")
+        row.wait_for(state="detached")
+        tab.page.keyboard.press(" ")
+        row.wait_for()
+        assert tab.wrong == []
+
+
+def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_path: Path) -> None:
+    """Its band reaches to zero, which must not squeeze the other points to a stripe."""
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("axis")
+    begin(hub, tmp_path, LINES)
+    rows = made(1, LINES, hole=0.0, unit="")
+    size = np.where(np.arange(len(LINES)) == 4, 1e-3, 1.0)[np.newaxis]
+    hub.write(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.charts[0].data[1][bode.at[4]] < -59")
+        low, high = tab.js("[bode.charts[0].scales.y.min, bode.charts[0].scales.y.max]")
+        assert -120 < low < -60
+        assert 0 < high < 60
+        assert tab.wrong == []
+
+
+def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard.view(whole)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        rows = "{ rows: 1, columns: 13, timeS: [347.9], schedule: [NaN], magnitude: Array(13).fill(NaN) }"
+        tab.page.wait_for_timeout(1000)  # the page's own map is drawn
+        assert tab.js("map.cells !== null")
+        assert tab.js(f"(map.draw({rows}, 347, 349), map.cells)") is None
+        assert tab.wrong == []
+
+
 def test_the_whole_keyboard(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
@@ -123,6 +208,11 @@ def test_the_whole_keyboard(browser: Browser, whole: Path) -> None:
         assert page.locator("#download-menu button").first.is_visible()
         page.keyboard.press("Escape")
         assert not page.locator("#download-menu").is_visible()
+        alarms = page.locator("#alarms-only")
+        alarms.focus()
+        page.keyboard.press("Space")
+        assert alarms.is_checked()
+        assert tab.js("timeline.atS") is None
         # Everything can be reached by Tab, shows that it has the focus, and has a name.
         names = set()
         for _ in range(60):

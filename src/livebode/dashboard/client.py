@@ -137,6 +137,8 @@ class Client:
         if not self._paused and self._sent.get("newest") != state.version:
             self._sent["newest"] = state.version
             found += state.newest_frames(quantity)
+        if self._reference is not None and not state.quantities.fit(self._reference):
+            self._reference = None  # of a run before this one
         if self._reference is not None and "reference" not in self._sent:
             self._sent["reference"] = True
             found += frame("reference", state.axis, state.quantities.of_responses(self._reference, quantity))

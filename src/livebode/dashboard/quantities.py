@@ -61,6 +61,11 @@ class Quantities:
         """Of the quantity; without one where it has none or nobody says it."""
         return self.unit if quantity == self.own else ""
 
+    def fit(self, responses: Responses) -> bool:
+        """Whether responses are of this run's quantity at its frequencies, as those of a run before may not be."""
+        at_hz = responses.lines.frequency_hz
+        return responses.quantity == self.own and np.array_equal(at_hz, self.lines.frequency_hz)
+
     def of_responses(self, responses: Responses, quantity: Quantity) -> Responses:
         """The same responses as another quantity; sigma to first order. InputError where it cannot be."""
         if quantity == responses.quantity:

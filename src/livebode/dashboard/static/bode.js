@@ -128,7 +128,9 @@ export class Bode {
     const known = sure.some((values) => values.some(Number.isFinite));
     const edges = drawn.flatMap((curve) => [`${key}High`, `${key}Low`].map((edge) => by(curve, curve[edge])));
     const all = drawn.map((curve) => by(curve, curve[key]));
-    return this.ranges[index](...extent(known ? sure : all, [...edges, ...all], index ? 10 : 3));
+    // A measured point is drawn whether it is sure or not; only its band may leave the picture.
+    const points = drawn.flatMap((curve, i) => (curve === this.curves.measured ? [all[i]] : []));
+    return this.ranges[index](...extent(known ? [...sure, ...points] : all, [...edges, ...all], index ? 10 : 3));
   }
 
   // A frame of a curve; drawn at the next `draw`.

@@ -23,7 +23,7 @@ export function overGrid(frame, grid, at) {
     deg: spread((i) => phase[i]),
     degHigh: spread((i) => phase[i] + halfDeg(reach[i])),
     degLow: spread((i) => phase[i] - halfDeg(reach[i])),
-    // What can be told from zero: the rest must not set the scale.
+    // What can be told from zero: of a curve beside the measured one, the rest must not set the scale.
     dbSure: spread((i) => (reach[i] >= 1 ? NaN : magnitude[i])),
     degSure: spread((i) => (reach[i] >= 1 ? NaN : phase[i])),
     coherence: spread((i) => coherence[i]),

@@ -1,6 +1,15 @@
 // The keyboard, and the page that says what it does.
 import { element } from "./make.js";
 
+// Whether the element that has the focus does something by itself with a key.
+function uses({ tagName, type }, key) {
+  if (tagName === "INPUT" && type === "range") return key.startsWith("Arrow");
+  if (tagName === "INPUT" && type === "checkbox") return key === " ";
+  if (tagName === "BUTTON" || tagName === "SUMMARY") return key === " " || key === "Enter";
+  if (tagName === "A") return key === "Enter";
+  return tagName === "INPUT" || tagName === "SELECT";
+}
+
 // `actions` are [keys, words, act]; `each` has what a key does that shares its words with others.
 export function keys(dialog, list, actions, each) {
   list.replaceChildren(
@@ -15,10 +24,7 @@ export function keys(dialog, list, actions, each) {
   );
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || dialog.open) return;
-    const { tagName, type } = event.target;
-    const slides = type === "range" && event.key.startsWith("Arrow"),
-      presses = tagName === "BUTTON" && (event.key === " " || event.key === "Enter");
-    if (slides || presses || tagName === "SELECT" || type === "password") return;
+    if (uses(event.target, event.key)) return;
     const act = known.get(event.key) || (event.key.length === 1 && known.get(event.key.toUpperCase()));
     if (!act) return;
     event.preventDefault();

@@ -20,6 +20,8 @@ const $ = (id) => document.getElementById(id);
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
+const REFERENCE_GONE =
+  "A new run has begun with other lines or another quantity: the frozen reference was let go.";
 const LEGEND = [
   ["measured", "measured ±3σ", ""],
   ["reference", "reference", "dashed"],
@@ -71,7 +73,7 @@ const link = new Link({
     if (news.health && page.facts?.begun) {
       health($("health"), news.health, page.facts, timeline.span);
       margins.lines = news.health.ms_at_lines;
-      if (page.tab === "margins") margins.draw();
+      page.dirty.add("trends");
     }
     if (news.notices) events.take(news.notices);
     if (news.newest) {
@@ -105,6 +107,9 @@ function begin({ facts, axes, trends }) {
     $("status-text").textContent = `${facts.name}: waiting for the first samples`;
     return;
   }
+  const measured = JSON.stringify([facts.frequency_hz, facts.quantity]);
+  const other = page.axis === facts.axis && page.measured !== measured;
+  page.measured = measured;
   const fits = facts.quantities.find((q) => q.name === page.quantity && !q.why_not);
   const key = JSON.stringify([facts.axis, facts.frequency_hz, fits ? page.quantity : facts.quantity]);
   page.quantity = fits ? page.quantity : facts.quantity;
@@ -121,16 +126,20 @@ function begin({ facts, axes, trends }) {
     const shown = facts.quantities.find((q) => q.name === page.quantity);
     page.key = key;
     page.rows = new Rows(facts.frequency_hz.length);
+    page.past = null;
     bode.begin(facts, shown.unit, shown.symbol);
     tracking.begin(facts, page.schedule);
     map.begin(facts, page.schedule);
     fill();
   }
+  const gone = other && page.frozen;
+  if (gone) letGo();
   legend();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   events.begin(facts.axis, facts.role === "operator" && facts.live);
-  if (facts.remark) complain(facts.remark);
+  const remarks = [gone ? REFERENCE_GONE : "", facts.remark].filter(Boolean);
+  if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
   if (facts.watched !== page.quantity) say();
 }
@@ -195,22 +204,28 @@ function legend() {
 }
 
 function freeze() {
-  page.frozen = !page.frozen;
   if (page.frozen) {
-    const timeS = bode.curves.measured?.frame.timeS[0];
-    if (timeS === undefined) {
-      page.frozen = false;
-      return;
-    }
-    link.wish({ kind: "freeze", time_s: timeS }, "freeze");
-  } else {
-    link.forget("freeze");
-    link.wish({ kind: "unfreeze" });
-    bode.drop("reference");
-    page.dirty.add("bode");
+    letGo();
+    return;
   }
-  $("freeze").textContent = page.frozen ? "Unfreeze" : "Freeze";
-  $("freeze").classList.toggle("primary", page.frozen);
+  const timeS = bode.curves.measured?.frame.timeS[0];
+  if (timeS === undefined) return;
+  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
+  frozen(true);
+}
+
+function letGo() {
+  link.forget("freeze");
+  link.wish({ kind: "unfreeze" });
+  bode.drop("reference");
+  page.dirty.add("bode");
+  frozen(false);
+}
+
+function frozen(is) {
+  page.frozen = is;
+  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
+  $("freeze").classList.toggle("primary", is);
   legend();
 }
 
@@ -228,6 +243,7 @@ function draw(now) {
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
   if (due("trends", 250)) {
     if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN);
+    margins.live = timeline.atS === null;
     if (page.tab === "margins") margins.draw();
   }
 }

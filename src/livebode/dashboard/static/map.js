@@ -96,6 +96,11 @@ export class LineMap {
           : NaN;
       }),
     );
+    if (!level.flat().some(Number.isFinite)) {
+      this.cells = null;
+      this.paint();
+      return;
+    }
     const usual = moving
       ? bins.map((bin) =>
           this.lines.map((_, line) => {
@@ -138,7 +143,7 @@ export class LineMap {
     ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
     ctx.fillStyle = colour("muted");
     if (!cells) {
-      ctx.fillText("no response yet", left, top + 20);
+      ctx.fillText("no valid response", left, top + 20);
       return;
     }
     const values = cells[this.what],
@@ -187,10 +192,11 @@ export class LineMap {
     ctx.textAlign = "center";
     ctx.textBaseline = "top";
     const origin = cells.moving ? 0 : originOf(cells.low),
-      end = cells.low + cells.step * cells.columns;
+      reach = cells.step * cells.columns,
+      places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4))));
     for (let i = 0; i <= 4; i++) {
-      const value = cells.low + ((end - cells.low) * i) / 4 - origin;
-      ctx.fillText(Number(value.toPrecision(3)).toString(), left + ((right - left) * i) / 4, bottom + 4);
+      const value = cells.low + (reach * i) / 4 - origin;
+      ctx.fillText(Number(value.toFixed(places)).toString(), left + ((right - left) * i) / 4, bottom + 4);
     }
     const unit = this.schedule.unit ? ` in ${this.schedule.unit}` : "";
     ctx.fillText(cells.moving ? `${this.schedule.name || "schedule"}${unit}` : "time in s", (left + right) / 2, h - 15);

@@ -15,7 +15,7 @@ const ROWS = [
 
 export class Margins {
   constructor(host, whyNot) {
-    Object.assign(this, { host, whyNot, newest: new Map(), lines: null });
+    Object.assign(this, { host, whyNot, newest: new Map(), lines: null, live: true });
   }
 
   begin(list, why) {
@@ -36,7 +36,7 @@ export class Margins {
   }
 
   draw() {
-    const { lines } = this,
+    const { lines, live } = this,
       rows = [];
     for (const [name, words, small] of ROWS) {
       const found = this.newest.get(name);
@@ -60,7 +60,8 @@ export class Margins {
         ),
       );
     }
-    if (lines)
+    // It is of the newest response, so not of a moment of the past.
+    if (lines && live)
       rows.push(
         element(
           "tr",

@@ -35,6 +35,7 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
 
   async function showMoment(timeS) {
     link.wish({ kind: "pause" }, "pause");
+    page.dirty.add("trends");
     status();
     tracking.marked = timeS;
     if (page.seeking) {
@@ -47,7 +48,7 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
       if (timeline.atS !== null) {
         for (const name of ["model", "baseline"]) bode.drop(name);
         for (const frame of framesOf(buffer)) if (frame.quantity === page.quantity) bode.take(frame);
-        page.dirty.add("bode").add("trends");
+        page.dirty.add("bode");
       }
       const { past } = page;
       if (!past || timeS < past.from || timeS > past.to || page.spanS !== "whole") await fill();
@@ -68,6 +69,7 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
     link.forget("pause");
     link.wish({ kind: "resume" });
     page.rows.clear();
+    page.dirty.add("trends");
     fill();
     status();
   }

@@ -17,7 +17,10 @@ export class Timeline {
 
   take(span) {
     this.span = { ...span, first_s: span.first_s ?? NaN, last_s: span.last_s ?? NaN };
-    this.draw();
+    const { first_s: first, last_s: last } = this.span;
+    // The moment that is shown was in a run before this one.
+    if (this.atS !== null && (this.atS < first || this.atS > last)) this.go(this.atS);
+    else this.draw();
   }
 
   // Show a moment of the record.
