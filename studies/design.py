@@ -24,14 +24,17 @@ def row(name: str, axis: BeltAxis, lines, samples: np.ndarray) -> str:
     """Predicted/simulated for each quantity, and what switching on from rest does to the following error."""
     at_m = axis.motion.cycle(axis.drive.rate_hz)[0]
     moves = len(at_m) > 1
-    simulated = extremes(axis, samples, ALIGNMENTS if moves else 1, len(at_m) / axis.drive.rate_hz if moves else 2.0)
+    simulated = extremes(
+        axis, samples, ALIGNMENTS if moves else 1, 2 * len(at_m) / axis.drive.rate_hz if moves else 2.0
+    )
     predicted = worst(peaks(Waveform(lines, samples), belt_machine(axis)))
     cells, ratios = [], []
     for quantity, (low, high) in simulated.items():
         told, seen = predicted[quantity].size, max(high, -low)
-        if quantity == "travel":
-            told = max(predicted[quantity].high - at_m.max(), at_m.min() - predicted[quantity].low)
-            seen = max(high - at_m.max(), at_m.min() - low)
+        if quantity == "travel":  # of a moving axis the end at which it is predicted worst
+            beyond = [(at_m.min() - predicted[quantity].low, at_m.min() - low)]
+            beyond += [(predicted[quantity].high - at_m.max(), high - at_m.max())]
+            told, seen = max(beyond, key=lambda pair: abs(pair[0] / pair[1] - 1) if moves else pair[1])
         ratios.append(told / seen)
         cells.append(f"{told:.3g} / {seen:.3g}")
     verdict = "reached" if max(abs(r - 1) for r in ratios) <= TARGET else "SHORT"

@@ -20,9 +20,9 @@ _DRY = "dry friction is left out: an axis that stands is moved less than predict
 def belt_machine(axis: BeltAxis) -> Machine:
     """The Machine that `axis` is, with its friction, noise and motion but without its own excitation.
 
-    Nine places along the motion's way, or the one where it stands. The motion's own peaks are those of one cycle,
-    simulated without excitation. Left out: how dry friction answers the excitation, and the images that the slower
-    loops throw (1e-6).
+    Nine places along the motion's way, or the one where it stands. The motion's own peaks are those of a cycle behind
+    another one, simulated without excitation: the first begins at rest, and ends in smaller ones. Left out: how dry
+    friction answers the excitation, and the images that the slower loops throw (1e-6).
     """
     quiet = replace(axis, excitation_n_m=np.zeros(0), faults=(), run_in_s=0.0)
     position_m, _ = axis.motion.cycle(axis.drive.rate_hz)
@@ -30,15 +30,15 @@ def belt_machine(axis: BeltAxis) -> Machine:
     low, high = float(position_m.min()), float(position_m.max())
     at_m = np.linspace(low, high, _PLACES) if moves else np.array([low])
     seconds = position_m.size / axis.drive.rate_hz if moves else _STANDING_S
-    block, truth = SimulatedAxis(replace(quiet, seconds=seconds)).run()
-    radius = axis.mechanics.radius_m
+    block, truth = SimulatedAxis(replace(quiet, seconds=(1 + moves) * seconds)).run()
+    radius, again = axis.mechanics.radius_m, moves * position_m.size
     observed: dict[Quantity, Floats] = {
-        "torque": block["u"],
-        "speed": truth.states[1] * radius,
-        "travel": truth.position_m,
-        "following error": (block["position_reference"] - truth.states[0]) * radius,
+        "torque": block["u"][again:],
+        "speed": truth.states[1, again:] * radius,
+        "travel": truth.position_m[again:],
+        "following error": (block["position_reference"] - truth.states[0])[again:] * radius,
     }
-    nearest = np.argmin(np.abs(truth.position_m[:, np.newaxis] - at_m), axis=1)
+    nearest = np.argmin(np.abs(observed["travel"][:, np.newaxis] - at_m), axis=1)
     places = [_place(quiet, float(x), _extremes(observed, nearest == i, float(x))) for i, x in enumerate(at_m)]
     return Machine(
         places=tuple(places),

@@ -83,9 +83,11 @@ def _peak(
 
 
 def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
-    """Of each quantity the place with the largest extreme; of the travel its two ends."""
-    by = {name: [p for p in found if p.quantity == name] for name in QUANTITIES}
-    largest = {name: max(of, key=lambda p: p.size) for name, of in by.items()}
-    low, high = min(by["travel"], key=lambda p: p.low), max(by["travel"], key=lambda p: p.high)
-    ends = Peak("travel", "", (low.excited[0], high.excited[1]), (low.own[0], high.own[1]))
-    return {**largest, "travel": ends}
+    """Of each quantity its two ends, wherever they are; its place is that of the larger one, of the travel none."""
+    return {name: _ends([p for p in found if p.quantity == name]) for name in QUANTITIES}
+
+
+def _ends(of: list[Peak]) -> Peak:
+    low, high = min(of, key=lambda p: p.low), max(of, key=lambda p: p.high)
+    place = "" if low.quantity == "travel" else (high if high.high >= -low.low else low).place
+    return Peak(low.quantity, place, (low.excited[0], high.excited[1]), (low.own[0], high.own[1]))
