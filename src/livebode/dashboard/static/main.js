@@ -2,6 +2,7 @@
 import { Bode } from "./bode.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
+import { REFERENCE_GONE, freezing } from "./freezing.js";
 import { health } from "./health.js";
 import { Link } from "./link.js";
 import { choose, element, segments } from "./make.js";
@@ -20,8 +21,6 @@ const $ = (id) => document.getElementById(id);
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
-const REFERENCE_GONE =
-  "A new run has begun with other lines or another quantity: the frozen reference was let go.";
 const LEGEND = [
   ["measured", "measured ±3σ", ""],
   ["reference", "reference", "dashed"],
@@ -203,32 +202,6 @@ function legend() {
   );
 }
 
-function freeze() {
-  if (page.frozen) {
-    letGo();
-    return;
-  }
-  const timeS = bode.curves.measured?.frame.timeS[0];
-  if (timeS === undefined) return;
-  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
-  frozen(true);
-}
-
-function letGo() {
-  link.forget("freeze");
-  link.wish({ kind: "unfreeze" });
-  bode.drop("reference");
-  page.dirty.add("bode");
-  frozen(false);
-}
-
-function frozen(is) {
-  page.frozen = is;
-  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
-  $("freeze").classList.toggle("primary", is);
-  legend();
-}
-
 function draw(now) {
   requestAnimationFrame(draw);
   if (!page.facts?.begun || !bode.charts.length) return;
@@ -253,6 +226,7 @@ const { fill, showMoment, goLive, drawRows } = past(
   { bode, tracking, map, timeline, link },
   { complain, status },
 );
+const { freeze, letGo } = freezing(page, { bode, link }, $("freeze"), legend);
 controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, timeline };
 requestAnimationFrame(draw);
