@@ -20,7 +20,9 @@ def design_command(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory for the excitation and axis.toml.")] = Path(
         "design"
     ),
-    to: Annotated[list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h, st; all unless said.")] = None,
+    to: Annotated[
+        list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h, st; all unless said.")
+    ] = None,
     name: Annotated[str, typer.Option(help="Of the excitation, in the files and theirs.")] = "excitation",
     band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Hz, over the file's.")] = None,
     resolution: Annotated[float | None, typer.Option(metavar="HZ", help="Distance of the lines.")] = None,
