@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from livebode.design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
 from livebode.design.files.c_names import KEYWORDS, identifier
-from livebode.excitation import chirp, low_crest_phases, odd_lines, prbs, quantised, stepped_sine
+from livebode.excitation import chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
 from livebode.nouns import GridError, InputError, Lines
 from livebode.session.experiment import Experiment
 from livebode.simulation import BeltAxis, Sensor, Strokes
@@ -126,6 +126,16 @@ def test_a_prbs_order_out_of_range_is_refused_with_the_nearest(order):
 def test_lines_too_close_for_any_prbs_are_refused():
     sentence = refused(lambda: choose(Wish(kind="prbs", band_hz=(20, 140), resolution_hz=1e-4), MACHINE), GridError)
     assert "the highest is 20" in sentence
+
+
+def test_a_line_that_drowns_in_the_rounding_is_refused_and_the_named_step_leaves_it():
+    lines = Lines.parse("20:140:20", 4000, 400)
+    waveform = Waveform(lines, multisine(lines, [0.001, 1, 1, 1, 1, 1, 1]))
+    sentence = refused(lambda: waveform.quantised(0.5))
+    assert "20 Hz has 0.001 N m" in sentence
+    fine = float(sentence.split("steps of ")[-1].split(" ")[0])
+    left = waveform.quantised(fine).spectrum[list(lines.bins)]
+    assert np.all(np.abs(left / waveform.spectrum[list(lines.bins)] - 1) <= 0.5)
 
 
 @settings(max_examples=60, deadline=None)

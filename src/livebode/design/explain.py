@@ -48,7 +48,9 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
         rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
     rows.append(Choice("recording", f"{design.recording_s:.4g} s", recording_why))
     rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
-    rows.append(Choice("hop", f"{design.hop} samples", "a divisor of the window near a twentieth"))
+    even = lines.window % design.hop == 0
+    hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
+    rows.append(Choice("hop", f"{design.hop} samples", hop_why))
     return tuple(rows)
 
 

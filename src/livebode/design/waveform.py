@@ -15,6 +15,8 @@ from livebode.nouns import InputError, Lines
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_CHANGED_MAX = 0.5  # of a line's amplitude by rounding: beyond it the line is more the drive's than ours
+
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
@@ -83,5 +85,29 @@ class Waveform:
         return replace(self, samples=self.samples * factor)
 
     def quantised(self, step: float) -> Waveform:
-        """In steps of the drive; see `livebode.excitation.quantised`."""
-        return replace(self, samples=quantised(self.samples, step), about={**self.about, "resolution_n_m": step})
+        """In steps of the drive; see `livebode.excitation.quantised`.
+
+        Raises
+        ------
+        InputError
+            Also where a line is left that the rounding changes by more than half; the sentence has a step that does.
+        """
+        stepped = replace(self, samples=quantised(self.samples, step), about={**self.about, "resolution_n_m": step})
+        changed = self._changed_by(stepped)
+        if np.max(changed) > _CHANGED_MAX:
+            worst = int(np.argmax(changed))
+            fine = step
+            while np.max(self._changed_by(replace(self, samples=quantised(self.samples, fine)))) > _CHANGED_MAX:
+                fine /= 2
+            amplitude = np.abs(self.spectrum[self.lines.bins[worst]])
+            raise InputError(
+                f"the line at {self.lines.frequency_hz[worst]:g} Hz has {amplitude:.3g} N m, which rounding to steps "
+                f"of {step:g} N m changes by {100 * changed[worst]:.0f} %; raise it, leave it out, or take steps of "
+                f"{fine!r} N m"
+            )
+        return stepped
+
+    def _changed_by(self, other: Waveform) -> Floats:
+        """How far each line lies from that of another one, as a share of it, shape (lines,)."""
+        own, its = self.spectrum[list(self.lines.bins)], other.spectrum[list(self.lines.bins)]
+        return np.asarray(np.abs(its - own) / np.abs(own))
