@@ -18,7 +18,7 @@ import numpy as np
 
 from examples.kernel_drive import KernelDrive
 from livebode import Channel, Lines, multisine
-from livebode.nouns import SpectraLayout
+from livebode.nouns import InputError, SpectraLayout
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode.sources.live import Batch, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
 
@@ -74,8 +74,13 @@ def main() -> None:
     epoch = secrets.randbits(63)
     if options.spectra is None:
         made = frames(options.seconds, epoch)
+    elif not options.spectra > 0:
+        parser.error(f"--spectra {options.spectra:g} is not above 0; 20 a second is usual")
     else:
-        made = spectra_frames(options.seconds, epoch, layout(options.spectra))
+        try:
+            made = spectra_frames(options.seconds, epoch, layout(options.spectra))
+        except InputError as error:
+            parser.error(f"--spectra {options.spectra:g}: {error}")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for frame in made:
             sender.sendto(frame, (host, int(port)))
