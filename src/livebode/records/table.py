@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import pyarrow as pa
-
-
-def prepare() -> None:
-    """Have Arrow look for pandas now, half a second where it is there, and not with the first rows of a machine."""
-    pa.array(np.zeros(1))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from livebode.nouns import Event, InputError
-from livebode.records.table import prepare
 from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.continuing import Before, Numbering
@@ -32,7 +31,6 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
         Where the configuration cannot be, or no samples come.
     """
     orders = orders or Orders()
-    prepare()
     source = make_source(axis.source)
     orders.of(source)
     with source.open(), contextlib.ExitStack() as finishing:
