@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.nouns import InputError
 from livebode.session.axis import ServeSection
-from livebode.sources.live.secret import secret_file
+from livebode.sources.live.secret import secret
 
 TOKEN_LETTERS_MIN = 32
 _MAKE = 'python -c "import secrets; print(secrets.token_urlsafe(32))"'
@@ -81,17 +80,9 @@ def _loopback(address: str) -> bool:
 
 
 def _token(key: str, variable: str | None, path: Path | None) -> str | None:
-    if variable is None and path is None:
+    token = secret("serve", key, variable, path)
+    if token is None:
         return None
-    if variable is not None and path is not None:
-        raise InputError(f"serve has both {key}_env and {key}_file; leave out one of them")
-    if variable is not None:
-        token = os.environ.get(variable)
-        if token is None:
-            raise InputError(f"the environment has no {variable!r}, which serve.{key}_env names; set it")
-    else:
-        assert path is not None
-        token = secret_file(path)
     if len(token) < TOKEN_LETTERS_MIN or not token.isascii() or not token.isprintable() or " " in token:
         raise InputError(
             f"serve.{key} is no token of at least {TOKEN_LETTERS_MIN} letters and digits; make one with `{_MAKE}`"

@@ -1,4 +1,4 @@
-"""Passwords: from the environment or a file, held nowhere else, shown nowhere."""
+"""Passwords and tokens: from the environment or a file, held nowhere else, shown nowhere."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ def password(settings: SourceSettings) -> str | None:
     InputError
         Where the variable is not set or the file cannot be read; the message names it, never what is in it.
     """
-    if settings.password_env is not None and settings.password_file is not None:
-        raise InputError("source has both password_env and password_file; leave out one of them")
-    if settings.password_env is not None:
-        value = os.environ.get(settings.password_env)
+    return secret("source", "password", settings.password_env, settings.password_file)
+
+
+def secret(section: str, key: str, variable: str | None, path: Path | None) -> str | None:
+    """What the section's `key`_env or `key`_file points to; None where neither is given, InputError as `password`."""
+    if variable is not None and path is not None:
+        raise InputError(f"{section} has both {key}_env and {key}_file; leave out one of them")
+    if variable is not None:
+        value = os.environ.get(variable)
         if value is None:
-            raise InputError(
-                f"the environment has no {settings.password_env!r}, which source.password_env names; set it"
-            )
+            raise InputError(f"the environment has no {variable!r}, which {section}.{key}_env names; set it")
         return value
-    if settings.password_file is not None:
-        return secret_file(settings.password_file)
-    return None
+    return None if path is None else _in_file(path)
 
 
-def secret_file(path: Path) -> str:
+def _in_file(path: Path) -> str:
     """The text of a file without the line's end behind it."""
     try:
         if path.stat().st_size > SECRET_BYTES_MAX:
