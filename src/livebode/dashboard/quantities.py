@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.estimation.quantities import convert
 from livebode.nouns import InputError, Lines, Loop, Quantity, Responses
+from livebode.records.run import lines_in
 from livebode.session.axis import LoopSection
 from livebode.session.said import said
 
@@ -46,7 +47,7 @@ class Quantities:
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
         """From run.json."""
         found = summary["found"]
-        lines = Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
+        lines = lines_in(found)
         try:
             loop = LoopSection.model_validate(said(dict(summary)).get("loop", {})).build(lines.rate_hz)
         except (InputError, ValueError):  # pydantic's errors are ValueErrors

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,11 @@ from livebode.records.segments import json_lines, reading
 from livebode.records.segments.manifest import Manifest, Segment
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
+
+
+def lines_in(found: Mapping[str, Any]) -> Lines:
+    """The lines that run.json names under `found`."""
+    return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
 
 
 @dataclass(frozen=True)
@@ -65,8 +70,7 @@ class Run:
     @property
     def lines(self) -> Lines:
         """Where it was measured."""
-        found = self.found
-        return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
+        return lines_in(self.found)
 
     @property
     def finished(self) -> bool:
