@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.estimation import snapshots
+from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
 from livebode.estimation.spectra_watch import SpectraWatch
-from livebode.nouns import NOT_WHOLE, SPIKE, Block, Event, InputError, Responses, Spectra, SpectraLayout
+from livebode.nouns import NOT_WHOLE, SPIKE, Block, InputError, Responses, Spectra, SpectraLayout
 
 Floats = NDArray[np.float64]
 
 _NONE = np.zeros(0, dtype=np.intp)
 
 
-class SpectraTracker:
+class SpectraTracker(AroundLines[SpectraWatch]):
     """Frequency responses of a machine whose drive runs the kernel and sends the spectra: a Tracker without its kernel.
 
     From a kernel in the same precision it gives the Responses that a Tracker gives from the samples; a Response speaks
@@ -59,35 +59,17 @@ class SpectraTracker:
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
         self._watch = SpectraWatch(layout.window)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
-        self._nothing: Responses | None = None
-        self._parts: dict[str, LineStage | SpectraWatch | PlausibleRange] = {
+        self._parts = {
             "lines": self._lines,
             "watch": self._watch,
             "range": self._range,
         }
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many samples the windows held, how many are missing, and how many spectra were left out."""
-        return self._watch.counts
-
     def found(self) -> dict[str, Any]:
         """What the responses stand on, as plain data for a record."""
         layout = self._layout
         constants = {signal.name: c for signal, c in zip(layout.signals, layout.subtracted)}
-        return self._lines.found() | {"from": "spectra", "subtracted": constants}
-
-    def excitation_power(self) -> Floats:
-        """Mean |R|² of the reference at each line over the remembered windows, shape (lines,); NaN before the first."""
-        return self._lines.excitation_power()
-
-    def repeatability(self) -> Floats:
-        """Share of the reference's power that repeats from spectrum to spectrum, shape (lines,); see `LineStage`."""
-        return self._lines.repeatability()
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: missing spectra, and windows that the drive marks."""
-        return self._watch.drain()
+        return super().found() | {"from": "spectra", "subtracted": constants}
 
     def process(self, block: Block) -> Responses:
         """Responses of these Spectra, which follow the ones before.
@@ -117,25 +99,6 @@ class SpectraTracker:
         responses = self._lines.process(rows, place, np.stack([time_s, schedule]), block.channels)
         self._nothing = responses[0:0]
         return responses
-
-    def finish(self) -> Responses | None:
-        """What is held back at the end: nothing, every response has come; None without spectra."""
-        return self._nothing
-
-    def snapshot(self) -> bytes:
-        """Everything that the next spectrum's result depends on, exact; see `restore`."""
-        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self._identity)
-
-    def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of a SpectraTracker with the same settings and layout.
-
-        Raises
-        ------
-        InputError
-            If the snapshot is damaged or belongs to others; the tracker is then as it was.
-        """
-        for name, state in snapshots.unpack(snapshot, self._identity).items():
-            self._parts[name].load(state)
 
     @property
     def _identity(self) -> str:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.estimation import snapshots
+from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.watch import Watch
-from livebode.nouns import Block, Event, InputError, Responses
-
-Floats = NDArray[np.float64]
+from livebode.nouns import Block, InputError, Responses
 
 
-class Tracker:
+class Tracker(AroundLines[Watch]):
     """Frequency responses of a machine in closed loop, sample by sample, from a sliding DFT at excited lines.
 
     Any cutting of the same samples into Blocks gives the same Responses, and a restored Tracker goes on as if it had
@@ -60,10 +56,9 @@ class Tracker:
             SpikeGate(self._named(settings.spikes), window) if settings.spikes else None,
             settings.dtype,
         )
-        self._nothing: Responses | None = None
         self._centre = Centre(window)
         self._watch = Watch(window)
-        self._parts: dict[str, LineSpectra | LineStage | Centre | Watch] = {
+        self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
             "centre": self._centre,
@@ -74,25 +69,8 @@ class Tracker:
         return np.array([self.settings.channel(role) in channels for role in self._roles])
 
     @property
-    def counts(self) -> dict[str, int]:
-        """How many samples came, were missing, and were left out for each reason."""
-        return self._watch.counts
-
-    def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record: rate, window, lines, hop."""
-        return self._lines.found()
-
-    def excitation_power(self) -> Floats:
-        """Mean |R|² of the reference at each line over the remembered windows, shape (lines,); NaN before the first."""
-        return self._lines.excitation_power()
-
-    def repeatability(self) -> Floats:
-        """Share of the reference's power that repeats from period to period, shape (lines,); see `LineStage`."""
-        return self._lines.repeatability()
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: gaps and samples that were left out."""
-        return self._watch.drain()
+    def _identity(self) -> str:
+        return self.settings.identity
 
     def process(self, block: Block) -> Responses:
         """Responses at the hops of this Block, which follows the one before.
@@ -122,22 +100,3 @@ class Tracker:
         responses = self._lines.process(rows, (rows.sample + 1) % s.lines.window, centre, block.channels)
         self._nothing = responses[0:0]
         return responses
-
-    def finish(self) -> Responses | None:
-        """What is held back at the end of the samples: nothing, every response has come; None without samples."""
-        return self._nothing
-
-    def snapshot(self) -> bytes:
-        """Everything that the next sample's result depends on, exact; see `restore`."""
-        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self.settings.identity)
-
-    def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of a Tracker with the same settings.
-
-        Raises
-        ------
-        InputError
-            If the snapshot is damaged or belongs to other settings; the Tracker is then as it was.
-        """
-        for name, state in snapshots.unpack(snapshot, self.settings.identity).items():
-            self._parts[name].load(state)
