@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
+# Small products only make BLAS's threads wait for each other; the command line does the same for itself.
+export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
 .PHONY: help demo test lint bench peers studies monitoring fuzz crash system-packages lock clean

@@ -16,6 +16,7 @@ _OVERSAMPLED = 128
 _LINES_WITH_HESSIAN = 200
 _STARTS_MAX, _STARTS_MIN = 256, 8
 _STARTS_TIMES_LINES = 4848  # 48 starts for 101 lines: some seconds
+_STARTS_TIMES_SAMPLES = 1 << 18  # where periods are long, each start takes them
 _TOGETHER = 1 << 19  # starts·lines² in one step: 8 MB in each array
 _SHAKEN_RAD = 0.5
 _PROMISING = 4  # one in so many is brought on to the peak
@@ -41,7 +42,7 @@ def low_crest_phases(
     seed
         Of the starts.
     starts
-        How many; None for as many as take some seconds: 230 for 21 lines, 48 for 101, 8 from 600 on.
+        How many; None for as many as take some seconds: 230 for 21 lines, 48 for 101, 8 for 600, one for 5,000.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def low_crest_phases(
     1.41
     """
     k, size = _reduced(bins, amplitude)
-    count = int(np.clip(_STARTS_TIMES_LINES // k.size, _STARTS_MIN, _STARTS_MAX)) if starts is None else starts
+    count = _starts_for(k) if starts is None else starts
     if count < 1:
         raise InputError(f"{starts=} is below 1; give at least one start")
     generator = np.random.default_rng(seed)
@@ -69,6 +70,11 @@ def low_crest_phases(
     for first in range(0, len(promising), at_once):
         ended += _descended(np.array([p for _, p in promising[first : first + at_once]]), k, size, PEAK)
     return np.asarray((min(ended, key=_first)[1] + np.pi / 2) % (2 * np.pi))  # of sines; the search is in cosines
+
+
+def _starts_for(k: Bins) -> int:
+    many = int(np.clip(_STARTS_TIMES_LINES // k.size, _STARTS_MIN, _STARTS_MAX))
+    return min(many, max(1, _STARTS_TIMES_SAMPLES // samples_for(int(k[-1]), VALLEY[-1][1])))
 
 
 def _first(found: tuple[float, Floats]) -> float:
