@@ -117,6 +117,14 @@ def test_recordings_beside_each_other(tmp_path: Path) -> None:
         ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "nothing but capitals"),
         ('[axes.x]\nsource.url = "udp://h:1"\nlines.windw = 3', "axis x: there is no setting 'lines.windw'"),
         ("[axes.x]\nlines.window = 3", "axis x: 'source' is missing"),
+        (
+            '[axes.x]\nsource.url = "udp://h:1"\nfit.model = "two-masses"',
+            "axis x: [fit]: there is no model 'two-masses'",
+        ),
+        (
+            '[axes.x]\nsource.url = "udp://h:1"\nfit = {model = "rigid", fixed = {Jx = 1.0}}',
+            "no parameter 'Jx'",
+        ),
     ],
 )
 def test_axes_that_cannot_be(tmp_path: Path, axes: str, says: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from livebode.nouns import InputError
 from livebode.session.axis import Axis
+from livebode.session.fits import check_fit
 from livebode.session.toml_file import parse_table, read_bytes, shortened
 
 AXES_MAX = 64
@@ -62,6 +63,11 @@ def axes_of(data: bytes, path: Path, over: Mapping[str, Mapping[str, Any]]) -> d
         axis = Axis.of(table, origin).beside(path.parent)
         if over:
             axis = Axis.of(merged(axis.model_dump(exclude_unset=True), over), origin)
+        if axis.fit is not None:
+            try:
+                check_fit(axis.fit)
+            except InputError as error:
+                raise InputError(f"{origin}: [fit]: {error}") from None
         found[name] = axis
     return found
 

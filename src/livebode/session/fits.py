@@ -114,6 +114,12 @@ def fitter_of(section: FitSection, unit: str) -> Fitter:
     return Fitter(chosen_model(section, unit), **_settings(section))
 
 
+def check_fit(section: FitSection) -> None:
+    """InputError where nothing that is measured could let this model be fitted; of "auto" the unit decides later."""
+    if section.model != "auto":
+        fitter_of(section, "")
+
+
 def chosen_model(section: FitSection, unit: str) -> PhysicalModel:
     """The section's model; "auto" is two masses where the input is a torque, else two masses behind an unknown gain."""
     name = section.model
