@@ -203,6 +203,8 @@ WRONG = [
     ({"amplitude_n_m": 0}, "amplitude_n_m=0"),
     ({"amplitude_n_m": [1, 2]}, "2 amplitudes for 7 lines"),
     ({"amplitude_n_m": [1, 1, 1, 0, 1, 1, 1]}, "no power at 80 Hz"),
+    ({"amplitude_n_m": [1, 2], "kind": "prbs"}, "lists 2 amplitudes, but 'prbs' has one"),
+    ({"amplitude_n_m": [1, 2], "shape": "equal snr"}, "leave one out"),
     ({"window": 0}, "window=0"),
     ({"window": 2}, "window=2"),
     ({"kind": "chirp", "lines": "20:140:20"}, "has lines of its own"),
@@ -259,6 +261,8 @@ def test_small_settings_of_the_excitations_are_checked():
     assert "held_ticks=0" in refused(lambda: prbs(3, held_ticks=0))
     assert "periods=0" in refused(lambda: stepped_sine(LINES, periods=0))
     assert "longest window" in refused(lambda: stepped_sine(LINES, periods=10**6))
+    many = Lines(tuple(range(1, 4000)), window=8000, rate_hz=4000.0)
+    assert "take 2097 lines or fewer" in refused(lambda: stepped_sine(many, periods=1))
     assert "sweep='up'" in refused(lambda: chirp(20, 140, 4000, 400, sweep="up"))
     assert "not wider than two bins" in refused(lambda: chirp(20, 25, 4000, 400))
     narrow = refused(lambda: odd_lines(20, 60, 4000, 400))

@@ -12,7 +12,11 @@ from livebode.nouns import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from livebode.design import Design
+
+_LINES_SHOWN = 25
 
 
 def design_command(
@@ -46,6 +50,8 @@ def design_command(
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
         return
     _show(made.design)
+    if made.left_out:
+        print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
 
 
@@ -75,5 +81,30 @@ def _show(design: Design) -> None:
     for choice in design.choices:
         table.add_row(choice.what, choice.value, choice.why)
     console.print(table)
+    if design.machine.noise > 0:
+        _show_lines(console, design)
     for note in design.machine.notes:
         console.print(f"note: {note}", soft_wrap=True)
+
+
+def _show_lines(console: Console, design: Design) -> None:
+    """What each line tells; of many lines some, the weakest among them."""
+    from rich.table import Table
+
+    relative, windows = design.accuracy.relative, design.windows
+    each = -(-len(relative) // _LINES_SHOWN)
+    first = int(relative.argmax()) % each
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {windows} window{'s' * (windows > 1)}"):
+        table.add_column(head, justify="right")
+    shown = zip(
+        design.waveform.lines.frequency_hz, design.waveform.amplitude, relative, design.accuracy.reached(windows)
+    )
+    for f, amplitude, sigma, bound in list(shown)[first::each]:
+        table.add_row(
+            f"{f:.6g} Hz", f"{amplitude:.4g} N m", f"{100 * sigma:.3g} % of |G|", f"{100 * bound:.3g} % of |G|"
+        )
+    console.print()
+    console.print(table)
+    if each > 1:
+        console.print(f"(one line in {each}; all are in design.json)")

@@ -39,6 +39,10 @@ class Accuracy:
             raise InputError(f"{accuracy=} is not a share above 0; 0.05 asks for 5 % of |G|")
         return max(1, ceil((HOLDING_95 * float(self.relative.max()) / accuracy) ** 2 - 1e-9))
 
+    def reached(self, windows: int) -> Floats:
+        """The 95 % bound of each line after so many windows, as a share of |G|."""
+        return np.asarray(HOLDING_95 * self.relative / sqrt(windows))
+
     def factor_for(self, accuracy: float) -> float:
         """By what factor the excitation must grow for that in one window; 0 without noise."""
         return HOLDING_95 * float(self.relative.max()) / accuracy

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design.machine import Extremes, Machine, Place, Quantity
+from livebode.design.machine import STANDING, Extremes, Machine, Place, Quantity
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 
 Floats = NDArray[np.float64]
@@ -51,8 +51,8 @@ def belt_machine(axis: BeltAxis) -> Machine:
 
 
 def _extremes(observed: dict[Quantity, Floats], here: NDArray[np.bool_], at_m: float) -> Extremes:
-    if not here.any():  # a place that the cart never reached by half the distance to the next
-        return {"travel": (at_m, at_m)}
+    if not here.any():  # a place that the cart never reached by half the distance to the next: as if it stood there
+        return STANDING | {"travel": (at_m, at_m)}
     return {name: (float(x[here].min()), float(x[here].max())) for name, x in observed.items()}
 
 

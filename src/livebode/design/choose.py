@@ -11,7 +11,7 @@ import numpy as np
 from livebode.design.accuracy import Accuracy, accuracy_of
 from livebode.design.explain import Choice, explained
 from livebode.design.grid import grid
-from livebode.design.limits import Bearable, check, room
+from livebode.design.limits import Bearable, check, check_known, room
 from livebode.design.machine import UNITS, Machine
 from livebode.design.make import unit_waveform
 from livebode.design.peaks import Peak, peaks, worst
@@ -26,6 +26,7 @@ _WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
 # From rest the position drifts further than in the periodic state; brought in so slowly, by 3 % (studies/design.py).
 _RAMP_S = 0.5
 _STROKES_MIN = 2  # there and back
+_LONG_S = 3600.0
 _WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
 
 
@@ -38,7 +39,7 @@ class Design:
     waveform
         The excitation as it is to be played.
     amplitude_n_m
-        Of each line, chirp, step or bit; of shaped or listed lines their rms.
+        Of each line, chirp, step or bit; of shaped lines their rms, of listed ones the list.
     limits, peaks
         What is borne, and what is predicted at each place.
     accuracy, windows
@@ -56,7 +57,7 @@ class Design:
     wish: Wish
     machine: Machine
     waveform: Waveform
-    amplitude_n_m: float
+    amplitude_n_m: float | list[float]
     limits: Bearable
     peaks: tuple[Peak, ...]
     accuracy: Accuracy
@@ -69,7 +70,7 @@ class Design:
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         lines = self.waveform.lines
-        low_high = {name: {"low": p.low, "high": p.high, "unit": UNITS[name], "place": p.place}
+        low_high = {name: {"low": p.low, "high": p.high, "unit": UNITS[name], "place": p.place, "motion_alone": p.own}
                     for name, p in worst(self.peaks).items()}  # fmt: skip
         return {
             "excitation": dict(self.waveform.about),
@@ -83,6 +84,7 @@ class Design:
             "predicted": low_high,
             "sigma": self.accuracy.sigma.tolist(),
             "sigma_relative": self.accuracy.relative.tolist(),
+            "bound_95_relative": self.accuracy.reached(self.windows).tolist(),
             "windows": self.windows,
             "recording_s": self.recording_s,
             "hop": self.hop,
@@ -102,24 +104,27 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         is not reached, or nothing is left of the excitation in the drive's steps.
     """
     limits = limits or Bearable()
+    check_known(machine, limits)
     found = grid(wish, machine.rate_hz)
     unit = unit_waveform(wish, found, machine)
-    listed = wish.amplitude_n_m is not None and np.ndim(wish.amplitude_n_m) == 1
-    per_unit = float(np.sqrt(np.mean(np.square(np.asarray(wish.amplitude_n_m, dtype=float))))) if listed else 1.0
     factor, why = _factor(wish, unit, machine, limits)
-    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": factor * per_unit})
+    amplitude = wish.listed or factor
+    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": amplitude})
     if wish.resolution_n_m is not None:
         waveform = waveform.quantised(wish.resolution_n_m)
     predicted = peaks(waveform, machine)
-    check(predicted, limits, factor * per_unit)
+    check(predicted, limits, None if wish.listed else factor)
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
     recording_s, recording_why = _recording(waveform, machine, windows)
+    if recording_s > _LONG_S and windows > 1:
+        in_time = max(1, int(windows * _LONG_S / recording_s))
+        recording_why += f"; an hour is enough for {100 * accuracy.reached(in_time).max():.2g} %"
     design = Design(
         wish=wish,
         machine=machine,
         waveform=waveform,
-        amplitude_n_m=factor * per_unit,
+        amplitude_n_m=amplitude,
         limits=limits,
         peaks=predicted,
         accuracy=accuracy,
@@ -135,7 +140,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
 def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> tuple[float, str]:
     """What the unit waveform is to be multiplied by, and why."""
     if wish.amplitude_n_m is not None:
-        return (1.0 if np.ndim(wish.amplitude_n_m) else float(np.asarray(wish.amplitude_n_m))), "as given"
+        return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
     predicted = peaks(unit, machine)
     largest, first = room(predicted, limits)
     if first is not None and largest <= 0:

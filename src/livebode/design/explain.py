@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.design.accuracy import HOLDING_95
 from livebode.design.grid import Grid
 from livebode.design.limits import Bearable
-from livebode.design.machine import UNITS
+from livebode.design.machine import UNITS, Quantity
 from livebode.design.peaks import Peak, worst
+
+_LISTED_MAX = 4  # amplitudes
+_LONG_S = 3600.0
 
 if TYPE_CHECKING:
     from livebode.design.choose import Design
@@ -31,12 +33,12 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
     f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
     spacing = f"{np.diff(f).min():g} Hz apart" if len(f) > 1 else "alone"
-    bound = HOLDING_95 * design.accuracy.relative / np.sqrt(design.windows)
-    weakest = int(np.argmax(design.accuracy.relative))
+    bound = design.accuracy.reached(design.windows)
+    weakest = int(np.argmax(bound))
     rows = [
         Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
         Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
-        Choice("amplitude", f"{design.amplitude_n_m:.4g} N m", amplitude_why),
+        Choice("amplitude", _amplitude(design), amplitude_why),
         Choice(
             "peak, rms", f"{waveform.peak:.4g}, {waveform.rms:.4g} N m", f"crest factor {waveform.crest_factor:.3f}"
         ),
@@ -46,7 +48,7 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
         many = f"{design.windows} window{'s' * (design.windows > 1)}"
         told = f"at {f[weakest]:g} Hz after {many}; σ = {machine.noise:g}"
         rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
-    rows.append(Choice("recording", f"{design.recording_s:.4g} s", recording_why))
+    rows.append(Choice("recording", _duration(design.recording_s), recording_why))
     rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
     even = lines.window % design.hop == 0
     hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
@@ -54,20 +56,37 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     return tuple(rows)
 
 
+def _duration(seconds: float) -> str:
+    if seconds < _LONG_S:
+        return f"{seconds:.4g} s"
+    days = seconds / 86400
+    return f"{seconds:.4g} s, {f'{days:.3g} days' if days >= 1 else f'{seconds / 3600:.3g} h'}"
+
+
+def _amplitude(design: Design) -> str:
+    amplitude = design.amplitude_n_m
+    if isinstance(amplitude, list):
+        few = len(amplitude) <= _LISTED_MAX
+        told = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
+        return f"{told} N m"
+    return f"{amplitude:.4g} N m" + ", rms of the lines" * (design.waveform.about.get("shape") == "equal snr")
+
+
 def _limit_row(peak: Peak, limits: Bearable) -> Choice:
+    """The peak beside its limit, and what of it the motion alone has."""
     low, high = limits.of(peak.quantity)
-    unit = UNITS[peak.quantity]
-    borne = f"limits {low:g} … {high:g}" if peak.quantity == "travel" else f"limit {high:g}"
-    limited = np.isfinite(high) or np.isfinite(low)
-    size = f"{peak.low:.4g} … {peak.high:.4g}" if peak.quantity == "travel" else f"{peak.size:.3g}"
-    alone = (
-        f"{peak.own[0]:.4g} … {peak.own[1]:.4g}"
-        if peak.quantity == "travel"
-        else f"{max(peak.own[1], -peak.own[0]):.3g}"
-    )
+    borne = "no limit"
+    if limits.limited(peak.quantity):
+        borne = f"limits {low:g} … {high:g}" if peak.quantity == "travel" else f"limit {high:g}"
+    if peak.own is None:
+        why = f"of the excitation; {borne}; what the motion alone has is not given"
+    else:
+        why = f"{borne}; the motion alone {_size(peak.quantity, *peak.own)}"
     where = f", {peak.place}" if peak.place else ""
     return Choice(
-        f"peak {peak.quantity}",
-        f"{size} {unit}",
-        f"{borne if limited else 'no limit'}; the motion alone {alone}{where}",
+        f"peak {peak.quantity}", f"{_size(peak.quantity, peak.low, peak.high)} {UNITS[peak.quantity]}", why + where
     )
+
+
+def _size(quantity: Quantity, low: float, high: float) -> str:
+    return f"{low:.4g} … {high:.4g}" if quantity == "travel" else f"{max(high, -low):.3g}"

@@ -9,6 +9,7 @@ from math import ceil, floor, gcd, lcm
 import numpy as np
 
 from livebode.design.wish import Wish
+from livebode.estimation.settings import default_hop
 from livebode.excitation import check_band, chirp_lines, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 from livebode.nouns import GridError, Lines
@@ -16,6 +17,9 @@ from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
 _BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
+_HOP_NEAR = 1.25  # times a twentieth of the window, or that part of it
+_LONGER_MAX = 1.05  # than the resolution asks for, to find a window that a hop divides
+_LINES_MAX = 5000  # each has so small a share of what the limits bear that more tell nothing
 _WORTH_FACTORS = 1000  # a window named by lines typed with many digits is no one's wish beyond this many times the rate
 
 
@@ -37,9 +41,22 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     Raises
     ------
     GridError
-        If the band is not below the Nyquist frequency, the lines are closer than any window resolves, or given lines
-        are off the grid of a given window; the sentence has the nearest choice.
+        If the band is not below the Nyquist frequency, the lines are closer than any window resolves or more than
+        5,000, or given lines are off the grid of a given window; the sentence has the nearest choice.
     """
+    found = _found(wish, rate_hz)
+    if len(found.lines) > _LINES_MAX:
+        f = found.lines.frequency_hz
+        # The period of a PRBS is rounded up to a power of two.
+        finest_hz = (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)
+        raise GridError(
+            f"{len(f)} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}; the finest resolution of this "
+            f"band is {ceil(1000 * finest_hz) / 1000:g} Hz, or narrow it"
+        )
+    return found
+
+
+def _found(wish: Wish, rate_hz: float) -> Grid:
     if wish.lines is not None:
         return _stepped(wish, _of_text(wish, wish.lines, rate_hz))
     assert wish.band_hz is not None
@@ -50,8 +67,7 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     if wish.window is not None:
         check_window(wish.window, rate_hz)
     apart = 1 if wish.kind in ("chirp", "stepped") else _QUIET_BETWEEN
-    window = wish.window or _window(wish.resolution_hz or 0.0, apart, rate_hz)
-    why = f"{apart} × {rate_hz:g} Hz / {wish.resolution_hz:g} Hz" if wish.window is None else "as given"
+    window, why = (wish.window, "as given") if wish.window else _window(wish.resolution_hz or 0.0, apart, rate_hz)
     if wish.kind == "odd":
         found = odd_lines(low, high, rate_hz, window, seed=wish.seed)
         return Grid(found, why, "odd bins, one in four of them quiet at random: distortion shows there")
@@ -66,9 +82,11 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
             f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz; the nearest are "
             f"{' and '.join(f'{f:g}' for f in near)} Hz; widen the band, or ask for a finer resolution"
         )
-    words = (
-        "every second bin of the band; those between show the noise" if apart == _QUIET_BETWEEN else "the band's bins"
-    )
+    words = "the band's bins"
+    if apart == _QUIET_BETWEEN:
+        words = "every second bin of the band; those between show the noise"
+        if len(bins) == 1:
+            words = "the one in the band; its neighbours show the noise"
     return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, words))
 
 
@@ -80,19 +98,26 @@ def _stepped(wish: Wish, found: Grid) -> Grid:
     return Grid(whole, why, found.lines_why, base=found.lines)
 
 
-def _window(resolution_hz: float, apart: int, rate_hz: float) -> int:
-    window = round(apart * rate_hz / resolution_hz)
-    if window > WINDOW_MAX:
+def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]:
+    """The shortest window that resolves it, or one a little longer that a hop near a twentieth of it divides."""
+    asked = apart * rate_hz / resolution_hz
+    if asked > WINDOW_MAX:
         raise GridError(
-            f"lines {resolution_hz:g} Hz apart need a window of {apart * rate_hz / resolution_hz:.0f} samples, more "
-            f"than {WINDOW_MAX}; the finest at {rate_hz:g} Hz is {apart * rate_hz / WINDOW_MAX:.3g} Hz"
+            f"lines {resolution_hz:g} Hz apart need a window of {asked:.0f} samples, more than {WINDOW_MAX}; the "
+            f"finest at {rate_hz:g} Hz is {apart * rate_hz / WINDOW_MAX:.3g} Hz"
         )
-    if window < 2 * apart + 1:
+    if asked < 2 * apart + 1 - 1e-9:
         raise GridError(
             f"lines {resolution_hz:g} Hz apart do not fit below the Nyquist frequency {rate_hz / 2:g} Hz; "
             f"the coarsest is {apart * rate_hz / (2 * apart + 1):.4g} Hz"
         )
-    return window
+    shortest = ceil(asked * (1 - 1e-9))
+    why = f"{apart} × {rate_hz:g} Hz / {resolution_hz:g} Hz"
+    for window in range(shortest, int(shortest * _LONGER_MAX) + 1):
+        hop = default_hop(window)
+        if window % hop == 0 and 1 / _HOP_NEAR <= 20 * hop / window <= _HOP_NEAR:
+            return window, why if window == shortest else f"{why}, and longer so that a hop divides it"
+    return shortest, why
 
 
 def _of_text(wish: Wish, text: str, rate_hz: float) -> Grid:

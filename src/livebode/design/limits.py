@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan
 
-from livebode.design.machine import UNITS, Quantity
+from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.design.peaks import Peak
 from livebode.nouns import InputError
 
@@ -53,10 +53,20 @@ class Bearable:
         }[quantity]
         return -most, most
 
-    @property
-    def none(self) -> bool:
-        """Whether nothing is limited."""
-        return self == Bearable()
+    def limited(self, quantity: Quantity) -> bool:
+        """Whether there is a limit at either end."""
+        low, high = self.of(quantity)
+        return low > -inf or high < inf
+
+
+def check_known(machine: Machine, limits: Bearable) -> None:
+    """InputError where a quantity is limited of which nobody says what the motion alone does with it."""
+    for name in QUANTITIES:
+        if limits.limited(name) and not all(name in place.motion for place in machine.places):
+            raise InputError(
+                f"the {name} is limited, but its lowest and highest value in the motion alone are not given; give them "
+                f"(in a file measured.{MOTION_KEYS[name]}), or leave out the limit"
+            )
 
 
 def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]:
@@ -67,7 +77,8 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     largest, first = inf, None
     for peak in found:
         low, high = limits.of(peak.quantity)
-        for own, excited, limit in ((peak.own[1], peak.excited[1], high), (-peak.own[0], -peak.excited[0], -low)):
+        least, most = peak.own or (0.0, 0.0)
+        for own, excited, limit in ((most, peak.excited[1], high), (-least, -peak.excited[0], -low)):
             if limit == inf:
                 continue
             factor = (limit - own) / excited if excited > 0 else (inf if own <= limit else -inf)
@@ -76,24 +87,31 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     return largest, first
 
 
-def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float) -> None:
-    """InputError where a limit is broken; the sentence has the largest amplitude that would pass."""
+def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None) -> None:
+    """InputError where a limit is broken; the sentence has the largest amplitude that would pass.
+
+    Without an amplitude the lines have one each, and it has by how much they would pass.
+    """
     factor, peak = room(found, limits)
     if factor >= 1 or peak is None:
         return
     low, high = limits.of(peak.quantity)
-    unit = UNITS[peak.quantity]
-    value, limit = (peak.high, high) if peak.high - high > low - peak.low else (peak.low, low)
+    unit, name = UNITS[peak.quantity], peak.quantity
+    above = peak.high - high > low - peak.low
+    value, limit, added = (peak.high, high, peak.excited[1]) if above else (peak.low, low, peak.excited[0])
     where = f" ({peak.place})" if peak.place else ""
     if factor <= 0:
-        own = peak.own[1] if value == peak.high else peak.own[0]
         raise InputError(
-            f"the motion alone has a {peak.quantity} of {own:.4g} {unit}{where} and leaves no room below the limit of "
+            f"the motion alone has a {name} of {value - added:.4g} {unit}{where} and leaves no room below the limit of "
             f"{limit:.4g} {unit}; slow the motion, or correct the limit"
         )
+    if amplitude is None:
+        what, passes = "the amplitudes as listed bring", f"{rounded_down(factor)} times them would pass"
+    else:
+        what = f"an amplitude of {amplitude:.4g} N m brings"
+        passes = f"the largest amplitude that passes is {rounded_down(factor * amplitude)} N m"
     raise InputError(
-        f"an amplitude of {amplitude:.4g} N m brings the {peak.quantity} to {value:.4g} {unit}{where}, beyond the "
-        f"limit of {limit:.4g} {unit}; the largest amplitude that passes is {rounded_down(factor * amplitude)} N m"
+        f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
     )
 
 

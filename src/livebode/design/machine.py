@@ -16,8 +16,17 @@ Complex = NDArray[np.complex128]
 Quantity = Literal["torque", "speed", "travel", "following error"]
 QUANTITIES: tuple[Quantity, ...] = ("torque", "speed", "travel", "following error")
 UNITS: Mapping[Quantity, str] = {"torque": "N m", "speed": "m/s", "travel": "m", "following error": "m"}
-Extremes = Mapping[Quantity, tuple[float, float]]
+MOTION_KEYS: Mapping[Quantity, str] = {
+    "torque": "torque_n_m",
+    "speed": "speed_m_per_s",
+    "travel": "position_m",
+    "following error": "following_error_m",
+}
+"""Under which key a file has the extremes of each in the motion alone."""
+Extremes = dict[Quantity, tuple[float, float]]
 """Lowest and highest value of each quantity."""
+STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
+"""What an axis does that stands, nobody says where."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +40,7 @@ class Place:
     speed, travel, angle
         From torque to the belt's speed at the motor, m/s, the load's position, m, and the motor's position, m.
     motion
-        What the motion alone does near this place; a quantity that is left out stays at 0.
+        What the motion alone does near this place; a quantity that is left out is not known.
     name
         In words.
     """
@@ -42,10 +51,6 @@ class Place:
     angle: Model
     motion: Extremes = field(default_factory=dict)
     name: str = ""
-
-    def own(self, quantity: Quantity) -> tuple[float, float]:
-        """Lowest and highest value of a quantity without excitation."""
-        return self.motion.get(quantity, (0.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

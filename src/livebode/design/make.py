@@ -32,7 +32,7 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
         samples = chirp(*wish.band_hz, lines.rate_hz, lines.window, sweep=wish.sweep)
     else:
         each = amplitudes(wish, found.base or lines, machine)
-        about |= {"shape": wish.shape if np.ndim(wish.amplitude_n_m or 0) == 0 else "as given"}
+        about |= {"shape": "as listed" if wish.listed else wish.shape}
         if found.base is not None:
             about |= {"periods": wish.periods, "step_samples": found.base.window}
             samples = stepped_sine(found.base, each, periods=wish.periods)
@@ -55,11 +55,12 @@ def _lower(wish: Wish) -> str:
 
 def amplitudes(wish: Wish, lines: Lines, machine: Machine) -> Floats:
     """Of each line, shape (lines,): as listed, else of rms 1."""
-    if wish.amplitude_n_m is not None and np.ndim(wish.amplitude_n_m) == 1:
-        listed = np.asarray(wish.amplitude_n_m, dtype=np.float64)
-        if listed.shape != (len(lines),):
-            raise InputError(f"amplitude_n_m lists {listed.size} amplitudes for {len(lines)} lines; give one for each")
-        return listed
+    if wish.listed:
+        if len(wish.listed) != len(lines):
+            raise InputError(
+                f"amplitude_n_m lists {len(wish.listed)} amplitudes for {len(lines)} lines; give one for each"
+            )
+        return np.array(wish.listed)
     if wish.shape == "flat":
         return np.ones(len(lines))
     f = lines.frequency_hz

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.design.machine import Machine, Place, Quantity
+from livebode.design.machine import STANDING, Extremes, Machine, Place
 from livebode.nouns import GridError, InputError, Loop, Responses
 from livebode.nouns.controllers import integral
 from livebode.nouns.model import Algebra, Gain, Model, as_model
@@ -89,7 +88,7 @@ def measured_machine(
     output: Output = "velocity",
     radius_m: float = 1.0,
     noise: float = 0.0,
-    motion: Mapping[Quantity, tuple[float, float]] | None = None,
+    motion: Extremes | None = None,
     stroke_s: float | None = None,
 ) -> Machine:
     """The Machine around a plant of which only the response is known, at one place.
@@ -109,16 +108,18 @@ def measured_machine(
     noise
         Standard deviation of white noise on the output, in its unit.
     motion
-        Lowest and highest value of each quantity in the motion alone; none for an axis that stands.
+        Lowest and highest value of each quantity in the motion alone. What is left out is not known, and bears no
+        limit; but an axis that stands has no speed and no following error, and takes no torque unless one is given.
     stroke_s
-        Seconds in which the motion passes each place once.
+        Seconds in which the motion passes each place once; None for an axis that stands.
 
     The load is taken to go with the motor: above the first antiresonance its travel differs.
 
     Raises
     ------
     InputError
-        If the plant has no response, the loop no feedback, or the output is not known.
+        If the plant has no response, the loop no feedback, the output is not known, a quantity of the motion is not in
+        order, or an axis without stroke_s moves.
     """
     given = as_model(plant)
     if loop.feedback is None:
@@ -129,5 +130,24 @@ def measured_machine(
         raise InputError(f"{radius_m=} is not a finite number above 0; leave it out for a rotary axis")
     way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
     speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
-    place = Place(plant=given, speed=speed, travel=way, angle=way, motion=dict(motion or {}), name="as measured")
+    own = _motion(motion or {}, stroke_s)
+    place = Place(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
     return Machine(places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s)
+
+
+def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
+    """What the motion does, completed where the axis stands."""
+    for name, (low, high) in given.items():
+        if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+            raise InputError(f"the {name} of the motion, [{low}, {high}], is no lowest and highest value; swap them")
+    if stroke_s is not None:
+        if not (np.isfinite(stroke_s) and stroke_s > 0):
+            raise InputError(f"{stroke_s=} is not a finite number above 0; leave it out for an axis that stands")
+        return given
+    low, high = given.get("speed", (0.0, 0.0))
+    if low != high:
+        raise InputError(
+            f"the motion has a speed of {low:g} … {high:g} m/s, but no stroke_s; give the seconds in which it passes "
+            "each place once"
+        )
+    return STANDING | given

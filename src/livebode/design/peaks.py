@@ -26,22 +26,22 @@ class Peak:
     excited
         Lowest and highest value that the excitation adds.
     own
-        Lowest and highest value of the motion alone.
+        Lowest and highest value of the motion alone; None where it is not known.
     """
 
     quantity: Quantity
     place: str
     excited: tuple[float, float]
-    own: tuple[float, float]
+    own: tuple[float, float] | None
 
     @property
     def low(self) -> float:
-        """Both together, at the worst of all alignments of excitation and motion."""
-        return self.own[0] + self.excited[0]
+        """Both together, at the worst of all alignments; the excitation's alone where the motion is not known."""
+        return self.excited[0] + (self.own[0] if self.own else 0.0)
 
     @property
     def high(self) -> float:
-        return self.own[1] + self.excited[1]
+        return self.excited[1] + (self.own[1] if self.own else 0.0)
 
     @property
     def size(self) -> float:
@@ -79,7 +79,7 @@ def _peak(
     answered = np.zeros_like(spectrum)
     answered[excited] = spectrum[excited] * response
     period = np.fft.irfft(answered, window)
-    return Peak(quantity, place.name, (float(period.min()), float(period.max())), place.own(quantity))
+    return Peak(quantity, place.name, (float(period.min()), float(period.max())), place.motion.get(quantity))
 
 
 def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
@@ -90,4 +90,5 @@ def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
 def _ends(of: list[Peak]) -> Peak:
     low, high = min(of, key=lambda p: p.low), max(of, key=lambda p: p.high)
     place = "" if low.quantity == "travel" else (high if high.high >= -low.low else low).place
-    return Peak(low.quantity, place, (low.excited[0], high.excited[1]), (low.own[0], high.own[1]))
+    own = (low.own[0], high.own[1]) if low.own and high.own else None
+    return Peak(low.quantity, place, (low.excited[0], high.excited[1]), own)

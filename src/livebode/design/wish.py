@@ -91,6 +91,19 @@ class Wish:
             raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
         if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):
             raise InputError(f"the lines of {self.kind!r} cannot be shaped; leave out shape, or take a multisine")
+        self._check_list()
+
+    def _check_list(self) -> None:
+        if self.listed and self.shape != "flat":
+            raise InputError(f"amplitude_n_m lists amplitudes, which shape = {self.shape!r} would set; leave one out")
+        if self.listed and self.kind in ("prbs", "chirp"):
+            raise InputError(f"amplitude_n_m lists {len(self.listed)} amplitudes, but {self.kind!r} has one; give that")
+
+    @property
+    def listed(self) -> list[float]:
+        """The amplitudes that are given one for each line; empty where they are not."""
+        given = self.amplitude_n_m
+        return [] if given is None or np.ndim(given) == 0 else np.asarray(given, dtype=float).tolist()
 
     def _check_numbers(self) -> None:
         for name in ("resolution_hz", "accuracy", "crest_factor_max", "resolution_n_m"):

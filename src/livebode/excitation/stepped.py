@@ -43,8 +43,10 @@ def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
         raise InputError(f"{periods=} is below 1; hold each line for at least one window")
     times = len(lines) * periods
     if times * lines.window > WINDOW_MAX:
+        most = WINDOW_MAX // (lines.window * len(lines))
+        fits = f"at most {most} periods" if most else f"{WINDOW_MAX // lines.window} lines or fewer"
         raise InputError(
             f"{len(lines)} steps of {periods} windows of {lines.window} samples are longer than the longest window "
-            f"{WINDOW_MAX}; take at most {max(1, WINDOW_MAX // (lines.window * len(lines)))} periods or fewer lines"
+            f"{WINDOW_MAX}; take {fits}"
         )
     return Lines(tuple(k * times for k in lines.bins), lines.window * times, lines.rate_hz)

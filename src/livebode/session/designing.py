@@ -28,11 +28,14 @@ class Designed:
         The experiment.
     directory, files
         Where it stands.
+    left_out
+        In a sentence what is not among the files of one that named no formats; empty where nothing is.
     """
 
     design: Design
     directory: Path
     files: tuple[str, ...]
+    left_out: str = ""
 
 
 def design_experiment(
@@ -59,6 +62,9 @@ def design_experiment(
     _check_free(directory, force)
     design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
     lines = design.waveform.lines
+    left_out = ""
+    if kinds is None and lines.window > PERIOD_MAX:
+        left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} that a PLC's table takes"
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{directory.name[:100]}.partial-", dir=directory.parent) as folder:
@@ -84,7 +90,7 @@ def design_experiment(
             partial.rename(directory)
     except OSError as error:
         raise InputError(f"{str(directory)!r} could not be written: {error.strerror}; nothing was left there") from None
-    return Designed(design, directory, files)
+    return Designed(design, directory, files, left_out)
 
 
 def _all_that_hold(window: int) -> list[str]:

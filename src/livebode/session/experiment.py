@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.design import Bearable, Machine, MeasuredResponse, Wish, belt_machine, measured_machine
-from livebode.design.machine import Quantity
+from livebode.design.machine import MOTION_KEYS
 from livebode.fitting import mean_response
 from livebode.nouns import InputError
 from livebode.records import Run
@@ -30,12 +30,6 @@ _BELT: dict[str, Any] = {
     "limits": Limits,
     "strokes": Strokes,
     "standstill": Standstill,
-}
-_MOTION: dict[Quantity, str] = {
-    "torque": "torque_n_m",
-    "speed": "speed_m_per_s",
-    "travel": "position_m",
-    "following error": "following_error_m",
 }
 _SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
 
@@ -156,7 +150,7 @@ class Experiment(BaseModel):
         run = Run.open(told.run)
         loop = self.loop or LoopSection.model_validate(said(run.summary).get("loop", {}))
         rate_hz = run.lines.rate_hz
-        motion = {name: getattr(told, key) for name, key in _MOTION.items() if getattr(told, key) is not None}
+        motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
         return measured_machine(
             MeasuredResponse.of(mean_response(run.responses())), loop.build(rate_hz), rate_hz,
             output=told.output, radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,

@@ -36,11 +36,12 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.nouns.errors.InputError: the name 'double' is a keyword of C; take for example 'double_w'
+    livebode.nouns.errors.InputError: the name 'double' is a keyword of C or C++; take for example 'double_w'
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:
-        raise InputError(f"the name {name!r} is a keyword of {language}; take for example {f'{name}_w'!r}")
+        whose = "C or C++" if language == "C" else language
+        raise InputError(f"the name {name!r} is a keyword of {whose}; take for example {f'{name}_w'!r}")
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
         return name
     raise InputError(

@@ -1,0 +1,78 @@
+"""What the motion alone does is not taken for nothing where nobody says it."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from livebode.design import QUANTITIES, Bearable, Wish, choose, measured_machine
+from livebode.design.machine import MOTION_KEYS
+from livebode.nouns import InputError
+from livebode.simulation import BeltAxis
+
+AXIS = BeltAxis()
+PLANT, LOOP = AXIS.linear(0.8).sampled(4000), AXIS.drive.loop()
+WISH = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
+MOTION = {
+    "torque": (-2.0, 1.5),
+    "speed": (-0.4, 0.4),
+    "travel": (0.25, 1.6),
+    "following error": (-0.01, 0.01),
+}
+LIMIT = {
+    "torque": {"torque_n_m_max": 14.5},
+    "speed": {"speed_m_per_s_max": 5.9},
+    "travel": {"position_m_max": 1.8},
+    "following error": {"following_error_m_max": 0.05},
+}
+
+
+def machine(motion, stroke_s=4.0):
+    return measured_machine(PLANT, LOOP, 4000.0, radius_m=0.019, motion=motion, stroke_s=stroke_s)
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_a_limit_on_what_nobody_knows_of_the_motion_is_refused_and_without_it_the_table_says_so(name):
+    known = {key: value for key, value in MOTION.items() if key != name}
+    with pytest.raises(InputError, match=f"the {name} is limited, but .*measured.{MOTION_KEYS[name]}"):
+        choose(WISH, machine(known), Bearable(**LIMIT[name]))
+    others = {key: value for other in known for key, value in LIMIT[other].items()}
+    design = choose(WISH, machine(known), Bearable(**others))
+    (row,) = [choice for choice in design.choices if choice.what == f"peak {name}"]
+    assert "what the motion alone has is not given" in row.why
+    assert design.plain()["predicted"][name]["motion_alone"] is None
+    whole = choose(WISH, machine(MOTION), Bearable(**LIMIT[name]))
+    excited = design.plain()["predicted"][name]
+    told = whole.plain()["predicted"][name]
+    assert told["low"] == pytest.approx(excited["low"] + MOTION[name][0])
+    assert told["high"] == pytest.approx(excited["high"] + MOTION[name][1])
+
+
+def test_an_axis_that_stands_moves_not_but_stands_nobody_knows_where():
+    standing = machine({}, stroke_s=None)
+    limits = {key: value for name in ("torque", "speed", "following error") for key, value in LIMIT[name].items()}
+    told = choose(WISH, standing, Bearable(**limits)).plain()["predicted"]
+    assert [told[name]["motion_alone"] for name in ("torque", "speed", "following error")] == [(0.0, 0.0)] * 3
+    with pytest.raises(InputError, match="the travel is limited"):
+        choose(WISH, standing, Bearable(position_m_max=1.8))
+    choose(WISH, machine({"travel": (0.8, 0.8)}, stroke_s=None), Bearable(position_m_max=1.8))
+
+
+@pytest.mark.parametrize(
+    ("motion", "stroke_s", "words"),
+    [
+        ({"speed": (-0.4, 0.4)}, None, "no stroke_s"),
+        ({"torque": (2.0, -2.0)}, 4.0, "no lowest and highest value"),
+        ({"torque": (np.nan, 2.0)}, 4.0, "no lowest and highest value"),
+        ({}, 0.0, "stroke_s=0.0"),
+    ],
+)
+def test_a_motion_that_makes_no_sense_is_refused(motion, stroke_s, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        machine(motion, stroke_s)
+
+
+def test_the_file_says_null_where_nothing_is_given():
+    design = choose(WISH, machine({}))
+    assert json.loads(json.dumps(design.plain()))["predicted"]["torque"]["motion_alone"] is None
