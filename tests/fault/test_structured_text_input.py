@@ -44,7 +44,7 @@ window = 20
         ("", "'' has .*; x would do"),
         (
             "Count",
-            "'Count' is a variable of the block itself in Structured Text, which knows no case; Count_1 would do",
+            "'Count' is a name that the generated text needs itself in Structured Text, which knows no case; Count_1 would do",
         ),
         ("U", "'U' is the same as 'u' in Structured Text, which knows no case; U_1 would do"),
     ],
@@ -65,9 +65,9 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
     ):
         with pytest.raises(InputError, match="two underscores"):
             make()
-    with pytest.raises(InputError, match="'stamp' is a variable of the block itself"):
+    with pytest.raises(InputError, match="'stamp' is a name that the generated text needs itself"):
         ring_block(["stamp"])
-    with pytest.raises(InputError, match="'fbring' is a variable of the block itself"):
+    with pytest.raises(InputError, match="'fbring' is a name that the generated text needs itself"):
         Project(PERIOD, 2.0, LINES, ["w", "fbring"], "w", ["w"]).files()
 
 

@@ -6,7 +6,7 @@ from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines
 from livebode.session.axis import Axis
 from livebode.sources.live.settings import named_channels
-from livebode.structured_text import Project
+from livebode.structured_text import Project, check_signals
 
 
 def plc_project(axis: Axis, rate_hz: float | None, amplitude: float, limit: float, ring_length: int) -> Project:
@@ -30,6 +30,7 @@ def plc_project(axis: Axis, rate_hz: float | None, amplitude: float, limit: floa
     tracked = [name for name in (excitation, signals.input, signals.output) if name is not None]
     named = [channel.name for channel in named_channels(axis.source.channels)]
     recorded = [*tracked, *([] if signals.schedule is None else [signals.schedule])]
+    check_signals(recorded)
     return Project(
         period=multisine(lines, amplitude),
         limit=limit,

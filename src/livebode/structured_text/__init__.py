@@ -2,7 +2,7 @@
 
 from livebode.structured_text.multisine import PERIOD_MAX, multisine
 from livebode.structured_text.names import as_name, check_name
-from livebode.structured_text.project import Project
+from livebode.structured_text.project import Project, check_signals
 from livebode.structured_text.ring import ring_block, ring_type
 from livebode.structured_text.sliding_dft import sliding_dft
 from livebode.structured_text.twincat import twincat
@@ -12,6 +12,7 @@ __all__ = [
     "Project",
     "as_name",
     "check_name",
+    "check_signals",
     "multisine",
     "ring_block",
     "ring_type",

@@ -72,7 +72,7 @@ def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> N
         check_name(name, what)
         low = name.lower()
         if low in own or low in before:
-            other = f"the same as {before[low]!r}" if low in before else "a variable of the block itself"
+            other = f"the same as {before[low]!r}" if low in before else "a name that the generated text needs itself"
             raise InputError(
                 f"{what} {name!r} is {other} in Structured Text, which knows no case; "
                 f"{as_name(name, [*own, *names])} would do"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -12,9 +12,20 @@ from livebode.structured_text.multisine import multisine
 from livebode.structured_text.names import check_names
 from livebode.structured_text.ring import LENGTH, ring_block, ring_type
 from livebode.structured_text.sliding_dft import sliding_dft
-from livebode.structured_text.text import comment, section
+from livebode.structured_text.text import Declared, comment, section
 
-_OWN = ("livebode", "fbMultisine", "fbSlidingDft", "fbRing", "enable", "stop", "scale")
+COUNTER = "sample"
+_DECLARED: list[Declared] = [
+    ("livebode", "ST_LivebodeRing", "what livebode reads"),
+    ("fbMultisine", "FB_Multisine", ""),
+    ("fbSlidingDft", "FB_SlidingDft", ""),
+    ("fbRing", "FB_LivebodeRing", ""),
+    ("enable", "BOOL", "excite"),
+    ("stop", "BOOL", "silence at once: wire the drive's fault to it"),
+    ("scale", "LREAL := 1.0", "of the excitation"),
+]
+# What MAIN says would mean something else beside a variable of one of these names.
+_OWN = ("MAIN", "F_GetSystemTime", *(word for name, of, _ in _DECLARED for word in (name, of.split()[0])))
 
 
 @dataclass(frozen=True)
@@ -30,7 +41,7 @@ class Project:
     lines
         Bins and window of the sliding DFT, and the rate of the task.
     channels
-        Names of the recorded signals, in the ring's order.
+        Names of what is recorded, in the ring's order.
     excitation
         Which of them the block makes; the program takes the others from the drive.
     tracked
@@ -50,7 +61,7 @@ class Project:
     excitation: str
     tracked: Sequence[str]
     ring_length: int = LENGTH
-    counter: str = "sample"
+    counter: str = COUNTER
     note: str = ""
 
     @property
@@ -65,8 +76,9 @@ class Project:
         ------
         InputError
             As `multisine`, `sliding_dft`, `ring_type` and `ring_block` do; or where the excitation or a tracked signal
-            is no channel.
+            is no channel, or has a name that the program needs itself.
         """
+        check_signals((self.excitation, *self.tracked), self.counter)
         for name in (self.excitation, *self.tracked):
             if name not in self.channels:
                 raise InputError(f"there is no channel {name!r}; known here: {', '.join(self.channels)}")
@@ -88,16 +100,7 @@ class Project:
             + "PROGRAM MAIN\n"
             + section(
                 "VAR",
-                [
-                    ("livebode", "ST_LivebodeRing", "what livebode reads"),
-                    ("fbMultisine", "FB_Multisine", ""),
-                    ("fbSlidingDft", "FB_SlidingDft", ""),
-                    ("fbRing", "FB_LivebodeRing", ""),
-                    ("enable", "BOOL", "excite"),
-                    ("stop", "BOOL", "silence at once: wire the drive's fault to it"),
-                    ("scale", "LREAL := 1.0", "of the excitation"),
-                    *((name, "LREAL", made.get(name, "")) for name in self.columns),
-                ],
+                [*_DECLARED, *((name, "LREAL", made.get(name, "")) for name in self.columns)],
             )
             + f"\n// 1. From the drive, of this cycle:\n{wired}\n\n"
             + "// 2. The excitation\n"
@@ -110,6 +113,11 @@ class Project:
             + f"fbRing(ring := livebode, stamp := F_GetSystemTime(), {_arguments(self.columns)});\n"
             + "END_PROGRAM\n"
         )
+
+
+def check_signals(names: Iterable[str], counter: str = COUNTER) -> None:
+    """InputError for a signal by whose name MAIN calls something of its own: the counter would go out as torque."""
+    check_names(list(dict.fromkeys(names)), "signal", (*_OWN, counter))
 
 
 def _arguments(names: Sequence[str]) -> str:

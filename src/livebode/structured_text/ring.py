@@ -101,7 +101,7 @@ def ring_block(
     check_name(name, "function block")
     check_name(type_name, "type")
     _check_size(len(channels), length)
-    check_names(channels, "channel", _OWN)
+    check_names(channels, "channel", (*_OWN, name, type_name))
     return (
         comment(f"A sample of each channel into the ring, once a cycle: {', '.join(channels)}")
         + f"FUNCTION_BLOCK {name}\n"

@@ -158,7 +158,7 @@ def sliding_dft(
         raise InputError(f"{len(channels)} channels are not between 1 and {CHANNELS_MAX}; take one block for each few")
     bins, window = len(lines), lines.window
     outputs, own = _outputs(len(channels), bins), _own(len(channels), bins, window, phase)
-    check_names(channels, "channel", [name for names, _, _ in (*outputs, *own) for name in names.split(", ")])
+    check_names(channels, "channel", [name, *(v for names, _, _ in (*outputs, *own) for v in names.split(", "))])
     check_bytes(8 * len(channels) * bins * 6, 8 * (2 + len(channels)), window, "a sliding DFT")
     sums = ("re", "im") if phase == "fixed" else ("s_re", "s_im")
     numbers = {
