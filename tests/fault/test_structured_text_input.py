@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from livebode.nouns import InputError, Lines
 from livebode.structured_text import Project, multisine, ring_block, ring_type, sliding_dft
@@ -44,7 +47,7 @@ window = 20
         ("", "'' has .*; x would do"),
         (
             "Count",
-            "'Count' is a name that the generated text needs itself in Structured Text, which knows no case; Count_1 would do",
+            "'Count' is a name that the generated text needs itself in Structured Text, which knows no case; Count_1",
         ),
         ("U", "'U' is the same as 'u' in Structured Text, which knows no case; U_1 would do"),
     ],
@@ -74,8 +77,8 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
 @pytest.mark.parametrize(
     ("period", "given", "said"),
     [
-        (PERIOD, {"limit": 1.2}, "peak of 1.5 exceeds limit=1.2; scale it by at most 0.8, or raise the limit"),
-        (PERIOD, {"limit": 0.0}, "limit=0.0 is no finite number above 0; the peak is 1.5, take at least that"),
+        (PERIOD, {"limit": 1.2}, "peak of 1.5 exceeds limit=1.2; scale it by at most 0.7996, or raise the limit"),
+        (PERIOD, {"limit": 0.0}, "limit=0.0 is no finite number above 0; give the most that drive and machine bear"),
         (PERIOD, {"limit": np.inf}, "limit=inf is no finite number above 0"),
         (PERIOD, {"limit": np.nan}, "limit=nan is no finite number above 0"),
         (PERIOD, {"rate_hz": 0.0}, "rate_hz=0.0 is not above 0"),
@@ -89,6 +92,24 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
 def test_an_excitation_that_no_block_can_play(period, given: dict[str, float], said: str) -> None:
     with pytest.raises(InputError, match=said):
         multisine(period, **({"rate_hz": 1e3, "limit": 2.0} | given))
+
+
+sizes = st.floats(1e-100, 1e100)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0, width=32), min_size=2, max_size=8).filter(any), sizes, sizes)
+@example([0.0, 1.0, -1.0], 1.5, 1.2)
+@example([1.0, 0.5], 35.6326, 2.0)
+def test_the_scale_that_a_refusal_names_passes_and_a_larger_one_by_a_thousandth_does_not(shape, size, limit) -> None:
+    period = np.array(shape) * size
+    try:
+        multisine(period, rate_hz=1e3, limit=limit)
+    except InputError as error:
+        scale = float(re.search(r"scale it by at most (\S+), or raise the limit", str(error)).group(1))
+        assert multisine(period * scale, rate_hz=1e3, limit=limit)
+        with pytest.raises(InputError, match="exceeds"):
+            multisine(period * scale * 1.002, rate_hz=1e3, limit=limit)
 
 
 def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:

@@ -7,7 +7,7 @@ from math import inf, isnan
 
 from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.design.peaks import Peak
-from livebode.nouns import InputError
+from livebode.nouns import InputError, rounded_down
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,13 +113,3 @@ def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None) ->
     raise InputError(
         f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
     )
-
-
-def rounded_down(value: float) -> str:
-    """Four digits that are not above the value.
-
-    >>> rounded_down(1.23456), rounded_down(0.0019996)
-    ('1.234', '0.001999')
-    """
-    text = f"{value:.4g}"
-    return text if float(text) <= value else f"{value * (1 - 5e-4):.4g}"

@@ -9,6 +9,7 @@ from livebode.nouns.loop import Loop
 from livebode.nouns.model import Gain, Model, as_model
 from livebode.nouns.parameters import Parameters
 from livebode.nouns.response import Quantity, Response, Responses, widened
+from livebode.nouns.rounding import rounded_down
 from livebode.nouns.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 
 __all__ = [
@@ -35,5 +36,6 @@ __all__ = [
     "as_model",
     "missing_channel",
     "rms",
+    "rounded_down",
     "widened",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError
+from livebode.nouns import InputError, rounded_down
 from livebode.structured_text.names import check_name
 from livebode.structured_text.text import array, comment, real, section
 
@@ -13,6 +13,8 @@ PERIOD_MAX = 16384
 """Longest period, samples: each is a line of text that the PLC's compiler reads."""
 RAMP_PERIODS_MAX = 1000
 _LOADED_AT_ONCE = 32  # samples a cycle while the table fills, so that the first cycle is as short as the others
+
+_BELOW = 1 - 1e-12  # so that the scaled samples' own rounding does not lead beyond the limit again
 
 _BODY = """\
 IF loaded < {chunks} THEN
@@ -26,7 +28,7 @@ IF index = 0 THEN
     IF level > 0 THEN
         rising := enable;
     ELSE
-        allowed := w_max / {peak};
+        allowed := (w_max / {peak}) * {below};
         refused := enable AND NOT (ABS(scale) * {peak} <= w_max);
         rising := enable AND NOT refused AND (loaded = {chunks});
         IF rising THEN
@@ -118,17 +120,17 @@ def multisine(
     """
     check_name(name, "function block")
     samples = _checked(period)
+    if not (np.isfinite(limit) and limit > 0):
+        raise InputError(f"{limit=} is no finite number above 0; give the most that drive and machine bear")
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise InputError(f"{rate_hz=} is not above 0; give the calls per second")
     if not 1 <= ramp_periods <= RAMP_PERIODS_MAX:
         raise InputError(f"{ramp_periods=} is not between 1 and {RAMP_PERIODS_MAX} periods; 1 is enough for most axes")
     peak = float(np.max(np.abs(samples)))
-    if not (np.isfinite(limit) and peak <= limit):
+    if peak > limit:
         raise InputError(
-            f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}; scale it by at most {limit / peak:.4g}, "
-            "or raise the limit"
-            if limit > 0 and np.isfinite(limit)
-            else f"{limit=} is no finite number above 0; the peak is {peak:.6g}, take at least that"
+            f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}; "
+            f"scale it by at most {rounded_down(limit / peak * _BELOW)}, or raise the limit"
         )
     chunks = [samples[i : i + _LOADED_AT_ONCE] for i in range(0, len(samples), _LOADED_AT_ONCE)]
     return (
@@ -140,6 +142,7 @@ def multisine(
             table="\n".join(_case(i, chunk) for i, chunk in enumerate(chunks)),
             chunks=len(chunks),
             peak=real(peak),
+            below=real(_BELOW),
             ramp=ramp_periods * len(samples),
             window=len(samples),
         )
@@ -189,7 +192,7 @@ def _declarations(window: int, limit: float) -> str:
                 ("sample", "ULINT", "number of this sample: calls before this one"),
                 ("steady", "BOOL", "w is exactly periodic: no ramp"),
                 ("refused", "BOOL", "this scale would break the limit; not begun"),
-                ("allowed", "LREAL", "the largest scale within the limit"),
+                ("allowed", "LREAL", "the largest scale within the limit, less 1E-12 of it"),
                 ("limited", "BOOL", "w was clamped since the ramp in began"),
             ],
         )
