@@ -81,7 +81,7 @@ def test_a_motion_that_leaves_no_room_is_named_and_not_the_excitation():
 )
 def test_a_band_that_does_not_end_below_the_nyquist_frequency_is_refused(low, width, kind):
     assume(low + width >= 2000)
-    wish = Wish(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0, periods=1)
+    wish = Wish(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0)
     sentence = refused(lambda: choose(wish, MACHINE), GridError)
     assert "Nyquist frequency 2000 Hz" in sentence
     assert f"{low + width:g}" in sentence
@@ -210,13 +210,31 @@ WRONG = [
     ({"kind": "chirp", "lines": "20:140:20"}, "has lines of its own"),
     ({"shape": "equal snr", "kind": "prbs"}, "cannot be shaped"),
     ({"resolution_n_m": float("inf")}, "resolution_n_m=inf"),
+    ({"amplitude_n_m": 1e-200}, "amplitude_n_m=1e-200"),
+    ({"accuracy": 1e-300}, "accuracy=1e-300"),
+    ({"crest_factor_max": 0.9}, "below 1"),
+    ({"lines": "20:140:20"}, "lines and band_hz both say"),
+    ({"window": 400, "resolution_hz": 20}, "resolution_hz and window both say"),
+    ({"kind": "prbs", "window": 400}, "no window of 400"),
+    ({"kind": "prbs", "order": 9, "resolution_hz": 5}, "resolution_hz and order both say"),
+    ({"kind": "odd", "phases": "random"}, "setting of kind 'multisine'"),
+    ({"order": 9}, "setting of kind 'prbs'"),
+    ({"sweep": "linear"}, "setting of kind 'chirp'"),
+    ({"periods": 2}, "setting of kind 'stepped'"),
+    ({"window": 3}, "take a window of 67 samples"),
+    ({"kind": "chirp", "band_hz": [20, 20], "resolution_hz": 5}, "take a wider band"),
+    ({"kind": "odd", "band_hz": [20, 20], "resolution_hz": 5}, "take a wider band"),
 ]
 
 
 @pytest.mark.parametrize(("excitation", "words"), WRONG)
 def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
-    data = {"band_hz": [20, 140], "resolution_hz": 20, "phases": "schroeder"} | excitation
-    if "lines" in excitation:
+    data = {"band_hz": [20, 140]} | excitation
+    if not {"window", "lines", "order"} & set(excitation):
+        data["resolution_hz"] = 20
+    if data.get("kind", "multisine") == "multisine":
+        data["phases"] = "schroeder"
+    if "lines" in excitation and "kind" in excitation:
         del data["band_hz"]
     asked = Experiment.of({"excitation": data, "belt": {}}, "here")
     assert words in refused(lambda: choose(asked.wish(), MACHINE))
@@ -236,6 +254,7 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
         ({"excitation": {}, "belt": {}, "limits": {"torque_n_m_max": 0}}, "not above 0"),
         ({"excitation": {}, "belt": {}, "signals": {"exitation": "w"}}, "did you mean 'excitation'?"),
         ({"excitation": {}, "measured": {"run": "nowhere"}}, "not the directory of a run"),
+        ({"excitation": {}, "belt": {"sensor": {"noise_rad_per_s": 1e300}}}, "noise=1e+300"),
     ],
 )
 def test_a_machine_that_makes_no_sense_is_refused(data, words):

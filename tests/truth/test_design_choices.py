@@ -44,9 +44,20 @@ def test_more_lines_than_tell_something_are_refused_and_the_named_resolution_pas
     try:
         assert lines(resolution_hz) <= 5000
     except GridError as error:
-        finest_hz = float(re.search(r"finest resolution of this band is (\S+) Hz", str(error)).group(1))
+        told = re.search(r"finest resolution of this band is (\S+) Hz|is 20, with lines (\S+) Hz apart", str(error))
+        finest_hz = float(told.group(1) or told.group(2))
         assert finest_hz > resolution_hz
+        if told.group(2):  # no register is that long; with the longest there are too many lines
+            return
         assert lines(finest_hz) <= 5000
+
+
+@pytest.mark.parametrize("order", [14, 17, 20])
+def test_a_prbs_with_more_lines_than_tell_something_names_an_order_that_passes(order):
+    with pytest.raises(GridError, match="more than 5000") as caught:
+        grid(Wish(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
+    named = int(re.search(r"take order (\d+)", str(caught.value)).group(1))
+    assert len(grid(Wish(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
 
 
 def test_listed_amplitudes_are_told_as_listed_and_refused_with_the_share_that_passes():
@@ -64,6 +75,22 @@ def test_listed_amplitudes_are_told_as_listed_and_refused_with_the_share_that_pa
     choose(Wish(**wish, amplitude_n_m=[share * a for a in listed]), MOVING, limits)
     with pytest.raises(InputError):
         choose(Wish(**wish, amplitude_n_m=[1.01 * share * a for a in listed]), MOVING, limits)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    step=st.floats(0.01, 0.5), limit=st.floats(2.5, 5.0), kind=st.sampled_from(["multisine", "chirp", "prbs", "odd"]),
+)  # fmt: skip
+def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step, limit, kind):
+    wish = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
+    wish |= {"phases": "schroeder"} if kind == "multisine" else {}
+    with pytest.raises(InputError) as caught:
+        choose(Wish(**wish, amplitude_n_m=20.0), MACHINE, Bearable(torque_n_m_max=limit))
+    found = re.search(r"largest amplitude that passes is (\S+) N m", str(caught.value))
+    if not found:
+        assert "left in the drive's steps" in str(caught.value)
+        return
+    choose(Wish(**wish, amplitude_n_m=float(found.group(1))), MACHINE, Bearable(torque_n_m_max=limit))
 
 
 def test_the_bound_of_each_line_is_that_of_its_windows_and_the_worst_is_the_wanted_one():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design.machine import STANDING, Extremes, Machine, Place, Quantity
+from livebode.design.machine import STANDING, Extremes, Machine, Place, Quantity, check_noise
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 
 Floats = NDArray[np.float64]
@@ -24,6 +24,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
     another one, simulated without excitation: the first begins at rest, and ends in smaller ones. Left out: how dry
     friction answers the excitation, and the images that the slower loops throw (1e-6).
     """
+    check_noise(axis.sensor.noise_rad_per_s)
     quiet = replace(axis, excitation_n_m=np.zeros(0), faults=(), run_in_s=0.0)
     position_m, _ = axis.motion.cycle(axis.drive.rate_hz)
     moves = position_m.size > 1

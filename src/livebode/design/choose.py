@@ -18,7 +18,7 @@ from livebode.design.peaks import Peak, peaks, worst
 from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
-from livebode.nouns import InputError
+from livebode.nouns import InputError, rounded_down
 
 # Of the room that the limits leave: what the prediction may err by.
 _RESERVE = 0.1
@@ -27,6 +27,7 @@ _WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
 _RAMP_S = 0.5
 _STROKES_MIN = 2  # there and back
 _LONG_S = 3600.0
+_TRIES = 100  # to find an amplitude that passes when rounded to the drive's steps
 _WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
 
 
@@ -108,12 +109,9 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     found = grid(wish, machine.rate_hz)
     unit = unit_waveform(wish, found, machine)
     factor, why = _factor(wish, unit, machine, limits)
-    amplitude = wish.listed or factor
-    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": amplitude})
-    if wish.resolution_n_m is not None:
-        waveform = waveform.quantised(wish.resolution_n_m)
-    predicted = peaks(waveform, machine)
-    check(predicted, limits, None if wish.listed else factor)
+    waveform, predicted = _played(wish, unit, factor, machine)
+    if room(predicted, limits)[0] < 1:
+        check(predicted, limits, None if wish.listed else factor, _passing(wish, unit, factor, machine, limits))
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
     recording_s, recording_why = _recording(waveform, machine, windows)
@@ -124,7 +122,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         wish=wish,
         machine=machine,
         waveform=waveform,
-        amplitude_n_m=amplitude,
+        amplitude_n_m=wish.listed or factor,
         limits=limits,
         peaks=predicted,
         accuracy=accuracy,
@@ -137,6 +135,34 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     return replace(design, choices=explained(design, found, why, recording_why))
 
 
+def _played(wish: Wish, unit: Waveform, factor: float, machine: Machine) -> tuple[Waveform, tuple[Peak, ...]]:
+    """The waveform as the drive plays it, and its peaks."""
+    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": wish.listed or factor})
+    predicted = peaks(waveform, machine)  # refused where it has power beyond what is known of the machine
+    if wish.resolution_n_m is None:
+        return waveform, predicted
+    waveform = waveform.quantised(wish.resolution_n_m)
+    return waveform, peaks(waveform, machine)
+
+
+def _passing(wish: Wish, unit: Waveform, factor: float, machine: Machine, limits: Bearable) -> float:
+    """A factor near the largest whose excitation keeps to the limits, in four digits; 0 where there is none.
+
+    Rounding to the drive's steps is not linear: what the peaks at one factor promise may fail at another.
+    """
+    for _ in range(_TRIES):
+        try:
+            share, _ = room(_played(wish, unit, factor, machine)[1], limits)
+        except InputError:  # too small for the steps
+            break
+        if share >= 1:
+            return factor
+        if share <= 0:
+            break
+        factor = rounded_down(factor * min(share, 1 - 1e-3))
+    return 0.0
+
+
 def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> tuple[float, str]:
     """What the unit waveform is to be multiplied by, and why."""
     if wish.amplitude_n_m is not None:
@@ -144,7 +170,7 @@ def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> t
     predicted = peaks(unit, machine)
     largest, first = room(predicted, limits)
     if first is not None and largest <= 0:
-        check(predicted, limits, 1.0)
+        check(predicted, limits, 1.0, 0.0)
     needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
     allowed = largest * (1 - _RESERVE)
     if needed == 0:

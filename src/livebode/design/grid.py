@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, floor, gcd, lcm
+from math import ceil, floor, gcd, lcm, log2
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 from livebode.nouns import GridError, Lines
 from livebode.nouns.lines import WINDOW_MAX, check_window
 
+_PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
 _BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
 _HOP_NEAR = 1.25  # times a twentieth of the window, or that part of it
@@ -33,6 +34,7 @@ class Grid:
     order: int = 0
     held_ticks: int = 1
     base: Lines | None = None  # of a stepped sine: the grid of one step
+    periods: int = 0  # of each step
 
 
 def grid(wish: Wish, rate_hz: float) -> Grid:
@@ -46,12 +48,14 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     """
     found = _found(wish, rate_hz)
     if len(found.lines) > _LINES_MAX:
-        f = found.lines.frequency_hz
-        # The period of a PRBS is rounded up to a power of two.
-        finest_hz = (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)
+        f, many = found.lines.frequency_hz, len(found.lines)
+        if wish.order is not None:
+            fewer = f"take order {wish.order - ceil(log2(many / _LINES_MAX))}"
+        else:  # the period of a PRBS is rounded up to a power of two
+            finest_hz = (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)
+            fewer = f"the finest resolution of this band is {ceil(1000 * finest_hz) / 1000:g} Hz"
         raise GridError(
-            f"{len(f)} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}; the finest resolution of this "
-            f"band is {ceil(1000 * finest_hz) / 1000:g} Hz, or narrow it"
+            f"{many} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}; {fewer}, or narrow the band"
         )
     return found
 
@@ -76,12 +80,7 @@ def _found(wish: Wish, rate_hz: float) -> Grid:
     first, last = ceil(low * window / rate_hz / apart - 1e-9), floor(high * window / rate_hz / apart + 1e-9)
     bins = [k * apart for k in range(max(first, 1), last + 1)]
     if not bins:
-        step_hz = apart * rate_hz / window
-        near = [k * step_hz for k in (last, first) if 0 < 2 * k * apart < window]
-        raise GridError(
-            f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz; the nearest are "
-            f"{' and '.join(f'{f:g}' for f in near)} Hz; widen the band, or ask for a finer resolution"
-        )
+        raise GridError(_no_line(low, high, apart * rate_hz / window, apart, rate_hz))
     words = "the band's bins"
     if apart == _QUIET_BETWEEN:
         words = "every second bin of the band; those between show the noise"
@@ -90,12 +89,22 @@ def _found(wish: Wish, rate_hz: float) -> Grid:
     return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, words))
 
 
+def _no_line(low: float, high: float, step_hz: float, apart: int, rate_hz: float) -> str:
+    """Why the band holds none of these lines, and what would."""
+    below = step_hz * floor(low / step_hz)
+    near = [f for f in (below, below + step_hz) if 0 < f < rate_hz / 2]
+    told = f"; the nearest are {' and '.join(f'{f:g}' for f in near)} Hz" if near else ""
+    finer = f", or take a window of {ceil(apart * rate_hz / (high - low))} samples" if high > low else ""
+    return f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz{told}; widen the band{finer}"
+
+
 def _stepped(wish: Wish, found: Grid) -> Grid:
     if wish.kind != "stepped":
         return found
-    whole = stepped_lines(found.lines, periods=wish.periods)
-    why = f"{len(found.lines)} steps of {wish.periods} periods of {found.lines.window} samples"
-    return Grid(whole, why, found.lines_why, base=found.lines)
+    steps, periods = len(found.lines), wish.periods or _PERIODS
+    whole = stepped_lines(found.lines, periods=periods)
+    why = f"{steps} step{'s' * (steps > 1)} of {periods} period{'s' * (periods > 1)} of {found.lines.window} samples"
+    return Grid(whole, why, found.lines_why, base=found.lines, periods=periods)
 
 
 def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]:
@@ -155,13 +164,12 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
     held = wish.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
     order = wish.order
     if order is None:
-        assert wish.resolution_hz is not None or wish.window is not None
-        bits = (wish.window or rate_hz / (wish.resolution_hz or 1.0)) / held
+        bits = rate_hz / (wish.resolution_hz or 1.0) / held
         order = max(ORDER_MIN, ceil(np.log2(bits + 1) - 1e-9))
         if order > ORDER_MAX:
             finest = rate_hz / held / (2**ORDER_MAX - 1)
             raise GridError(
-                f"lines {wish.resolution_hz or rate_hz / (wish.window or 1):g} Hz apart need a PRBS of order {order}; "
+                f"lines {wish.resolution_hz:g} Hz apart need a PRBS of order {order}; "
                 f"the highest is {ORDER_MAX}, with lines {finest:.3g} Hz apart"
             )
     window = (2**order - 1) * held

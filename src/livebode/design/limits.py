@@ -7,7 +7,7 @@ from math import inf, isnan
 
 from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.design.peaks import Peak
-from livebode.nouns import InputError, rounded_down
+from livebode.nouns import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class Bearable:
                 raise InputError(f"{name}={value} is not above 0; leave it out for no limit")
         if not self.position_m_min < self.position_m_max:
             raise InputError(
-                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; swap them"
+                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; correct one"
             )
 
     def of(self, quantity: Quantity) -> tuple[float, float]:
@@ -87,10 +87,10 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     return largest, first
 
 
-def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None) -> None:
-    """InputError where a limit is broken; the sentence has the largest amplitude that would pass.
+def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None, passing: float) -> None:
+    """InputError where a limit is broken; the sentence has `passing`, an amplitude that is borne, 0 where none is.
 
-    Without an amplitude the lines have one each, and it has by how much they would pass.
+    Without an amplitude the lines have one each, and `passing` is what to multiply them by.
     """
     factor, peak = room(found, limits)
     if factor >= 1 or peak is None:
@@ -102,14 +102,16 @@ def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None) ->
     where = f" ({peak.place})" if peak.place else ""
     if factor <= 0:
         raise InputError(
-            f"the motion alone has a {name} of {value - added:.4g} {unit}{where} and leaves no room below the limit of "
-            f"{limit:.4g} {unit}; slow the motion, or correct the limit"
+            f"the motion alone has a {name} of {value - added:.4g} {unit}{where} and leaves no room to the limit of "
+            f"{limit:.4g} {unit}; change the motion, or correct the limit"
         )
     if amplitude is None:
-        what, passes = "the amplitudes as listed bring", f"{rounded_down(factor)} times them would pass"
+        what, passes = "the amplitudes as listed bring", f"{passing:.4g} times them would pass"
     else:
         what = f"an amplitude of {amplitude:.4g} N m brings"
-        passes = f"the largest amplitude that passes is {rounded_down(factor * amplitude)} N m"
+        passes = f"the largest amplitude that passes is {passing:.4g} N m"
+    if passing <= 0:
+        passes = "no smaller one is left in the drive's steps"
     raise InputError(
         f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
     )

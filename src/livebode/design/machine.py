@@ -28,6 +28,16 @@ Extremes = dict[Quantity, tuple[float, float]]
 STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
 """What an axis does that stands, nobody says where."""
 
+_NOISE_MIN, _NOISE_MAX = 1e-15, 1e9  # beyond them is a slip of the pen
+
+
+def check_noise(noise: float) -> None:
+    """InputError where no output has noise of this standard deviation."""
+    if not (noise == 0 or _NOISE_MIN <= noise <= _NOISE_MAX):
+        raise InputError(
+            f"noise={noise} is not 0 or from {_NOISE_MIN:g} to {_NOISE_MAX:g}; give its standard deviation"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Place:
@@ -71,6 +81,8 @@ class Machine:
         Seconds in which the motion passes each place once; None for an axis that stands.
     notes
         What the prediction leaves out, in sentences.
+    band_hz
+        Where the responses are known; None everywhere.
     """
 
     places: tuple[Place, ...]
@@ -79,12 +91,12 @@ class Machine:
     noise: float = 0.0
     stroke_s: float | None = None
     notes: tuple[str, ...] = ()
+    band_hz: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not self.places:
             raise InputError("the machine has no place; describe it at one at least")
-        if not (np.isfinite(self.noise) and self.noise >= 0):
-            raise InputError(f"noise={self.noise} is not a finite number of at least 0; give its standard deviation")
+        check_noise(self.noise)
 
     def torque(self, place: Place, frequency_hz: Floats) -> Complex:
         """U/W = E/(1 + G·F) at one place."""

@@ -11,7 +11,7 @@ from livebode.design.grid import Grid
 from livebode.design.machine import Machine
 from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
-from livebode.excitation import chirp, equal_snr, multisine, prbs, stepped_sine
+from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
 from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
@@ -28,16 +28,17 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
         samples = prbs(found.order, held_ticks=found.held_ticks)
     elif wish.kind == "chirp":
         assert wish.band_hz is not None
-        about |= {"sweep": wish.sweep, "band_hz": list(wish.band_hz)}
-        samples = chirp(*wish.band_hz, lines.rate_hz, lines.window, sweep=wish.sweep)
+        sweep = wish.sweep or "linear"
+        about |= {"sweep": sweep, "band_hz": list(wish.band_hz)}
+        samples = chirp(*wish.band_hz, lines.rate_hz, lines.window, sweep=sweep)
     else:
         each = amplitudes(wish, found.base or lines, machine)
         about |= {"shape": "as listed" if wish.listed else wish.shape}
         if found.base is not None:
-            about |= {"periods": wish.periods, "step_samples": found.base.window}
-            samples = stepped_sine(found.base, each, periods=wish.periods)
+            about |= {"periods": found.periods, "step_samples": found.base.window}
+            samples = stepped_sine(found.base, each, periods=found.periods)
         else:
-            phases = "random" if wish.kind == "odd" else wish.phases
+            phases: Phases = "random" if wish.kind == "odd" else wish.phases or "low crest"
             about |= {"phases": phases}
             samples = multisine(lines, each, phases, seed=wish.seed)
     made = Waveform(lines, samples, about)
@@ -50,7 +51,8 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
 
 
 def _lower(wish: Wish) -> str:
-    return "a PRBS" if wish.phases == "low crest" or wish.kind != "multisine" else "phases = 'low crest'"
+    searched = wish.kind != "multisine" or wish.phases in (None, "low crest")
+    return "a PRBS" if searched else "phases = 'low crest'"
 
 
 def amplitudes(wish: Wish, lines: Lines, machine: Machine) -> Floats:

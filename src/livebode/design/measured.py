@@ -139,7 +139,7 @@ def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
     """What the motion does, completed where the axis stands."""
     for name, (low, high) in given.items():
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
-            raise InputError(f"the {name} of the motion, [{low}, {high}], is no lowest and highest value; swap them")
+            raise InputError(f"the {name} of the motion, [{low}, {high}], is no lowest and highest value; correct it")
     if stroke_s is not None:
         if not (np.isfinite(stroke_s) and stroke_s > 0):
             raise InputError(f"{stroke_s=} is not a finite number above 0; leave it out for an axis that stands")

@@ -13,6 +13,7 @@ from livebode.design.waveform import Waveform
 Floats = NDArray[np.float64]
 
 _POWERLESS = 1e-12  # of the largest bin: rounding
+_EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,22 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
     The excitation's part is the sum of its bins times their closed-loop responses, over one period: exact for a linear
     machine that has been excited for long. From rest it takes the loop some seconds to get there, and the position may
     drift further meanwhile: bring the excitation in slowly. Excitation and motion are not synchronous, so their
-    extremes at each place are added.
+    extremes at each place are added. Of a quantised excitation the lines that rounding puts where the machine is not
+    known are left out.
+
+    Raises
+    ------
+    GridError
+        If the excitation has power where the machine is not known.
     """
     window, rate_hz = waveform.lines.window, waveform.lines.rate_hz
     spectrum = np.fft.rfft(waveform.samples)
     # The integrators of the loop leave nothing of a constant.
     excited = np.flatnonzero(np.abs(spectrum) > _POWERLESS * np.max(np.abs(spectrum)))
     excited = excited[excited > 0]
+    if machine.band_hz is not None and "resolution_n_m" in waveform.about:
+        low, high = np.array(machine.band_hz) * window / rate_hz
+        excited = excited[(excited >= low * (1 - _EDGE)) & (excited <= high * (1 + _EDGE))]
     return tuple(
         _peak(quantity, place, response, spectrum, excited, window)
         for place in machine.places

@@ -100,10 +100,11 @@ class Waveform:
             while np.max(self._changed_by(replace(self, samples=quantised(self.samples, fine)))) > _CHANGED_MAX:
                 fine /= 2
             amplitude = np.abs(self.spectrum[self.lines.bins[worst]])
+            whole = self.about.get("kind") in ("prbs", "chirp")
+            remedy = "raise the amplitude" if whole else "raise it, leave it out"
             raise InputError(
                 f"the line at {self.lines.frequency_hz[worst]:g} Hz has {amplitude:.3g} N m, which rounding to steps "
-                f"of {step:g} N m changes by {100 * changed[worst]:.0f} %; raise it, leave it out, or take steps of "
-                f"{fine!r} N m"
+                f"of {step:g} N m changes by {100 * changed[worst]:.0f} %; {remedy}, or take steps of {fine!r} N m"
             )
         return stepped
 

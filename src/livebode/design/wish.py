@@ -15,6 +15,9 @@ from livebode.nouns import InputError
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]
 
+_WHOSE = {"phases": "multisine", "order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
+_ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
+
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
@@ -30,26 +33,31 @@ class Wish:
         "multisine"; "odd": odd lines of random phase with quiet ones among them, to tell distortion; "prbs", "chirp",
         "stepped": one line after the other.
     phases
-        Of a multisine: "low crest", "schroeder" or "random".
+        Of a multisine: "low crest", which is chosen, "schroeder" or "random".
     shape
         Amplitudes of the lines: "flat", or for an "equal snr" at the output of the machine.
     amplitude_n_m
         Of each line of a multisine (of a shaped one: their rms), of the chirp, of the steps or of the PRBS; a list has
         one for each line. None: as small as the accuracy allows, and within the limits.
     accuracy
-        Wanted 95 % bound of each line as a share of |G|.
+        Wanted 95 % bound of each line as a share of |G|, 1e-6 … 1.
     crest_factor_max
         A crest factor that must be reached; None asks for none.
     resolution_n_m
         Step of the drive, to round to.
     order, held_ticks
-        Of the PRBS: length of its register, and ticks that a bit stands.
+        Of the PRBS: length of its register, instead of a resolution, and ticks that a bit stands.
     sweep
-        Of the chirp: "linear" or "logarithmic".
+        Of the chirp: "linear", which is chosen, or "logarithmic".
     periods
-        Windows that each step of a stepped sine takes.
+        Windows that each step of a stepped sine takes; 4 are chosen.
     seed
         Of all that is random: the same seed, the same excitation.
+
+    Raises
+    ------
+    InputError
+        If something is missing, cannot be, is of another kind, or is said twice.
     """
 
     band_hz: tuple[float, float] | None = None
@@ -57,7 +65,7 @@ class Wish:
     lines: str | None = None
     window: int | None = None
     kind: Kind = "multisine"
-    phases: Phases = "low crest"
+    phases: Phases | None = None
     shape: Shape = "flat"
     amplitude_n_m: float | Sequence[float] | None = None
     accuracy: float = 0.05
@@ -65,39 +73,54 @@ class Wish:
     resolution_n_m: float | None = None
     order: int | None = None
     held_ticks: int | None = None
-    sweep: Sweep = "linear"
-    periods: int = 4
+    sweep: Sweep | None = None
+    periods: int | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
         for name, known in (
             ("kind", get_args(Kind)),
-            ("phases", get_args(Phases)),
+            ("phases", (None, *get_args(Phases))),
             ("shape", get_args(Shape)),
-            ("sweep", get_args(Sweep)),
+            ("sweep", (None, *get_args(Sweep))),
         ):
             if (word := getattr(self, name)) not in known:
-                raise InputError(f"{name}={word!r} is not known; choose {', '.join(map(repr, known))}")
+                raise InputError(f"{name}={word!r} is not known; choose {', '.join(map(repr, filter(None, known)))}")
         self._check_numbers()
+        self._check_amplitude()
+        self._check_whose()
+        self._check_grid()
+
+    def _check_whose(self) -> None:
+        for name, kind in _WHOSE.items():
+            if getattr(self, name) is not None and self.kind != kind:
+                raise InputError(f"{name} is a setting of kind {kind!r}, and kind is {self.kind!r}; leave it out")
+        if self.lines is not None and self.kind not in ("multisine", "stepped"):
+            raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
+        if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):
+            raise InputError(f"the lines of {self.kind!r} cannot be shaped; leave out shape, or take a multisine")
+        if self.listed and self.shape != "flat":
+            raise InputError(f"amplitude_n_m lists amplitudes, which shape = {self.shape!r} would set; leave one out")
+        if self.listed and self.kind in ("prbs", "chirp"):
+            raise InputError(f"amplitude_n_m lists {len(self.listed)} amplitudes, but {self.kind!r} has one; give that")
+
+    def _check_grid(self) -> None:
         if self.band_hz is not None and np.shape(self.band_hz) != (2,):
             raise InputError(f"band_hz={self.band_hz} is no band; give two frequencies in Hz, such as [20, 140]")
         if self.order is not None:
             check_order(self.order)
         if self.lines is None and self.band_hz is None:
             raise InputError("neither band_hz nor lines is given; say what is to be measured, such as [20, 140]")
-        if self.lines is None and self.resolution_hz is None and self.window is None:
-            raise InputError("neither resolution_hz nor window is given; say how far apart the lines may be")
-        if self.lines is not None and self.kind not in ("multisine", "stepped"):
-            raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
-        if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):
-            raise InputError(f"the lines of {self.kind!r} cannot be shaped; leave out shape, or take a multisine")
-        self._check_list()
-
-    def _check_list(self) -> None:
-        if self.listed and self.shape != "flat":
-            raise InputError(f"amplitude_n_m lists amplitudes, which shape = {self.shape!r} would set; leave one out")
-        if self.listed and self.kind in ("prbs", "chirp"):
-            raise InputError(f"amplitude_n_m lists {len(self.listed)} amplitudes, but {self.kind!r} has one; give that")
+        if self.kind == "prbs" and self.window is not None:
+            raise InputError(f"a PRBS takes 2^order - 1 bits, no window of {self.window}; give order or resolution_hz")
+        apart = [name for name in ("lines", "resolution_hz", "window", "order") if getattr(self, name) is not None]
+        if self.lines is not None:
+            apart = [name for name in ("lines", "band_hz", "resolution_hz") if getattr(self, name) is not None]
+        if not apart:
+            other = "order" if self.kind == "prbs" else "window"
+            raise InputError(f"neither resolution_hz nor {other} is given; say how far apart the lines may be")
+        if len(apart) > 1:
+            raise InputError(f"{apart[0]} and {apart[1]} both say which lines there are; leave one out")
 
     @property
     def listed(self) -> list[float]:
@@ -110,14 +133,25 @@ class Wish:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InputError(f"{name}={value} is not a finite number above 0")
+        if not _ACCURACY_MIN <= self.accuracy <= 1:
+            raise InputError(f"accuracy={self.accuracy} is no share of |G| from {_ACCURACY_MIN:g} to 1; 0.05 is 5 %")
+        if self.crest_factor_max is not None and self.crest_factor_max < 1:
+            raise InputError(f"crest_factor_max={self.crest_factor_max} is below 1, the crest factor of a PRBS")
         for name in ("window", "held_ticks", "periods"):
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise InputError(f"{name}={value} is below 1; give a whole number above 0")
         if self.seed < 0:
             raise InputError(f"seed={self.seed} is below 0; give a whole number of at least 0")
-        given = np.atleast_1d(np.asarray(0.0 if self.amplitude_n_m is None else self.amplitude_n_m, dtype=np.float64))
-        if not np.all(np.isfinite(given)) or np.any(given < 0) or (self.amplitude_n_m is not None and not given.any()):
+
+    def _check_amplitude(self) -> None:
+        given = np.atleast_1d(np.asarray(1.0 if self.amplitude_n_m is None else self.amplitude_n_m, dtype=np.float64))
+        if not np.all(np.isfinite(given)) or np.any(given < 0) or not given.any():
             raise InputError(
                 f"amplitude_n_m={self.amplitude_n_m} is not finite and above 0; leave it out to have it chosen"
+            )
+        if not _AMPLITUDE_MIN <= given.max() <= _AMPLITUDE_MAX:
+            raise InputError(
+                f"amplitude_n_m={self.amplitude_n_m} is not from {_AMPLITUDE_MIN:g} to {_AMPLITUDE_MAX:g} N m; "
+                "leave it out to have it chosen"
             )

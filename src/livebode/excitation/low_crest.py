@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from livebode.excitation.descent import PEAK, VALLEY, Stages, descend, descend_together, period, samples_for
 from livebode.nouns import InputError
@@ -59,6 +60,13 @@ def low_crest_phases(
     count = _starts_for(k) if starts is None else starts
     if count < 1:
         raise InputError(f"{starts=} is below 1; give at least one start")
+    # Threads of products as small as these wait for each other, on a busy machine for several times the search.
+    with threadpool_limits(1, user_api="blas"):
+        return np.asarray((_searched(k, size, seed, count) + np.pi / 2) % (2 * np.pi))  # of sines, found as cosines
+
+
+def _searched(k: Bins, size: Floats, seed: int, count: int) -> Floats:
+    """The phases of cosines where the best of so many starts ends."""
     generator = np.random.default_rng(seed)
     at_once = max(1, _TOGETHER // k.size**2) if k.size <= _LINES_WITH_HESSIAN else 1
     promising: list[tuple[float, Floats]] = []
@@ -69,7 +77,7 @@ def low_crest_phases(
     ended: list[tuple[float, Floats]] = []
     for first in range(0, len(promising), at_once):
         ended += _descended(np.array([p for _, p in promising[first : first + at_once]]), k, size, PEAK)
-    return np.asarray((min(ended, key=_first)[1] + np.pi / 2) % (2 * np.pi))  # of sines; the search is in cosines
+    return min(ended, key=_first)[1]
 
 
 def _starts_for(k: Bins) -> int:

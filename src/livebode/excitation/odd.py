@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.nouns import GridError, Lines
-from livebode.nouns.lines import check_window
+from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _GROUP_MIN = 2
 
@@ -48,10 +48,13 @@ def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, gro
     odd = np.arange(first + (first + 1) % 2, last + 1, 2)
     odd = odd[2 * odd < window]
     if odd.size < group:
-        needed = int(np.ceil(2 * group * rate_hz / (high_hz - low_hz))) if high_hz > low_hz else 2 * window
+        longer = ""
+        if (high_hz - low_hz) * WINDOW_MAX >= 2 * group * rate_hz:
+            needed = int(np.ceil(2 * group * rate_hz / (high_hz - low_hz)))
+            longer = f"a window of {max(needed, window + 1)} samples, or "
         raise GridError(
             f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {resolution_hz:g} Hz grid, less than one "
-            f"group of {group}; take a window of {max(needed, window + 1)} samples, or a wider band"
+            f"group of {group}; take {longer}a wider band"
         )
     generator = np.random.default_rng(seed)
     groups = [odd[i : i + group] for i in range(0, odd.size, group)]

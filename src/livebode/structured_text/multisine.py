@@ -130,7 +130,7 @@ def multisine(
     if peak > limit:
         raise InputError(
             f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}; "
-            f"scale it by at most {rounded_down(limit / peak * _BELOW)}, or raise the limit"
+            f"scale it by at most {rounded_down(limit / peak * _BELOW):g}, or raise the limit"
         )
     chunks = [samples[i : i + _LOADED_AT_ONCE] for i in range(0, len(samples), _LOADED_AT_ONCE)]
     return (
