@@ -82,8 +82,9 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
         (PERIOD, {"limit": np.inf}, "limit=inf is no finite number above 0"),
         (PERIOD, {"limit": np.nan}, "limit=nan is no finite number above 0"),
         (PERIOD, {"rate_hz": 0.0}, "rate_hz=0.0 is not above 0"),
-        (PERIOD, {"ramp_periods": 0}, "ramp_periods=0 is not between 1 and 1000 periods"),
-        ([0.0, 0.0], {}, "zero everywhere"),
+        (PERIOD, {"ramp_periods": 0}, "ramp_periods=0 is not from 1 to 1073741823 periods"),
+        ([0.0, 0.0], {}, "the period is nowhere larger than 0.0; give an excitation"),
+        ([1e-320, 0.0], {}, "the period is nowhere larger than 1e-320; give an excitation"),
         ([1.0, np.nan], {}, "sample 1 of the period is nan"),
         (np.ones(16385), {}, r"shape \(16385,\) is not one of 2 to 16384 samples"),
         ([[1.0, 2.0]], {}, r"shape \(1, 2\)"),
@@ -121,7 +122,7 @@ def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:
     assert ring_type(4, 1e3, length=262_142)
     with pytest.raises(InputError, match="length=1 samples is too short; take at least 2"):
         ring_block(["u"], length=1)
-    with pytest.raises(InputError, match="0 channels are not between 1 and 16"):
+    with pytest.raises(InputError, match=r"channels \[\] are not 1 to 16 names"):
         sliding_dft(LINES, [])
     with pytest.raises(InputError, match="65 channels is not one of 1 to 64"):
         ring_type(65, 1e3)
@@ -145,7 +146,7 @@ def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:
         (('output = "y"', 'output = "z"'), ("--rate", 1000), "there is no channel 'z'; known here: w, y"),
         (('"w [N m]"', '"two words"'), ("--rate", 1000), "there is no channel 'w'"),
         (("", ""), ("--rate", 1000, "--limit", 0.1), "exceeds limit=0.1; scale it by at most"),
-        (("", ""), ("--rate", 1000, "--amplitude", "nan"), "not finite"),
+        (("", ""), ("--rate", 1000, "--amplitude", "nan"), "amplitude=nan is not a finite number"),
         (("", ""), ("--rate", 1000, "--ring", 1), "too short"),
     ],
 )

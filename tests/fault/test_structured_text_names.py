@@ -35,7 +35,7 @@ def generated(signals: dict[str, str], *, named: bool) -> dict[str, str]:
         "signals": signals,
         "lines": {"frequencies": "100, 200", "window": 20},
     }
-    return plc_project(Axis.of(axis, "axis"), rate_hz=1000.0, amplitude=0.3, limit=2.0, ring_length=100).files()
+    return plc_project(Axis.of(axis, "axis"), rate_hz=1e3, amplitude=0.3, limit=2.0, ring_length=100).files()
 
 
 PLAIN = dict(scopes(list(generated(SIGNALS, named=True).values())))

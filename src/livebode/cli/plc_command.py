@@ -17,12 +17,17 @@ _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used
 
 def plc_command(
     axis: Annotated[Path, typer.Argument(metavar="AXIS.toml", help="Configuration with lines, window and signals.")],
-    amplitude: Annotated[float, typer.Option(metavar="SIZE", help="Of each line, in the excitation's unit.")],
     limit: Annotated[float, typer.Option(metavar="SIZE", help="What the excitation never exceeds.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory to write to.")],
+    amplitude: Annotated[
+        float | None, typer.Option(metavar="SIZE", help="A multisine: of each line, in the excitation's unit.")
+    ] = None,
+    excitation: Annotated[
+        Path | None, typer.Option(metavar="FILE.npz", help="Instead: what livebode design left, with its ramp.")
+    ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Cycles of the task per second; source.rate_hz unless said."),
+        typer.Option(metavar="HZ", help="Cycles of the task per second; that of design or source unless said."),
     ] = None,
     ring: Annotated[int, typer.Option(metavar="SAMPLES", help="Samples that the ring keeps.")] = 8192,
     twincat: Annotated[bool, typer.Option("--twincat", help="As .TcPOU and .TcDUT instead of .st.")] = False,
@@ -31,9 +36,17 @@ def plc_command(
     """Write function blocks for the axis's PLC: excitation, sliding DFT, and the ring that livebode reads."""
     from livebode import structured_text
     from livebode.session.axis import Axis
+    from livebode.session.designed import read_designed
     from livebode.session.plc import plc_project
 
-    project = plc_project(Axis.read(axis), rate, amplitude, limit, ring)
+    project = plc_project(
+        Axis.read(axis),
+        limit=limit,
+        ring_length=ring,
+        rate_hz=rate,
+        amplitude=amplitude,
+        designed=None if excitation is None else read_designed(excitation),
+    )
     files = project.files()
     if twincat:
         files = dict(structured_text.twincat(text) for text in files.values())

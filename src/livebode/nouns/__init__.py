@@ -9,8 +9,8 @@ from livebode.nouns.loop import Loop
 from livebode.nouns.model import Gain, Model, as_model
 from livebode.nouns.parameters import Parameters
 from livebode.nouns.response import Quantity, Response, Responses, widened
-from livebode.nouns.rounding import rounded_down
 from livebode.nouns.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
+from livebode.nouns.wording import counted, rounded_down
 
 __all__ = [
     "NOT_WHOLE",
@@ -34,6 +34,7 @@ __all__ = [
     "Spectra",
     "SpectraLayout",
     "as_model",
+    "counted",
     "missing_channel",
     "rms",
     "rounded_down",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Model, Response, Responses
+from livebode.nouns import Model, Response, Responses, counted
 from livebode.report import ticks, words
 from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
 from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, decibels, summarised
@@ -242,7 +242,7 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
         ]
     mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
     handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
-    texts = [f"median of {words.counted(summary.count, 'valid response')}", "5–95 % of them"][: len(handles) - 1]
+    texts = [f"median of {counted(summary.count, 'valid response')}", "5–95 % of them"][: len(handles) - 1]
     if mean:
         handles, texts = handles[len(texts) // 2 :], ["5–95 % of the responses"] * (len(texts) // 2)
     at_s = summary.newest.time_s

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Response
-from livebode.report import words
+from livebode.nouns import Response, counted
 from livebode.report.bode import frequency_axis
 from livebode.report.map import frequency_edges
 from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style
@@ -53,7 +52,7 @@ def comparison_figure(
         )
         first = figure.add_subplot(grid[0])
         panels = [first, *(figure.add_subplot(grid[i], sharex=first) for i in (1, 2, 3))]
-        facts = f"{before.quantity} · {words.counted(len(f), 'line')} · {int(differs.sum())} differ"
+        facts = f"{before.quantity} · {counted(len(f), 'line')} · {int(differs.sum())} differ"
         heading(figure, look, "Before and after", facts, 0.085)
         turn = unwrapped(np.degrees(np.angle(before.value)), np.zeros(len(f), dtype=bool))
         drawn = [

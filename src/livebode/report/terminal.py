@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses
+from livebode.nouns import Responses, counted
 from livebode.report import ticks, words
 from livebode.report.style import shortened
 from livebode.report.summary import Summary, summarised
@@ -42,7 +42,7 @@ def terminal_bode(
         False keeps to ASCII, for terminals whose encoding is not UTF-8.
     """
     summary = summarised(responses)
-    middle = f"{words.quantity(responses)}: median of {words.counted(summary.count, 'valid response')}"
+    middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'valid response')}"
     if not summary.count:
         middle = f"{words.quantity(responses)}: no valid response"
     caption = _written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.nouns import Responses
+from livebode.nouns import Responses, counted
 from livebode.report.style import shortened
 from livebode.report.ticks import frequency_label
 
@@ -35,14 +35,6 @@ def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None =
     """The line below the title: quantity, channels, lines, and how much was valid."""
     path = f" from {shortened(names[0], 30)} to {shortened(names[1], 30)}" if names else ""
     return f"{quantity(responses)}{path} · {lines_phrase(responses)} · {valid_rows} of {counted(len(responses))} valid"
-
-
-def counted(count: int, what: str = "response") -> str:
-    """
-    >>> counted(1), counted(3)
-    ('1 response', '3 responses')
-    """
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def clock(time_s: np.ndarray) -> tuple[float, str]:

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity
+from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity, counted
 from livebode.session.toml_file import one_line, read_table, shortened
 from livebode.sources.live import SourceSettings, checked_address
 
-_SAME_RATE = 1e-6
+SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
 _MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
@@ -115,11 +115,12 @@ class LoopSection(_Section):
         """The Loop that this describes, recorded at `rate_hz`; InputError where the parts do not make one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
-            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > _SAME_RATE:
+            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
+                held = counted(part.held_ticks, "tick")
                 raise InputError(
-                    f"loop.{name} runs at {part.rate_hz:g} Hz and holds {part.held_ticks} ticks, which makes "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the recording has {rate_hz:g} Hz; held_ticks is the "
-                    "recording's rate over the controller's"
+                    f"loop.{name} runs at {part.rate_hz:g} Hz and holds {held}, which makes "
+                    f"{part.rate_hz * part.held_ticks:g} Hz, but the samples come at {rate_hz:g} Hz; held_ticks is "
+                    "their rate over the controller's"
                 )
         return Loop(
             feedback=self._feedback(),
@@ -248,8 +249,8 @@ class Axis(_Section):
 
 
 def _sentence(error: ValidationError) -> str:
-    """The first thing that is wrong, with its place and value."""
-    first = error.errors(include_url=False)[0]
+    """The first thing that is wrong, with its place and value; what is missing last: a misspelt key leaves a gap."""
+    first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
     # Behind a choice of types pydantic puts the name of the type that it tried.
     place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":

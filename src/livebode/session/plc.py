@@ -2,43 +2,133 @@
 
 from __future__ import annotations
 
+import json
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.design import Waveform
 from livebode.excitation import multisine
-from livebode.nouns import InputError, Lines
-from livebode.session.axis import Axis
+from livebode.nouns import InputError, Lines, counted
+from livebode.session.axis import SAME_RATE, Axis
+from livebode.session.designed import ramp_periods
 from livebode.sources.live.settings import named_channels
-from livebode.structured_text import Project, check_signals
+from livebode.structured_text import SMALLEST, Project, check_rate, check_signals
+
+Floats = NDArray[np.float64]
+_TAKE = "take the axis.toml that `livebode design` left beside it"
 
 
-def plc_project(axis: Axis, rate_hz: float | None, amplitude: float, limit: float, ring_length: int) -> Project:
-    """The project of an axis: a flat multisine at its lines, its signals tracked, its channels in the ring.
+def plc_project(
+    axis: Axis,
+    *,
+    limit: float,
+    ring_length: int,
+    rate_hz: float | None = None,
+    amplitude: float | None = None,
+    designed: Waveform | None = None,
+) -> Project:
+    """The project of an axis: its excitation, its signals tracked, its channels in the ring.
+
+    Parameters
+    ----------
+    axis
+        Names the signals, lines and window; its rate and its controllers' are held against the task's.
+    limit
+        What the excitation never exceeds.
+    ring_length
+        Samples that the ring keeps.
+    rate_hz
+        Of the task, if neither the axis nor the design has it.
+    amplitude
+        Of a flat multisine at the axis's lines, with Schroeder's phases.
+    designed
+        Instead (see `read_designed`): its period is played as it is, and brought in over its `ramp_s`.
 
     Raises
     ------
     InputError
-        If the axis names no excitation, no exact lines and window, or no rate; or as `Project.files` does.
+        If not just one of `amplitude` and `designed` is given, rates or lines contradict each other, the axis names no
+        excitation, no exact lines and window, or no rate; or as `read_designed` and `Project.files` do.
     """
-    rate = rate_hz or axis.source.rate_hz
-    if rate is None:
-        raise InputError("the rate of the PLC's task is not said; give --rate HZ, or source.rate_hz")
+    if (amplitude is None) == (designed is None):
+        raise InputError("give either --amplitude SIZE, of each line, or --excitation FILE.npz of `livebode design`")
+    whole = None if designed is None else designed.lines
+    rate = _rate_hz(
+        {
+            "--rate": rate_hz,
+            "the designed excitation": None if whole is None else whole.rate_hz,
+            "source.rate_hz": axis.source.rate_hz,
+        }
+    )
     signals, excitation = axis.signals, axis.signals.excitation
     if excitation is None:
         raise InputError("signals.excitation is missing; name the channel that the PLC adds to the torque reference")
-    frequencies, window = axis.lines.frequencies, axis.lines.window
-    if frequencies == "auto" or window == "auto":
-        raise InputError("lines or window are 'auto'; give lines.frequencies and lines.window, which the PLC excites")
-    lines = Lines.parse(frequencies, rate, window)
+    axis.loop.build(rate)
+    lines = _lines(axis, rate, whole)
     tracked = [name for name in (excitation, signals.input, signals.output) if name is not None]
     named = [channel.name for channel in named_channels(axis.source.channels)]
     recorded = [*tracked, *([] if signals.schedule is None else [signals.schedule])]
     check_signals(recorded)
+    period, periods, note = _flat(lines, amplitude) if designed is None else _designed(designed)
     return Project(
-        period=multisine(lines, amplitude),
+        period=period,
         limit=limit,
         lines=lines,
         channels=named or list(dict.fromkeys(recorded)),
         excitation=excitation,
         tracked=list(dict.fromkeys(tracked)),
         ring_length=ring_length,
-        note=f"{len(lines)} lines of amplitude {amplitude:g} with Schroeder's phases: "
-        f"{', '.join(f'{f:g}' for f in lines.frequency_hz)} Hz",
+        ramp_periods=periods,
+        note=note,
     )
+
+
+def _rate_hz(said: dict[str, float | None]) -> float:
+    """The one rate of the task, on which all who say one agree."""
+    known = [(who, rate_hz) for who, rate_hz in said.items() if rate_hz is not None]
+    if not known:
+        raise InputError("the rate of the PLC's task is not said; give --rate HZ, or source.rate_hz")
+    first, rate = known[0]
+    check_rate(rate)
+    for other, rate_hz in known[1:]:
+        if abs(rate - rate_hz) > SAME_RATE * rate_hz:
+            raise InputError(
+                f"{first} says {rate:g} Hz, but {other} {rate_hz:g} Hz; the PLC's task has one rate, correct it"
+            )
+    return rate
+
+
+def _lines(axis: Axis, rate_hz: float, whole: Lines | None) -> Lines:
+    """The axis's lines; a design must excite them all, and its own stand for "auto"."""
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if whole is not None:
+        if window not in ("auto", whole.window):
+            raise InputError(f"lines.window is {window}, but the design's period has {whole.window} samples; {_TAKE}")
+        window = whole.window
+        if frequencies == "auto":
+            return whole
+    if frequencies == "auto" or window == "auto":
+        raise InputError("lines or window are 'auto'; give lines.frequencies and lines.window, which the PLC excites")
+    lines = Lines.parse(frequencies, rate_hz, window)
+    if whole is not None and (silent := set(lines.bins) - set(whole.bins)):
+        raise InputError(
+            f"the design does not excite {min(silent) * lines.resolution_hz:g} Hz; leave that out, or {_TAKE}"
+        )
+    return lines
+
+
+def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
+    """A multisine with all lines alike: period, periods of its ramp, and what it is."""
+    if amplitude is None or not SMALLEST <= amplitude < inf:
+        raise InputError(f"{amplitude=} is not a finite number from {SMALLEST} up; give the size of each line")
+    frequencies = ", ".join(f"{f:g}" for f in lines.frequency_hz)
+    note = f"{counted(len(lines), 'line')} of amplitude {amplitude:g} with Schroeder's phases: {frequencies} Hz"
+    return multisine(lines, amplitude), 1, note
+
+
+def _designed(waveform: Waveform) -> tuple[Floats, int, str]:
+    """The same of a design."""
+    note = "\n".join(f"{key}: {json.dumps(value)}" for key, value in waveform.about.items())
+    return waveform.samples, ramp_periods(waveform), note

@@ -7,11 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.nouns import InputError, rounded_down
 from livebode.structured_text.names import check_name
-from livebode.structured_text.text import array, comment, real, section
+from livebode.structured_text.text import array, check_rate, comment, real, section
 
 PERIOD_MAX = 16384
 """Longest period, samples: each is a line of text that the PLC's compiler reads."""
-RAMP_PERIODS_MAX = 1000
+SMALLEST = float(np.finfo(np.float64).tiny)
+"""Size below which an LREAL loses digits, or is none to some controllers."""
+_UDINT_MAX = 2**32 - 1
 _LOADED_AT_ONCE = 32  # samples a cycle while the table fills, so that the first cycle is as short as the others
 
 _BELOW = 1 - 1e-12  # so that the scaled samples' own rounding does not lead beyond the limit again
@@ -110,7 +112,7 @@ def multisine(
     Raises
     ------
     InputError
-        If the period is not one of 2 to 16384 finite samples, is zero or exceeds the limit, or the name is none that
+        If the period is not one of 2 to 16384 finite samples, is silence or exceeds the limit, or the name is none that
         Structured Text takes.
 
     Examples
@@ -122,10 +124,11 @@ def multisine(
     samples = _checked(period)
     if not (np.isfinite(limit) and limit > 0):
         raise InputError(f"{limit=} is no finite number above 0; give the most that drive and machine bear")
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not above 0; give the calls per second")
-    if not 1 <= ramp_periods <= RAMP_PERIODS_MAX:
-        raise InputError(f"{ramp_periods=} is not between 1 and {RAMP_PERIODS_MAX} periods; 1 is enough for most axes")
+    check_rate(rate_hz)
+    if not 1 <= ramp_periods <= _UDINT_MAX // len(samples):
+        raise InputError(
+            f"{ramp_periods=} is not from 1 to {_UDINT_MAX // len(samples)} periods; 1 is enough for most axes"
+        )
     peak = float(np.max(np.abs(samples)))
     if peak > limit:
         raise InputError(
@@ -160,8 +163,8 @@ def _checked(period: ArrayLike) -> NDArray[np.float64]:
     if not np.all(np.isfinite(samples)):
         bad = int(np.flatnonzero(~np.isfinite(samples))[0])
         raise InputError(f"sample {bad} of the period is {samples[bad]}; give finite numbers")
-    if not np.any(samples):
-        raise InputError("the period is zero everywhere; give an excitation")
+    if (peak := float(np.max(np.abs(samples)))) < SMALLEST:
+        raise InputError(f"the period is nowhere larger than {peak}; give an excitation")
     return samples
 
 

@@ -48,6 +48,8 @@ class Project:
         Those that the sliding DFT follows.
     ring_length
         Samples that the ring keeps.
+    ramp_periods
+        Periods over which the excitation is brought in and out.
     counter
         Name of one more channel: the excitation's sample counter, whose multiples of the window are borders of periods.
     note
@@ -61,6 +63,7 @@ class Project:
     excitation: str
     tracked: Sequence[str]
     ring_length: int = LENGTH
+    ramp_periods: int = 1
     counter: str = COUNTER
     note: str = ""
 
@@ -85,7 +88,9 @@ class Project:
         check_names(self.columns, "channel", _OWN)
         rate_hz = self.lines.rate_hz
         return {
-            "FB_Multisine.st": multisine(self.period, rate_hz=rate_hz, limit=self.limit, note=self.note),
+            "FB_Multisine.st": multisine(
+                self.period, rate_hz=rate_hz, limit=self.limit, ramp_periods=self.ramp_periods, note=self.note
+            ),
             "FB_SlidingDft.st": sliding_dft(self.lines, self.tracked),
             "ST_LivebodeRing.st": ring_type(len(self.columns), rate_hz, length=self.ring_length),
             "FB_LivebodeRing.st": ring_block(self.columns, length=self.ring_length),

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from livebode.nouns import InputError
+from livebode.nouns import InputError, counted
 from livebode.structured_text.names import check_name, check_names
-from livebode.structured_text.text import array, check_bytes, comment, real, section
+from livebode.structured_text.text import array, check_bytes, check_rate, comment, real, section
 
 LENGTH = 8192
 CHANNELS_MAX = 64
@@ -52,8 +50,7 @@ def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str 
     """
     check_name(name, "type")
     _check_size(channels, length)
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not above 0; give the samples per second")
+    check_rate(rate_hz)
     members = [
         ("magic", "UDINT := 16#474E524C", "byte 0"),
         ("version", "UINT := 1", "4"),
@@ -67,7 +64,7 @@ def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str 
     ]
     declared = section("STRUCT", members).replace("END_VAR", "END_STRUCT")
     return (
-        comment(f"What livebode reads: {length} samples of {channels} channels, {length / rate_hz:.4g} s")
+        comment(f"What livebode reads: {length} samples of {counted(channels, 'channel')}, {length / rate_hz:.4g} s")
         + f"TYPE {name} :\n{declared}END_TYPE\n"
     )
 
@@ -122,7 +119,9 @@ def ring_block(
 
 def _check_size(channels: int, length: int) -> None:
     if not 1 <= channels <= CHANNELS_MAX:
-        raise InputError(f"a ring of {channels} channels is not one of 1 to {CHANNELS_MAX}; take a ring for each few")
+        raise InputError(
+            f"a ring of {counted(channels, 'channel')} is not one of 1 to {CHANNELS_MAX}; take a ring for each few"
+        )
     if length < 2:
         raise InputError(f"a ring of {length=} samples is too short; take at least 2, better {LENGTH}")
-    check_bytes(_HEADER_BYTES, 8 * channels, length, f"a ring of {channels} channels")
+    check_bytes(_HEADER_BYTES, 8 * channels, length, f"a ring of {counted(channels, 'channel')}")

@@ -155,7 +155,7 @@ def sliding_dft(
     if phase not in ("fixed", "window"):
         raise InputError(f"{phase=} is not known; take 'fixed' or 'window'")
     if not 1 <= len(channels) <= CHANNELS_MAX:
-        raise InputError(f"{len(channels)} channels are not between 1 and {CHANNELS_MAX}; take one block for each few")
+        raise InputError(f"channels {list(channels)} are not 1 to {CHANNELS_MAX} names; take a block for each few")
     bins, window = len(lines), lines.window
     outputs, own = _outputs(len(channels), bins), _own(len(channels), bins, window, phase)
     check_names(channels, "channel", [name, *(v for names, _, _ in (*outputs, *own) for v in names.split(", "))])

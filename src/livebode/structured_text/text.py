@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isfinite
 
-from livebode.nouns import InputError
+from livebode.nouns import InputError, counted
 
 BYTES_MAX = 8 << 20
 """Most memory of one block or ring: what livebode reads from a PLC, and more than most PLCs leave free."""
@@ -48,11 +49,17 @@ def array(*lengths: int, of: str = "LREAL") -> str:
     return f"ARRAY [{', '.join(f'0..{length - 1}' for length in lengths)}] OF {of}"
 
 
+def check_rate(rate_hz: float) -> None:
+    """InputError for what is no rate of a task."""
+    if not (isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"{rate_hz=} is not above 0; give the cycles of the task per second")
+
+
 def check_bytes(fixed: int, each: int, count: int, what: str) -> None:
     """InputError where `fixed` + `each`·`count` bytes are more than a PLC has; `what` names that which is counted."""
     needed = fixed + each * count
     if needed > BYTES_MAX:
         raise InputError(
-            f"{what} of {count} samples takes {needed} bytes of the PLC, more than {BYTES_MAX}; "
-            f"take at most {(BYTES_MAX - fixed) // each} samples"
+            f"{what} of {counted(count, 'sample')} takes {needed} bytes of the PLC, more than {BYTES_MAX}; "
+            f"take at most {counted((BYTES_MAX - fixed) // each, 'sample')}"
         )

@@ -1,0 +1,53 @@
+"""The excitation that `livebode design` left, read back for a PLC."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from math import ceil, isfinite
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.design import Waveform
+from livebode.nouns import InputError, Lines
+
+
+def read_designed(path: Path) -> Waveform:
+    """The excitation in an .npz of `livebode design`; its `about` is all that the file says of it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is none of those.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as held:
+            samples, frequency_hz, rate_hz = (_reals(held[key]) for key in ("samples", "frequency_hz", "rate_hz"))
+            rate = float(rate_hz)
+            about = json.loads(str(held["facts"]))
+        bins = [round(f * samples.size / rate) for f in frequency_hz.tolist()]
+        if max(bins) > samples.size:
+            raise ValueError(bins)
+        return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise InputError(f"{str(path)!r} could not be read: {why}") from None
+    except (ValueError, KeyError, TypeError, AttributeError, EOFError, ArithmeticError, zipfile.BadZipFile, zlib.error):
+        raise InputError(f"{str(path)!r} is no .npz that `livebode design` left; take its excitation.npz") from None
+
+
+def ramp_periods(waveform: Waveform) -> int:
+    """Whole periods over which it is to be brought in: as many as its design's `ramp_s` needs, else one."""
+    ramp_s = waveform.about.get("ramp_s", 0.0)
+    if isinstance(ramp_s, bool) or not isinstance(ramp_s, (int, float)) or not (isfinite(ramp_s) and ramp_s >= 0):
+        raise InputError(f"the excitation's {ramp_s=} is no time; design it again")
+    lines = waveform.lines
+    return max(1, ceil(ramp_s * lines.rate_hz / lines.window - 1e-9))
+
+
+def _reals(array: NDArray[np.generic]) -> NDArray[np.float64]:
+    return array.astype(np.float64, casting="same_kind")
