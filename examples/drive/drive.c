@@ -13,12 +13,17 @@ static const float subtracted[DRIVE_SIGNALS] = {0, DRIVE_VELOCITY_RAD_S};
 static unsigned char memory[EXCITATION_SAMPLES * (8 + 4 * DRIVE_SIGNALS) + EXCITATION_LINES * (12 + 16 * DRIVE_SIGNALS) +
                             256];
 
+enum { RAMP = DRIVE_RAMP_PERIODS * EXCITATION_SAMPLES };
+
 static lb_sdft32 *dft;
 static uint64_t epoch, samples;
 static char layout[DRIVE_LAYOUT_TEXT];
 static uint32_t sequence, layout_bytes, layout_crc;
 static uint32_t place;       /* of the next sample in the excitation's period */
-static uint32_t whole_after; /* samples until the window holds neither the start nor one that was not finite */
+static uint32_t level;       /* of the ramp, in samples */
+static int rising;           /* ramping in, or there */
+static volatile int enabled;
+static uint32_t whole_after; /* samples until the window holds neither start nor ramp nor one that was not finite */
 static struct {
     float sums[DRIVE_SIGNALS][EXCITATION_LINES][2];
     uint64_t newest;
@@ -69,19 +74,34 @@ int drive_begin(uint64_t epoch_)
     return lb_sdft32_init(memory, sizeof memory, &config, &dft) != LB_OK;
 }
 
-float drive_excitation(void) { return excitation[place]; }
+void drive_enable(int on) { enabled = on; }
+
+float drive_excitation(void) { return excitation[place] * ((float)level / RAMP); }
 
 static int is_finite(float x) { return x - x == 0.0f; }
+
+static void advance(void)
+{
+    level += rising && level < RAMP;
+    level -= !rising && level > 0;
+    place = place + 1 < EXCITATION_SAMPLES ? place + 1 : 0;
+    if (place == 0) {
+        rising = enabled;
+    }
+}
 
 void drive_tick(float torque_n_m, float velocity_rad_s)
 {
     const float x[DRIVE_SIGNALS] = {torque_n_m - subtracted[0], velocity_rad_s - subtracted[1]};
     (void)lb_sdft32_push(dft, x);
-    place = place + 1 < EXCITATION_SAMPLES ? place + 1 : 0;
     whole_after -= whole_after > 0;
+    if (whole_after < EXCITATION_SAMPLES && !(rising && level == RAMP)) {
+        whole_after = EXCITATION_SAMPLES;
+    }
     if (!is_finite(x[0]) || !is_finite(x[1])) {
         whole_after = 2 * EXCITATION_SAMPLES; /* the kernel has forgotten it by then */
     }
+    advance();
     if (++samples % DRIVE_HOP == 0) {
         (void)lb_sdft32_read(dft, LB_PHASE_FIXED, &latest.sums[0][0][0]);
         latest.newest = samples - 1;

@@ -10,7 +10,19 @@
 #define EXCITATION_TYPE float
 #include "excitation.h"
 
-#define DRIVE_HOP 200 /* samples from spectrum to spectrum, 20 a second; it divides the window */
+#define DRIVE_RATE_HZ 4000 /* of the control interrupt */
+#ifndef DRIVE_HOP
+#define DRIVE_HOP 200 /* samples from spectrum to spectrum, 20 a second */
+#endif
+#ifndef DRIVE_RAMP_PERIODS
+#define DRIVE_RAMP_PERIODS 5 /* over which the excitation is brought in and out */
+#endif
+#ifndef DRIVE_LIMIT_N_M
+#define DRIVE_LIMIT_N_M 0.5f /* what the excitation never exceeds */
+#endif
+_Static_assert(EXCITATION_SAMPLES % DRIVE_HOP == 0, "DRIVE_HOP must divide EXCITATION_SAMPLES; define another hop");
+_Static_assert(EXCITATION_RATE_HZ == DRIVE_RATE_HZ, "the excitation is made for another rate than DRIVE_RATE_HZ");
+_Static_assert((float)EXCITATION_PEAK_N_M <= DRIVE_LIMIT_N_M, "the excitation exceeds DRIVE_LIMIT_N_M");
 #ifndef DRIVE_VELOCITY_RAD_S
 #define DRIVE_VELOCITY_RAD_S 30 /* taken off the velocity: what it is about at this speed */
 #endif
@@ -22,6 +34,9 @@ enum { DRIVE_SIGNALS = 2 };
 
 /* epoch: another number at each start. 0 when it is ready. */
 int drive_begin(uint64_t epoch);
+
+/* Whether to excite: taken over where a period begins, and followed over DRIVE_RAMP_PERIODS of them. At first it does not. */
+void drive_enable(int on);
 
 /* In the control interrupt: what to add to the torque reference in this cycle … */
 float drive_excitation(void);

@@ -13,7 +13,7 @@
 #define SPECTRA ((volatile uint32_t *)0x40004000u)
 #define SAMPLES ((volatile uint32_t *)0x40005000u)
 
-enum { RATE_HZ = 4000, BATCH = 100, BATCHES = SECONDS * RATE_HZ / BATCH };
+enum { RATE_HZ = DRIVE_RATE_HZ, BATCH = 100, BATCHES = SECONDS * RATE_HZ / BATCH };
 static const char layout[] = "u\tN m\ny\trad/s\n";
 
 /* Two batches: the interrupt fills one while the other is sent. */
@@ -79,6 +79,7 @@ int main(void)
     }
     serial_begin(SPECTRA);
     serial_begin(SAMPLES);
+    drive_enable(1);
     TICK[1] = CLOCK_HZ / RATE_HZ - 1;
     TICK[2] = 0;
     TICK[0] = 7; /* processor clock, interrupt, on */

@@ -26,6 +26,10 @@ from tests.truth.test_live_run import started, table
 FOLDER = ROOT / "examples" / "drive"
 LINES = Lines.parse("20:220:10", rate_hz=4000, window=400)
 SECONDS = 6
+# The excitation begins with the second period and is brought in over five; whole windows begin there.
+RAMP = 5 * LINES.window
+STEADY = LINES.window + RAMP
+SPOILT = (STEADY + LINES.window) // 200 - 1
 AXIS = (FOLDER / "axis.toml").read_text(encoding="utf-8")
 URL = 'url = "tcp://127.0.0.1:5000"'
 
@@ -99,7 +103,7 @@ def sums_of(samples: np.ndarray, dtype: str, constant: float) -> np.ndarray:
 def test_the_frames_carry_the_bits_that_the_host_computes_from_the_same_samples(drive):
     _, sent = drive
     assert sent.newest.tolist() == list(range(199, SECONDS * 4000, 200))
-    assert sent.state.tolist() == [1] + [0] * (len(sent.state) - 1)
+    assert sent.state.tolist() == [1] * SPOILT + [0] * (len(sent.state) - SPOILT)
     assert np.array_equal(sent.sums.astype(np.complex64), sums_of(sent.samples, "float32", 30))
 
 
@@ -109,14 +113,15 @@ def test_twenty_spectra_a_second_are_less_than_a_quarter_of_the_samples(drive):
 
 
 def test_the_excitation_is_the_design_and_the_responses_are_the_machines(drive):
-    """Torque beside the controller's is the multisine to float's rounding; y/u is the two masses' within the noise."""
+    """Torque beside the controller's is the multisine to float's rounding, brought in evenly; y/u is the machine's."""
     _, sent = drive
     c = constants()
     u, y = sent.samples
     excitation = u - c["GAIN_N_M_S_RAD"] * (c["SPEED_RAD_S"] - y)
     period = multisine(LINES, 0.05)
-    assert np.abs(excitation - np.resize(period, len(u))).max() < 2e-6
-    frf = (sent.sums[1, 2:] / sent.sums[0, 2:]).mean(axis=0)
+    level = np.clip((np.arange(len(u)) - LINES.window) / RAMP, 0, 1)
+    assert np.abs(excitation - np.resize(period, len(u)) * level).max() < 2e-6
+    frf = (sent.sums[1, SPOILT:] / sent.sums[0, SPOILT:]).mean(axis=0)
     assert np.abs(frf / two_masses(c) - 1).max() < 3e-3
 
 
@@ -143,7 +148,7 @@ def test_the_constant_is_worth_its_digits(drive, tmp_path):
     errors = {}
     for constant, given in ((30, sent), (0, played(built(tmp_path, "-DDRIVE_VELOCITY_RAD_S=0")))):
         exact = sums_of(given.samples, "float64", 30)
-        frf, truth = (s[1, 2:] / s[0, 2:] for s in (given.sums, exact))
+        frf, truth = (s[1, SPOILT:] / s[0, SPOILT:] for s in (given.sums, exact))
         errors[constant] = np.abs(frf / truth - 1).max()
     print(
         f"float32 against float64, worst relative error of y/u: {errors[30]:.1e}, without the constant {errors[0]:.1e}"
@@ -155,18 +160,21 @@ def test_the_constant_is_worth_its_digits(drive, tmp_path):
 def test_livebode_run_makes_the_same_of_its_frames_as_of_its_samples(drive, tmp_path):
     program, sent = drive
     spectra = live_run(program, tmp_path)
-    write_parquet(
-        tmp_path / "log.parquet", {"t": np.arange(sent.samples.shape[1]) / 4000} | dict(zip("uy", sent.samples))
-    )
+    spoilt = spectra["sample"] < STEADY
+    assert not np.any(spectra["valid"][spoilt])
+    spectra = {name: column[~spoilt] for name, column in spectra.items()}
+    samples = sent.samples[:, STEADY:]
+    write_parquet(tmp_path / "log.parquet", {"t": np.arange(samples.shape[1]) / 4000} | dict(zip("uy", samples)))
     lines = '[lines]\nfrequencies = "20:220:10"\nwindow = 400\n'
     (tmp_path / "log.toml").write_text(AXIS.replace(URL, 'log = "log.parquet"') + f"hop = 200\n{lines}")
     assert livebode("run", tmp_path / "log.toml", "--out", tmp_path / "recorded").code == 0
     theirs = table(tmp_path / "recorded")
     assert set(spectra) == set(theirs)
+    theirs["sample"] = theirs["sample"] + STEADY
     for name in ("sample", "frequency_hz", "valid", "dof"):
         np.testing.assert_array_equal(spectra[name], theirs[name], err_msg=name)
     valid = theirs["valid"]
-    assert np.count_nonzero(valid) == (SECONDS * 20 - 1) * len(LINES)
+    assert np.count_nonzero(valid) == (SECONDS * 20 - SPOILT) * len(LINES)
     frf, truth = (rows["re"][valid] + 1j * rows["im"][valid] for rows in (spectra, theirs))
     error = np.abs(frf / truth - 1).max()
     print(f"responses from frames against those from samples, worst relative difference: {error:.1e}")
