@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -87,6 +88,7 @@ def table(core: Core, counted: Counted) -> list[str]:
 
 
 def main() -> None:
+    argparse.ArgumentParser(prog="python -m bench.mcu", description=__doc__).parse_args()
     if absent := missing():
         sys.exit(f"{' and '.join(absent)} not installed: `make system-packages` installs them")
     for core in (M4F, M7):

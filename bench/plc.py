@@ -6,6 +6,8 @@ change of LREAL numbers.
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 
 from livebode.excitation import multisine as multisine_period
@@ -109,6 +111,7 @@ def excitation(count: int) -> str:
 
 def main() -> None:
     """Print the tables."""
+    argparse.ArgumentParser(prog="python -m bench.plc", description=__doc__).parse_args()
     print(f"FB_SlidingDft, N = {WINDOW}\n")
     print("| K | channels | phase | mean | most | while the table fills | bytes | difference to the kernel |")
     print("|---|---|---|---|---|---|---|---|")
