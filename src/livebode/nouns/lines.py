@@ -189,10 +189,12 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
     near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
     sentence = (
         f"the line {float(line):g} Hz is not on the {float(resolution):g} Hz grid of window={window} at "
-        f"{rate_hz:g} Hz; the nearest lines are {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
+        f"{rate_hz:g} Hz; the nearest {'lines are' if len(near) > 1 else 'line is'} "
+        f"{' and '.join(f'{float(f):.6g}' for f in near)} Hz"
     )
     unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**6).denominator for f in wanted))
     multiples = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
     if unit > 100 * window:
         return sentence + ", and no window of a useful length would fit them all"
-    return sentence + f", and windows of {' or '.join(map(str, multiples))} samples would fit"
+    which = "windows" if len(multiples) > 1 else "a window"
+    return f"{sentence}, and {which} of {' or '.join(map(str, multiples))} samples would fit"
