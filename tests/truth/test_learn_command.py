@@ -207,6 +207,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("lines.rate_hz", "fast", "lines.rate_hz = 'fast' is not a number"),
         ("estimator", None, "estimator is missing"),
         ("tables", [], "tables = [] is empty"),
+        ("hop", 0, "hop = 0 is below 1"),
         ("signals", 3, "signals = 3 is not a table"),
     ],
 )

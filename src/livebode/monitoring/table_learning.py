@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.accuracy import Accuracy, accuracy
+from livebode.monitoring.accuracy import STRETCH, Accuracy, accuracy
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
 from livebode.nouns import InputError
@@ -55,7 +55,8 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
     known = np.isfinite(variance)
     information = np.where(known, 1 / variance, 0.0)
     score = np.where(known, deviation, 0.0) * information
-    return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest))
+    off = _off(table, cell, information)
+    return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest, off))
 
 
 def _grid(rows: Rows) -> tuple[float, float, float, int]:
@@ -105,3 +106,21 @@ def _smallest(table: Table) -> Floats:
     enough = table.count.ravel() >= WINDOWS_MIN
     known = KNOWN * np.sqrt(own[enough] / table.count.ravel()[enough, np.newaxis])
     return np.asarray(np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0)))
+
+
+def _off(table: Table, cell: NDArray[np.intp], information: Floats) -> Floats:
+    """Standard deviation of what the means' own errors add up to over a stretch of rows, (components,).
+
+    The mean of n rows is off by a variance/n, by the same in every row of its cell: a machine that stays in one cell
+    shows all of it for ever, one that goes through many shows their mean.
+    """
+    cells, count = table.count.size, table.count.ravel()[:, np.newaxis]
+    own = np.einsum("...ii->...i", table.covariance).reshape(cells, -1) / np.maximum(count, 1)
+    stretch = np.arange(len(cell)) // STRETCH
+    pair, at = np.unique(stretch * cells + cell, return_inverse=True)
+    weight = np.stack([np.bincount(at, column) for column in information.T], axis=1)
+    error = np.where(weight > 0, weight**2 * own[pair % cells], 0.0)
+    variance, total = (np.stack([np.bincount(pair // cells, c) for c in x.T], axis=1) for x in (error, weight))
+    known = total > 0
+    of_stretch = np.where(known, variance / np.where(known, total, 1.0) ** 2, 0.0)
+    return np.asarray(np.sqrt(of_stretch.sum(axis=0) / np.maximum(known.sum(axis=0), 1)))
