@@ -246,6 +246,7 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
     [
         ({"excitation": {}}, "either a [belt]"),
         ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}, "measured": {"noise": 1.0}}, "'measured.run' is missing"),
         ({"excitation": {}, "belt": {"mechanic": {}}}, "did you mean 'mechanics'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load": 3}}}, "did you mean 'load_kg'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load_kg": "much"}}}, "should be a valid number"),
@@ -305,7 +306,8 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
         (["--amplitude", "-1"], "amplitude_n_m=-1"),
         (["--band", "20-140"], "--band '20-140'"),
         (["--to", "xlsx"], "'.xlsx' is not known"),
-        (["--name", "int"], "keyword of C"),
+        (["--name", "int"], "keyword or macro of C"),
+        (["--name", "NULL", "--to", "h"], "take for example 'NULL_w'"),
         (["--name", "a,b", "--to", "csv"], "cannot head a column"),
         (["--name", "../a", "--to", "csv"], "none of a file"),
         (["--name", "/tmp/a", "--to", "npz"], "none of a file"),

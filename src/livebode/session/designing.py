@@ -56,7 +56,7 @@ def design_experiment(
         If nothing can be chosen (see `choose`), a format is not known or forbids the name, something stands in the
         directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
     """
-    kinds = None if suffixes is None else tuple(f".{s.lstrip('.')}" for s in suffixes)
+    kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
     for kind in kinds or ():
         if kind not in FORMATS:
             raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")

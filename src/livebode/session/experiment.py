@@ -88,6 +88,8 @@ class Experiment(BaseModel):
                 raise InputError(
                     f"{origin}: there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
                 ) from None
+            if first["type"] == "missing":
+                raise InputError(f"{origin}: {place!r} is missing; add it") from None
             raise InputError(f"{origin}: {place} = {first['input']!r} is not usable: {first['msg'].lower()}") from None
         if (found.belt is None) == (found.measured is None):
             raise InputError(f"{origin}: describe either a [belt] axis by its constants, or one that was [measured]")
