@@ -13,7 +13,7 @@ static const float subtracted[DRIVE_SIGNALS] = {0, DRIVE_VELOCITY_RAD_S};
 static unsigned char memory[EXCITATION_SAMPLES * (8 + 4 * DRIVE_SIGNALS) + EXCITATION_LINES * (12 + 16 * DRIVE_SIGNALS) +
                             256];
 
-enum { RAMP = DRIVE_RAMP_PERIODS * EXCITATION_SAMPLES };
+enum { RAMP = EXCITATION_RAMP_PERIODS * EXCITATION_SAMPLES };
 
 static lb_sdft32 *dft;
 static uint64_t epoch, samples;

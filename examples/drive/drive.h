@@ -14,9 +14,6 @@
 #ifndef DRIVE_HOP
 #define DRIVE_HOP 200 /* samples from spectrum to spectrum, 20 a second */
 #endif
-#ifndef DRIVE_RAMP_PERIODS
-#define DRIVE_RAMP_PERIODS 5 /* over which the excitation is brought in and out */
-#endif
 #ifndef DRIVE_LIMIT_N_M
 #define DRIVE_LIMIT_N_M 0.5f /* what the excitation never exceeds */
 #endif
@@ -35,7 +32,7 @@ enum { DRIVE_SIGNALS = 2 };
 /* epoch: another number at each start. 0 when it is ready. */
 int drive_begin(uint64_t epoch);
 
-/* Whether to excite: taken over where a period begins, and followed over DRIVE_RAMP_PERIODS of them. At first it does not. */
+/* Whether to excite: taken over where a period begins, and followed over EXCITATION_RAMP_PERIODS of them. At first it does not. */
 void drive_enable(int on);
 
 /* In the control interrupt: what to add to the torque reference in this cycle … */

@@ -13,7 +13,10 @@
 #define LB_LANES (128 / LB_BITS)
 #endif
 
+/* Calls where speed is no matter: with the sanitizers' checks, inlining makes objects of megabytes. */
+#ifndef LB_INLINE
 #define LB_INLINE static inline __attribute__((always_inline))
+#endif
 
 typedef real vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_alias));
 typedef real loose_vec

@@ -400,6 +400,25 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
         assert tab.wrong == []
 
 
+def test_an_answer_to_an_earlier_wish_undoes_no_choice_of_an_axis(
+    browser: Browser, whole: Path, tmp_path: Path
+) -> None:
+    with Watched(tmp_path / "other", loop=None) as other:
+        other.go(12_000)
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard.view(whole)
+    dashboard.view(other.directory)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        for key in "42424242":  # another quantity, and in the same moment another axis: the answers cross the wishes
+            tab.js(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }}))")
+            tab.page.locator("#axis").select_option("1")
+            tab.until("page.facts.name === 'other' && bode.curves.measured?.frame.axis === 1")
+            tab.js("new Promise((done) => setTimeout(done, 200))")  # a wish that went astray would be answered by now
+            assert tab.js("[page.axis, page.facts.name]") == [1, "other"]
+            tab.page.locator("#axis").select_option("0")
+            tab.until("page.facts.name === 'run' && bode.curves.measured?.frame.axis === 0")
+
+
 def test_a_link_that_breaks_comes_back(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.estimation import Settings, Tracker
-from livebode.monitoring import Apart, Baseline, Monitor, learn_table, signals_of
+from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.nouns import Block, InputError
 from livebode.simulation import TensionLoss
 from studies.monitoring_axis import LINES
@@ -19,9 +19,13 @@ FAULT = TensionLoss(start_s=6.0, loss=0.03)
 
 
 def baseline(by_model: bool) -> Baseline:
-    rows = Apart(LINES.window, SETTINGS.step).of_responses(Tracker(SETTINGS).process(recorded((0.3,) * 12, seed=40)))
-    table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], [rows])
-    return Baseline(LINES, signals_of(SETTINGS), "joint", "plant", (table,), machine() if by_model else None)
+    responses = Tracker(SETTINGS).process(recorded((0.3,) * 12, seed=40))
+    at = places(LINES.window, SETTINGS.step)
+    rows = [Apart(LINES.window, place).of_responses(responses) for place in at]
+    table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], rows, len(at))
+    return Baseline(
+        LINES, SETTINGS.step, signals_of(SETTINGS), "joint", "plant", (table,), machine() if by_model else None
+    )
 
 
 def events_of(monitor: Monitor, tracker: Tracker, parts: list[Block]) -> list[tuple[str, int, str]]:

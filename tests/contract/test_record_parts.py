@@ -34,7 +34,7 @@ class StopError(Exception):
 
 
 def watching() -> Watching:
-    baseline = Baseline(SETTINGS.lines, ROLES, "joint", "plant", (), machine())
+    baseline = Baseline(SETTINGS.lines, SETTINGS.step, ROLES, "joint", "plant", (), machine())
     return Watching(Monitor(baseline, SETTINGS), "healthy.json")
 
 

@@ -210,6 +210,7 @@ WRONG = [
     ({"kind": "chirp", "lines": "20:140:20"}, "has lines of its own"),
     ({"shape": "equal snr", "kind": "prbs"}, "cannot be shaped"),
     ({"resolution_n_m": float("inf")}, "resolution_n_m=inf"),
+    ({"resolution_hz": 2e-311, "kind": "prbs"}, "resolution_hz=2e-311"),
     ({"amplitude_n_m": 1e-200}, "amplitude_n_m=1e-200"),
     ({"accuracy": 1e-300}, "accuracy=1e-300"),
     ({"crest_factor_max": 0.9}, "below 1"),
@@ -230,7 +231,7 @@ WRONG = [
 @pytest.mark.parametrize(("excitation", "words"), WRONG)
 def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
     data = {"band_hz": [20, 140]} | excitation
-    if not {"window", "lines", "order"} & set(excitation):
+    if not {"window", "lines", "order", "resolution_hz"} & set(excitation):
         data["resolution_hz"] = 20
     if data.get("kind", "multisine") == "multisine":
         data["phases"] = "schroeder"
@@ -245,6 +246,7 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
     [
         ({"excitation": {}}, "either a [belt]"),
         ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}, "measured": {"noise": 1.0}}, "'measured.run' is missing"),
         ({"excitation": {}, "belt": {"mechanic": {}}}, "did you mean 'mechanics'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load": 3}}}, "did you mean 'load_kg'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load_kg": "much"}}}, "should be a valid number"),
@@ -304,8 +306,12 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
         (["--amplitude", "-1"], "amplitude_n_m=-1"),
         (["--band", "20-140"], "--band '20-140'"),
         (["--to", "xlsx"], "'.xlsx' is not known"),
-        (["--name", "int"], "keyword of C"),
+        (["--name", "int"], "keyword or macro of C"),
+        (["--name", "NULL", "--to", "h"], "take for example 'NULL_w'"),
         (["--name", "a,b", "--to", "csv"], "cannot head a column"),
+        (["--name", "../a", "--to", "csv"], "none of a file"),
+        (["--name", "/tmp/a", "--to", "npz"], "none of a file"),
+        (["--name", "", "--to", "npz"], "none of a file"),
     ):
         done = livebode("design", experiment, "--out", out, *options)
         assert done.code == 2, done.err
@@ -324,6 +330,9 @@ def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experime
     assert "--force" in livebode("design", experiment, "--out", out).err
     assert livebode("design", experiment, "--out", out, "--amplitude", "0.5", "--force").code == 0
     assert json.loads((out / "design.json").read_text())["excitation"]["amplitude_n_m"] == 0.5
+    (out / "log.parquet").write_text("an afternoon")
+    assert "also holds 'log.parquet'" in livebode("design", experiment, "--out", out, "--force").err
+    assert (out / "log.parquet").read_text() == "an afternoon"
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "thesis.txt").write_text("years")

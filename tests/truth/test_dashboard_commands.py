@@ -24,7 +24,10 @@ from tests.dashboards import Watched
 @contextmanager
 def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The command in a process of its own, and the address that it printed; ended by Ctrl-C, and cleanly."""
-    command = [sys.executable, "-c", "from livebode.cli import main; main()", *map(str, arguments)]
+    # What starts the tests in the background may have told them to ignore Ctrl-C.
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    code += "from livebode.cli import main; main()"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
     log = folder / "log.txt"
     with log.open("w") as out:
         process = subprocess.Popen(

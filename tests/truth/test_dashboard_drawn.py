@@ -241,7 +241,7 @@ def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Pat
     responses = Run.open(whole).responses()
     table = table_of(float(np.nanmin(responses.schedule)), float(np.nanmax(responses.schedule)))
     roles = {"output": "y", "input": "u", "excitation": "w", "schedule": "x"}
-    Baseline(LINES, roles, "joint", "plant", (table,), None).save(tmp_path / "healthy.json")
+    Baseline(LINES, 20, roles, "joint", "plant", (table,), None).save(tmp_path / "healthy.json")
     copy = shutil.copytree(whole, tmp_path / "run")
     summary = json.loads((copy / "run.json").read_text())
     summary["configuration"]["monitoring"] = {"baseline": str(tmp_path / "healthy.json")}

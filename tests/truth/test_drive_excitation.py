@@ -17,12 +17,12 @@ from livebode.design import Waveform, write
 FOLDER = ROOT / "examples" / "drive"
 N, RAMP = 20, 3 * 20
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
-OPTIONS = ("-DDRIVE_HOP=10", "-DDRIVE_RAMP_PERIODS=3")
+OPTIONS = ("-DDRIVE_HOP=10",)
 
 
 def made(window: int, rate_hz: float, amplitude: float) -> Waveform:
     lines = Lines((1, 3), window, rate_hz)
-    return Waveform(lines, multisine(lines, amplitude))
+    return Waveform(lines, multisine(lines, amplitude), {"ramp_s": 3 * window / rate_hz})
 
 
 EXCITATION = made(N, 4000, 0.1)

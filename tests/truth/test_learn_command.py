@@ -189,7 +189,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("{", "is not a baseline"),
         ("[]", "is not a baseline"),
         ('{"format": "livebode baseline", "version": 99}', "version 99"),
-        ('{"format": "livebode baseline", "version": 1}', "damaged"),
+        ('{"format": "livebode baseline", "version": 2}', "damaged"),
     ):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=word):
@@ -207,6 +207,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("lines.rate_hz", "fast", "lines.rate_hz = 'fast' is not a number"),
         ("estimator", None, "estimator is missing"),
         ("tables", [], "tables = [] is empty"),
+        ("hop", 0, "hop = 0 is below 1"),
         ("signals", 3, "signals = 3 is not a table"),
     ],
 )
@@ -244,4 +245,4 @@ def _small() -> Baseline:
         0.1, 0.4, np.full(28, 9),
     )  # fmt: skip
     signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
-    return Baseline(lines, signals, "joint", "plant", (table,), machine)
+    return Baseline(lines, 20, signals, "joint", "plant", (table,), machine)

@@ -229,6 +229,7 @@ def test_a_baseline_learned_from_samples_tells_a_change_in_spectra(tmp_path: Pat
     healthy = recorded(tmp_path, config, record(seconds=40.0))
     learned = livebode("learn", healthy, "--out", tmp_path / "healthy.json")
     assert learned.code == 0, learned.err
+    assert "learn with a hop of 80 or less" in learned.out
     what = replace(layout(), values=())
     config += '[monitoring]\nbaseline = "healthy.json"\n'
     changed, out = run_live(tmp_path, "changed", frames(record(0.1), what), config)

@@ -92,6 +92,27 @@ def test_windows_that_hang_together_are_allowed_for() -> None:
     assert TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1).process(slow(8)) == []
 
 
+def test_what_a_short_baseline_is_off_by_is_no_change() -> None:
+    """Sixty baselines from forty windows of one place, each judged for 1,500: no alarm.
+
+    One alarm in 30 days is asked for, and 2.5 hours are judged. A mean that is off by up to three of its standard
+    deviations keeps to that; of the 360 components one is off by more, and only from four and a half on (once in 400
+    such tests) would its sum rise.
+    """
+
+    def still(windows: int, seed: int) -> Rows:
+        rows, place = made(windows, seed, louder=5.0), made(windows, seed, louder=0.0)
+        nowhere = np.full(windows, np.nan)
+        value = rows.value / place.value
+        return Rows(**(vars(rows) | {"value": value, "schedule": nowhere, "step": nowhere, "ok": np.ones(windows) > 0}))
+
+    asked_s = seconds_between("one in 30 days of motion")
+    for seed in range(60):
+        watcher = TableMonitor(learn_table("lines", NAMES, [still(40, 1000 + seed)]), asked_s, 0.1)
+        assert watcher.process(still(1500, 2000 + seed)) == []
+        assert watcher.judged == 1500
+
+
 def test_mean_time_between_false_alarms_of_a_chart() -> None:
     """At least as long as asked for (Lorden's bound), for small and for large changes a step, over 400 waits each."""
     generator = np.random.default_rng(9)
@@ -122,3 +143,5 @@ def test_a_change_is_found_as_soon_as_information_allows() -> None:
 def test_too_little_is_refused() -> None:
     with pytest.raises(InputError, match="give longer runs"):
         learn_table("lines", NAMES, [made(20, 11)])
+    with pytest.raises(InputError, match="hold 0 windows"):
+        learn_table("lines", NAMES, [])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,7 +46,8 @@ def design_command(
         "band_hz": None if band is None else _band(band),
     }  # fmt: skip
     asked = Experiment.read(experiment, {key: value for key, value in over.items() if value is not None})
-    made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw)
+    with _working():
+        made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=_draw)
     if as_json:
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
         return
@@ -53,6 +55,13 @@ def design_command(
     if made.left_out:
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
+
+
+def _working() -> AbstractContextManager[object]:
+    """On a terminal a sign of life: thousands of lines take their time."""
+    from rich.console import Console
+
+    return Console(stderr=True).status("choosing")
 
 
 def _band(text: str) -> list[float]:

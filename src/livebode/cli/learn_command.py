@@ -39,7 +39,12 @@ def learn_command(
 
 
 def _found(baseline: Baseline) -> dict[str, Any]:
+    from livebode.monitoring import PLACES
+    from livebode.monitoring.table import STILL
+
     table, machine = baseline.tables[0], baseline.machine
+    stands = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
+    coarse = len(baseline.places) < PLACES and not stands
     cells = int((table.count > 0).sum())
     found: dict[str, Any] = {
         "runs": list(baseline.runs),
@@ -47,6 +52,8 @@ def _found(baseline: Baseline) -> dict[str, Any]:
         "cells": cells,
         "parameters": [name for other in baseline.tables[1:] for name in other.names],
         "lines_from_percent": [round(100 * float(x), 2) for x in table.accuracy.smallest[0::2]],
+        "hop": baseline.hop,
+        "hop_at_most": baseline.lines.window // PLACES if coarse else None,
         "model": None,
         "remark": baseline.remark,
     }
@@ -70,13 +77,23 @@ def _sentences(found: dict[str, Any]) -> str:
         watched = "Lines and fitted parameters" if found["parameters"] else "Lines alone"
         return (
             f"{text} No model of the moving machine: {found['remark']}. {watched} are watched, "
-            f"lines for changes of at least {sizes}."
+            f"lines for changes of at least {sizes}.{_coarse(found)}"
         )
     changes = ", ".join(f"{name} {percent:g} %" for name, percent in model["changes_from_percent"].items())
     way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
         f"{text}\nThe model of the machine knows the way {way} at speeds {speeds} a second, and is good for changes "
         f"from: {changes}."
+    )
+
+
+def _coarse(found: dict[str, Any]) -> str:
+    if (most := found["hop_at_most"]) is None:
+        return ""
+    return (
+        f"\nA hop of {found['hop']} samples shows too little of what motion does to the responses: judge a machine "
+        "that stands, or recordings that begin at the same place of the excitation's period; else learn with a hop "
+        f"of {most} or less."
     )
 
 

@@ -17,6 +17,7 @@ def axis_text(
     log: str = "log.parquet",
     loop: Mapping[str, Any] | None = None,
     motion: Mapping[str, Any] | None = None,
+    tracking: Mapping[str, Any] | None = None,
 ) -> str:
     """The configuration as TOML.
 
@@ -32,19 +33,21 @@ def axis_text(
         The tables below [loop], as in docs/configuration.md.
     motion
         The table [motion].
+    tracking
+        What goes into [tracking] besides.
     """
     lines, moves = design.waveform.lines, design.machine.stroke_s is not None
     averaged = design.windows > 1 and not moves
-    tracking: dict[str, Any] = {"estimator": "joint", "hop": design.hop}
+    tracked: dict[str, Any] = {"estimator": "joint", "hop": design.hop} | dict(tracking or {})
     if averaged:
-        tracking |= {"average": True, "forgetting": 1.0}
+        tracked |= {"average": True, "forgetting": 1.0}
     if moves and lines.quiet and not motion:
-        tracking |= {"noise": "quiet"}
+        tracked |= {"noise": "quiet"}
     tables: dict[str, Mapping[str, Any]] = {
         "source": {"log": log},
         "signals": signals,
         "lines": {"frequencies": lines_text(lines), "window": lines.window},
-        "tracking": tracking,
+        "tracking": tracked,
     }
     if motion:
         tables["motion"] = motion

@@ -114,6 +114,8 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         check(predicted, limits, None if wish.listed else factor, _passing(wish, unit, factor, machine, limits))
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
+    ramp_s = ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz
+    waveform = replace(waveform, about={**waveform.about, "ramp_s": ramp_s})
     recording_s, recording_why = _recording(waveform, machine, windows)
     if recording_s > _LONG_S and windows > 1:
         in_time = max(1, int(windows * _LONG_S / recording_s))
@@ -129,7 +131,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         windows=windows,
         recording_s=recording_s,
         hop=default_hop(waveform.lines.window),
-        ramp_s=ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz,
+        ramp_s=ramp_s,
         choices=(),
     )
     return replace(design, choices=explained(design, found, why, recording_why))

@@ -90,6 +90,7 @@ def measured_machine(
     noise: float = 0.0,
     motion: Extremes | None = None,
     stroke_s: float | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Machine:
     """The Machine around a plant of which only the response is known, at one place.
 
@@ -98,7 +99,7 @@ def measured_machine(
     plant
         From torque, N m, to the measured output: a Model (a `Fit`, a `MeasuredResponse`) or a python-control system.
     loop
-        Its loop, with the feedback.
+        Its loop, with the feedback from this output, and an excitation that is a torque.
     rate_hz
         Ticks of the drive per second.
     output
@@ -112,6 +113,8 @@ def measured_machine(
         limit; but an axis that stands has no speed and no following error, and takes no torque unless one is given.
     stroke_s
         Seconds in which the motion passes each place once; None for an axis that stands.
+    notes
+        For `Machine.notes`.
 
     The load is taken to go with the motor: above the first antiresonance its travel differs.
 
@@ -131,8 +134,11 @@ def measured_machine(
     way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
     speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
     own = _motion(motion or {}, stroke_s)
+    band_hz = (given.frequency_hz[0], given.frequency_hz[-1]) if isinstance(given, MeasuredResponse) else None
     place = Place(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
-    return Machine(places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s)
+    return Machine(
+        places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz
+    )
 
 
 def _motion(given: Extremes, stroke_s: float | None) -> Extremes:

@@ -80,6 +80,11 @@ class Waveform:
         """Peak over rms of the samples as the drive holds them."""
         return self.peak / self.rms
 
+    @property
+    def ramp_periods(self) -> int:
+        """In how many periods to bring it in: as `about` says in ramp_s, else one."""
+        return max(1, round(float(self.about.get("ramp_s", 0.0)) * self.lines.rate_hz / self.lines.window))
+
     def scaled(self, factor: float) -> Waveform:
         """The same excitation `factor` times as large."""
         return replace(self, samples=self.samples * factor)

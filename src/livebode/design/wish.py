@@ -16,6 +16,7 @@ Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]
 
 _WHOSE = {"phases": "multisine", "order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
+_RESOLUTION_MIN_HZ = 1e-6
 _ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
 
 
@@ -133,6 +134,10 @@ class Wish:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise InputError(f"{name}={value} is not a finite number above 0")
+        if self.resolution_hz is not None and self.resolution_hz < _RESOLUTION_MIN_HZ:
+            raise InputError(
+                f"resolution_hz={self.resolution_hz} is below {_RESOLUTION_MIN_HZ:g}; ask for a coarser one"
+            )
         if not _ACCURACY_MIN <= self.accuracy <= 1:
             raise InputError(f"accuracy={self.accuracy} is no share of |G| from {_ACCURACY_MIN:g} to 1; 0.05 is 5 %")
         if self.crest_factor_max is not None and self.crest_factor_max < 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -67,6 +67,6 @@ def _far(distance: Floats, rounding: float | Floats) -> Flags:
     # Equal periods have the distance 0; adding the rounding keeps the logarithm.
     log = np.log(distance + rounding + np.finfo(np.float64).tiny)
     middle = np.median(log)
-    spread = np.median(np.abs(log - middle)) / norm.ppf(0.75)
-    sigmas = norm.isf(FALSE_ALARM / len(log))
+    spread = np.median(np.abs(log - middle)) / ndtri(0.75)
+    sigmas = -ndtri(FALSE_ALARM / len(log))
     return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))

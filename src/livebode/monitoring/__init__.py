@@ -8,13 +8,14 @@ from livebode.monitoring.machine import Machine
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.monitor import Monitor
-from livebode.monitoring.rows import Apart, Rows
+from livebode.monitoring.rows import PLACES, Apart, Rows, places
 from livebode.monitoring.table import Table
 from livebode.monitoring.table_learning import learn_table
 from livebode.monitoring.table_monitor import TableMonitor
 
 __all__ = [
     "DEFAULT",
+    "PLACES",
     "Apart",
     "Baseline",
     "Evidence",
@@ -27,6 +28,7 @@ __all__ = [
     "TableMonitor",
     "learn_machine",
     "learn_table",
+    "places",
     "seconds_between",
     "signals_of",
 ]

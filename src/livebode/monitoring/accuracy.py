@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _BATCHES = (2, 4, 8)
-_STRETCH = 24  # windows, over which what the baseline does not know is judged
+STRETCH = 24  # windows, over which what the baseline does not know is judged
 _APART = 4.0  # a change is at least this many scatters
+_OFF = 1.5  # scatters are at least this many standard deviations of the baseline's own error: three are then allowed
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class Accuracy:
         Variance of the mean over neighbouring windows, against what independent windows would have; at least 1.
     scatter
         Standard deviation of a change that was not there, over stretches of healthy motion: what speeds, directions
-        and friction leave that the baseline does not know.
+        and friction leave that the baseline does not know, and the error of the baseline itself.
     smallest
         The smallest change that an alarm is for, of the logarithm.
     """
@@ -39,16 +40,19 @@ class Accuracy:
         return 2 * self.scatter
 
 
-def accuracy(score: Floats, information: Floats, smallest: Floats) -> Accuracy:
-    """From healthy windows in order, shape (windows, components) each; `smallest` as asked for, (components,)."""
+def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats | float = 0.0) -> Accuracy:
+    """From healthy windows in order, shape (windows, components) each; `smallest` as asked for, (components,).
+
+    `off` is the standard deviation of what the baseline itself is off by over a stretch, (components,).
+    """
     inflation = np.ones(smallest.shape)
     for size in _BATCHES:
         sums, total = _batched(score, size), _batched(information, size)
         inflation = np.maximum(inflation, _mean(sums**2) / np.maximum(_mean(total), 1e-300))
-    sums, total = _batched(score, _STRETCH), _batched(information, _STRETCH)
+    sums, total = _batched(score, STRETCH), _batched(information, STRETCH)
     known = total > 0
     rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
-    scatter = np.sqrt(np.maximum(_mean(rest), 0.0))
+    scatter = np.hypot(np.sqrt(np.maximum(_mean(rest), 0.0)), _OFF * off)
     return Accuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
 
 

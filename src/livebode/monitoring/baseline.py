@@ -7,6 +7,7 @@ from pathlib import Path
 
 from livebode.estimation import Settings
 from livebode.monitoring.machine import Machine
+from livebode.monitoring.rows import PLACES, places
 from livebode.monitoring.table import Table
 from livebode.nouns import InputError, Lines
 
@@ -23,6 +24,8 @@ class Baseline:
     ----------
     lines
         Of the runs that it was learned from.
+    hop
+        Theirs, in samples.
     signals
         Channel names of output, input, excitation and schedule, None where there is none.
     estimator, quantity
@@ -40,6 +43,7 @@ class Baseline:
     """
 
     lines: Lines
+    hop: int
     signals: dict[str, str | None]
     estimator: str
     quantity: str
@@ -67,6 +71,27 @@ class Baseline:
                     f"the baseline was learned with {name} {learned}, and this run has {here}; take the same {name}, "
                     "or learn a baseline from such runs"
                 )
+        if self.machine is None:
+            self._check_hop(settings.step)
+
+    @property
+    def apart(self) -> int:
+        """Samples from one row of its tables to the next."""
+        return max(self.lines.window, self.hop)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Where in the period the rows of its tables stood; of five or more it is good for any other."""
+        return places(self.lines.window, self.hop)
+
+    def _check_hop(self, hop: int) -> None:
+        window = self.lines.window
+        known = len(self.places) >= PLACES or places(window, hop)[0] in self.places
+        if not known or self.apart % max(window, hop):
+            raise InputError(
+                f"the baseline was learned with hop {self.hop}, and this run has {hop}, whose windows stand where the "
+                f"baseline knows none; take hop {self.hop}, or learn a baseline from such runs"
+            )
 
     @classmethod
     def load(cls, path: Path) -> Baseline:

@@ -21,7 +21,7 @@ from livebode.motion import Curve, MovingModel
 from livebode.nouns import InputError, Lines
 
 _FORMAT = "livebode baseline"
-_VERSION = 1
+_VERSION = 2
 
 
 def save(baseline: Baseline, path: Path) -> None:
@@ -72,6 +72,7 @@ def _plain(baseline: Baseline) -> dict[str, Any]:
         "livebode": version("livebode"),
         "runs": list(baseline.runs),
         "lines": {"bins": lines.bins, "quiet": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz},
+        "hop": baseline.hop,
         "signals": baseline.signals,
         "estimator": baseline.estimator,
         "quantity": baseline.quantity,
@@ -96,8 +97,12 @@ def _baseline(data: Part) -> Baseline:
     if not tables:
         raise data.wrong("tables", "empty")
     signals = data.part("signals")
+    hop = data.whole("hop")
+    if hop < 1:
+        raise data.wrong("hop", "below 1")
     return Baseline(
         lines,
+        hop,
         {role: signals.value(role) and signals.text(role) for role in ROLES},
         data.text("estimator"),
         data.text("quantity"),

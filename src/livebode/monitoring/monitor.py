@@ -11,7 +11,7 @@ from livebode.estimation import Settings, snapshots
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT, seconds_between
 from livebode.monitoring.machine_monitor import MachineMonitor
-from livebode.monitoring.rows import Apart
+from livebode.monitoring.rows import Apart, places
 from livebode.monitoring.table_monitor import TableMonitor
 from livebode.nouns import Block, Event, Parameters, Responses
 
@@ -45,7 +45,8 @@ class Monitor:
         baseline.check(settings, corrected)
         self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
         mean_s, lines = seconds_between(false_alarms), settings.lines
-        self._step_s = max(lines.window, settings.step) / lines.rate_hz
+        apart = lines.window if baseline.machine is not None else baseline.apart
+        self._step_s = apart / lines.rate_hz
         self._machine: MachineMonitor | None = None
         self._tables: dict[str, TableMonitor] = {}
         if baseline.machine is not None:
@@ -57,7 +58,7 @@ class Monitor:
             share = mean_s * len(baseline.tables)
             self._tables = {t.what: TableMonitor(t, share, self._step_s) for t in baseline.tables}
         self._parameters = next((t.names for t in baseline.tables if t.what == "parameters"), ())
-        self._apart = {name: Apart(lines.window, settings.step) for name in self._tables}
+        self._apart = {name: Apart(apart, places(lines.window, settings.step)[0]) for name in self._tables}
         self._counts = {"change": 0, "change-cleared": 0}
 
     @property

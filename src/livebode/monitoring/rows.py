@@ -42,15 +42,38 @@ class Rows:
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 
-class Apart:
-    """Takes one row for each window from a stream of responses or parameters: the first in each period.
+PLACES = 5
+"""Places of the period that show what a window's place does to a moving machine's response."""
 
-    Of responses further apart than a window it takes each.
+
+def places(window: int, hop: int) -> tuple[int, ...]:
+    """Where in the period rows are to stand at this hop, in samples behind its end: first the one to judge at.
+
+    In a window over which the machine moves, each line leaks into the others, with a phase that depends on where in
+    the excitation's period the window begins; five places or more show how much. Every hop that divides the window
+    has a row at the period's end, any other has its last one of a period as near to it as can be.
+
+    >>> places(400, 20), places(400, 200), places(400, 400), places(400, 800), places(400, 89)
+    ((0, 320, 240, 160, 80), (0, 200), (0,), (0,), (356, 267, 178, 89))
+    """
+    count = max(1, window // hop)
+    return tuple(step * hop % window for step in range(count, 0, -max(1, count // PLACES))) if hop < window else (0,)
+
+
+class Apart:
+    """Takes rows whose windows do not overlap from a stream of responses or parameters.
+
+    Parameters
+    ----------
+    apart
+        Samples from row to row: a window, or the hop where that is longer.
+    place
+        One of `places`.
     """
 
-    def __init__(self, window: int, hop: int) -> None:
-        self._window, self._place, self._apart = window, hop % window, max(window, hop)
-        self._sample, self._schedule = -2 * self._apart, np.nan  # no row stands so far behind it
+    def __init__(self, apart: int, place: int) -> None:
+        self._apart, self._place = apart, place
+        self._sample, self._schedule = -2 * apart, np.nan  # no row stands so far behind it
 
     def of_responses(self, responses: Responses) -> Rows:
         """Rows of complex values at the lines."""
@@ -71,7 +94,7 @@ class Apart:
         )  # fmt: skip
 
     def _chosen(self, sample: NDArray[np.int64]) -> NDArray[np.intp]:
-        return np.flatnonzero((sample + 1) % self._window == self._place)
+        return np.flatnonzero((sample + 1) % self._apart == self._place)
 
     def _rows(
         self, value: NDArray[np.complex128], variance: Floats, schedule: Floats, time_s: Floats,

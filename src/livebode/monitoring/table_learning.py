@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.accuracy import Accuracy, accuracy
+from livebode.monitoring.accuracy import STRETCH, Accuracy, accuracy
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
 from livebode.nouns import InputError
@@ -21,28 +21,31 @@ _STILL = 0.05  # of the fastest usual step
 _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
 
 
-def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows]) -> Table:
+def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: int = 1) -> Table:
     """Mean and covariance in 24 bins of the schedule, apart for each way.
 
     The runs should hold what is usual: speeds, directions, temperatures. What windows in a row have in common, and
-    whole stretches of them, is learned with it, and makes alarms as much slower.
+    whole stretches of them, is learned with it, and makes alarms as much slower. So is what differs between places of
+    the period: `runs` may hold each recording `overlap` times, with rows that stand at other places of it. These
+    overlap, and count as one.
 
     Raises
     ------
     InputError
         If there are too few rows, or no cell has enough of them.
     """
-    rows = Rows.join(runs)
-    rows = rows.some(rows.ok)
-    if len(rows) < 3 * WINDOWS_MIN:
+    windows = sum(int(rows.ok.sum()) for rows in runs) // overlap
+    if windows < 3 * WINDOWS_MIN:
         raise InputError(
-            f"the runs hold {len(rows)} windows with valid {what} that do not overlap, less than the {3 * WINDOWS_MIN} "
+            f"the runs hold {windows} windows with valid {what} that do not overlap, less than the {3 * WINDOWS_MIN} "
             "that a baseline needs; give longer runs"
         )
+    rows = Rows.join(runs)
+    rows = rows.some(rows.ok)
     low, step, still, bins = _grid(rows)
     cell, inside = cells(rows, low, step, still, bins)
     rows, cell = rows.some(inside), cell[inside]
-    table = _moments(what, tuple(names), (low, step, still), bins, rows, cell)
+    table = _moments(what, tuple(names), (low, step, still), bins, rows, cell, overlap)
     if not np.any(table.count >= WINDOWS_MIN):
         raise InputError(
             f"no bin of the schedule holds {WINDOWS_MIN} windows of {what}; give longer runs over the whole way"
@@ -52,7 +55,8 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows]) -> Table:
     known = np.isfinite(variance)
     information = np.where(known, 1 / variance, 0.0)
     score = np.where(known, deviation, 0.0) * information
-    return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest))
+    off = _off(table, cell, information)
+    return replace(table, accuracy=accuracy(score, information, table.accuracy.smallest, off))
 
 
 def _grid(rows: Rows) -> tuple[float, float, float, int]:
@@ -65,14 +69,16 @@ def _grid(rows: Rows) -> tuple[float, float, float, int]:
 
 
 def _moments(
-    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: Rows, cell: NDArray[np.intp]
-) -> Table:
+    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: Rows,
+    cell: NDArray[np.intp], overlap: int,
+) -> Table:  # fmt: skip
     number, columns = bins * WAYS, rows.value.shape[1]
     lines = what == "lines"
     parts = (columns, 2) if lines else (1, columns)
     mean = np.full((number, columns), complex(np.nan, np.nan))
     covariance = np.full((number, parts[0], parts[1], parts[1]), np.nan)
-    variance, count = np.full((number, columns), np.nan), np.bincount(cell, minlength=number)
+    variance = np.full((number, columns), np.nan)
+    count = np.rint(np.bincount(cell, minlength=number) / overlap).astype(np.int64)
     for i in np.flatnonzero(count >= WINDOWS_MIN):
         value = rows.value[cell == i]
         mean[i] = value.mean(axis=0)
@@ -80,7 +86,7 @@ def _moments(
             relative = value / mean[i] - 1
             variance[i] = np.mean(rows.variance[cell == i], axis=0) / np.abs(mean[i]) ** 2
         part = np.stack([relative.real, relative.imag], axis=2) if lines else relative.real[:, np.newaxis, :]
-        covariance[i] = np.einsum("rgi,rgj->gij", part, part) / (count[i] - 1)
+        covariance[i] = np.einsum("rgi,rgj->gij", part, part) / len(part) * count[i] / (count[i] - 1)
     components = 2 * columns if lines else columns
     return Table(
         what,
@@ -100,3 +106,21 @@ def _smallest(table: Table) -> Floats:
     enough = table.count.ravel() >= WINDOWS_MIN
     known = KNOWN * np.sqrt(own[enough] / table.count.ravel()[enough, np.newaxis])
     return np.asarray(np.maximum(_SMALLEST, np.quantile(known, _ENOUGH, axis=0)))
+
+
+def _off(table: Table, cell: NDArray[np.intp], information: Floats) -> Floats:
+    """Standard deviation of what the means' own errors add up to over a stretch of rows, (components,).
+
+    The mean of n rows is off by a variance/n, by the same in every row of its cell: a machine that stays in one cell
+    shows all of it for ever, one that goes through many shows their mean.
+    """
+    cells, count = table.count.size, table.count.ravel()[:, np.newaxis]
+    own = np.einsum("...ii->...i", table.covariance).reshape(cells, -1) / np.maximum(count, 1)
+    stretch = np.arange(len(cell)) // STRETCH
+    pair, at = np.unique(stretch * cells + cell, return_inverse=True)
+    weight = np.stack([np.bincount(at, column) for column in information.T], axis=1)
+    error = np.where(weight > 0, weight**2 * own[pair % cells], 0.0)
+    variance, total = (np.stack([np.bincount(pair // cells, c) for c in x.T], axis=1) for x in (error, weight))
+    known = total > 0
+    of_stretch = np.where(known, variance / np.where(known, total, 1.0) ** 2, 0.0)
+    return np.asarray(np.sqrt(of_stretch.sum(axis=0) / np.maximum(known.sum(axis=0), 1)))

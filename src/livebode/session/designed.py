@@ -6,7 +6,7 @@ import json
 import os
 import zipfile
 import zlib
-from math import ceil, isfinite
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -30,23 +30,14 @@ def read_designed(path: Path) -> Waveform:
             rate = float(rate_hz)
             about = json.loads(str(held["facts"]))
         bins = [round(f * samples.size / rate) for f in frequency_hz.tolist()]
-        if max(bins) > samples.size:
-            raise ValueError(bins)
+        if max(bins) > samples.size or not isfinite(float(about.get("ramp_s", 0.0))):
+            raise ValueError(bins, about)
         return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else str(error)
         raise InputError(f"{str(path)!r} could not be read: {why}") from None
     except (ValueError, KeyError, TypeError, AttributeError, EOFError, ArithmeticError, zipfile.BadZipFile, zlib.error):
         raise InputError(f"{str(path)!r} is no .npz that `livebode design` left; take its excitation.npz") from None
-
-
-def ramp_periods(waveform: Waveform) -> int:
-    """Whole periods over which it is to be brought in: as many as its design's `ramp_s` needs, else one."""
-    ramp_s = waveform.about.get("ramp_s", 0.0)
-    if isinstance(ramp_s, bool) or not isinstance(ramp_s, (int, float)) or not (isfinite(ramp_s) and ramp_s >= 0):
-        raise InputError(f"the excitation's {ramp_s=} is no time; design it again")
-    lines = waveform.lines
-    return max(1, ceil(ramp_s * lines.rate_hz / lines.window - 1e-9))
 
 
 def _reals(array: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -55,10 +56,12 @@ def design_experiment(
         If nothing can be chosen (see `choose`), a format is not known or forbids the name, something stands in the
         directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
     """
-    kinds = None if suffixes is None else tuple(f".{s.lstrip('.')}" for s in suffixes)
+    kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
     for kind in kinds or ():
         if kind not in FORMATS:
             raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
+    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
+        raise InputError(f"the name {name!r} is none of a file; take letters, digits and underscores")
     _check_free(directory, force)
     design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
     lines = design.waveform.lines
@@ -78,12 +81,14 @@ def design_experiment(
                 log=experiment.log,
                 loop=experiment.loop_tables(),
                 motion=experiment.motion_table(lines.window / lines.rate_hz),
+                tracking=experiment.tracking(),
             )
             (partial / "axis.toml").write_text(configuration, encoding="utf-8")
-            (partial / _MARK).write_text(to_json(design.plain(), indent=1) + "\n", encoding="utf-8")
             if draw is not None:
                 draw(design, partial / f"{name}.png")
-            files = tuple(sorted(path.name for path in partial.iterdir()))
+            files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
+            told = {"files": files} | design.plain()
+            (partial / _MARK).write_text(to_json(told, indent=1) + "\n", encoding="utf-8")
             _check_free(directory, force)
             if directory.exists():
                 shutil.rmtree(directory)
@@ -105,3 +110,14 @@ def _check_free(directory: Path, force: bool) -> None:
         raise InputError(f"{str(directory)!r} exists already; take another --out, or --force to replace it")
     if directory.is_symlink() or not (directory / _MARK).is_file():
         raise InputError(f"{str(directory)!r} is not what an earlier design left; take another --out")
+    if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / _MARK)):
+        raise InputError(
+            f"{str(directory)!r} also holds {others[0]!r}, which no design made; move it, or take another --out"
+        )
+
+
+def _left_by(mark: Path) -> set[str]:
+    try:
+        return set(json.loads(mark.read_text(encoding="utf-8"))["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()

@@ -7,17 +7,14 @@ import tomllib
 from collections.abc import Mapping
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from livebode.design import Bearable, Machine, MeasuredResponse, Wish, belt_machine, measured_machine
-from livebode.design.machine import MOTION_KEYS
-from livebode.fitting import mean_response
+from livebode.design import Bearable, Machine, Wish, belt_machine
 from livebode.nouns import InputError
-from livebode.records import Run
 from livebode.session.axis import LoopSection
-from livebode.session.said import said
+from livebode.session.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 
 T = TypeVar("T")
@@ -34,22 +31,6 @@ _BELT: dict[str, Any] = {
 _SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
 
 
-class _Measured(BaseModel):
-    """[measured]: a plant that a run measured, and what its motion does alone."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    run: Path
-    output: Literal["velocity", "position"] = "velocity"
-    radius_m: float = 1.0
-    noise: float = 0.0
-    stroke_s: float | None = None
-    torque_n_m: tuple[float, float] | None = None
-    speed_m_per_s: tuple[float, float] | None = None
-    position_m: tuple[float, float] | None = None
-    following_error_m: tuple[float, float] | None = None
-
-
 class Experiment(BaseModel):
     """A machine, either a belt axis by its constants or one that was measured, and a wish."""
 
@@ -57,7 +38,7 @@ class Experiment(BaseModel):
 
     excitation: dict[str, Any]
     belt: dict[str, dict[str, Any]] | None = None
-    measured: _Measured | None = None
+    measured: MeasuredSection | None = None
     limits: dict[str, Any] = {}
     loop: LoopSection | None = None
     signals: dict[str, str] = {}
@@ -82,9 +63,11 @@ class Experiment(BaseModel):
             raise InputError(f"{str(path)!r} is not text; give the description of an experiment in TOML") from None
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{str(path)!r} is not TOML: {error}") from None
-        wanted = data.get("excitation", {})
+        wanted, above = data.get("excitation", {}), dict(over or {})
         if isinstance(wanted, dict):
-            data["excitation"] = wanted | dict(over or {})
+            # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
+            gone = {"lines": "band_hz" in above, "window": "resolution_hz" in above, "order": "resolution_hz" in above}
+            data["excitation"] = {key: value for key, value in wanted.items() if not gone.get(key)} | above
         found = cls.of(data, str(path))
         if found.measured is None:
             return found
@@ -101,10 +84,12 @@ class Experiment(BaseModel):
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"]))
             if first["type"] == "extra_forbidden":
-                known = _Measured if first["loc"][0] == "measured" else cls
+                known = MeasuredSection if first["loc"][0] == "measured" else cls
                 raise InputError(
                     f"{origin}: there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
                 ) from None
+            if first["type"] == "missing":
+                raise InputError(f"{origin}: {place!r} is missing; add it") from None
             raise InputError(f"{origin}: {place} = {first['input']!r} is not usable: {first['msg'].lower()}") from None
         if (found.belt is None) == (found.measured is None):
             raise InputError(f"{origin}: describe either a [belt] axis by its constants, or one that was [measured]")
@@ -145,22 +130,17 @@ class Experiment(BaseModel):
         axis = self.axis()
         if axis is not None:
             return belt_machine(axis)
+        return self._measured_axis().machine()
+
+    def _measured_axis(self) -> MeasuredAxis:
         assert self.measured is not None
-        told = self.measured
-        run = Run.open(told.run)
-        loop = self.loop or LoopSection.model_validate(said(run.summary).get("loop", {}))
-        rate_hz = run.lines.rate_hz
-        motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
-        return measured_machine(
-            MeasuredResponse.of(mean_response(run.responses())), loop.build(rate_hz), rate_hz,
-            output=told.output, radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
-        )  # fmt: skip
+        return MeasuredAxis(self.measured, self.loop)
 
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the axis.toml, as docs/configuration.md has it."""
         axis = self.axis()
         if axis is None:
-            return {} if self.loop is None else _finite(self.loop.model_dump(exclude_unset=True))
+            return _finite(self._measured_axis().loop_tables())
         drive = axis.drive
         velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
                     "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
@@ -178,11 +158,18 @@ class Experiment(BaseModel):
         return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
 
     def signal_names(self) -> dict[str, str]:
-        """[signals] of the axis.toml; those of the simulated axis where nothing is said."""
+        """[signals] of the axis.toml; those of the simulated axis or of the run where nothing is said."""
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
             raise InputError(f"there is no signals.{unknown[0]}; {_near(unknown[0], (*_SIGNALS, 'schedule'))}")
-        own = {"schedule": "x"} if self.belt is not None and "strokes" in self.belt else {}
+        if self.belt is None:
+            own = self._measured_axis().signal_names()
+        else:
+            own = {"schedule": "x"} if "strokes" in self.belt else {}
         return _SIGNALS | own | self.signals
+
+    def tracking(self) -> dict[str, Any]:
+        """What [tracking] of the axis.toml has to say of the recording."""
+        return {} if self.belt is not None else self._measured_axis().tracking()
 
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -127,9 +127,20 @@ def chosen_model(section: FitSection, unit: str) -> PhysicalModel:
         name = "two-mass" if unit.endswith("/(N m)") or section.radius_m else "two-mass-gain"
     output = section.output
     if output == "auto":
-        output = "position" if unit.split("/(")[0] in _POSITIONS else "velocity"
+        output = output_of(unit) or "velocity"
     options = {"side": section.side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     return model_named(name, output=output, **options)
+
+
+def output_of(unit: str) -> Literal["velocity", "position"] | None:
+    """Whether a response of this unit leads to a position or a velocity; None where it has no unit.
+
+    >>> output_of("rad/(N m)"), output_of("rad/s/(N m)"), output_of("")
+    ('position', 'velocity', None)
+    """
+    if not unit:
+        return None
+    return "position" if unit.split("/(")[0] in _POSITIONS else "velocity"
 
 
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:

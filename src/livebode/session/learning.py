@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table
+from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table, places
 from livebode.nouns import Block, InputError
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
@@ -40,13 +40,15 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
     say("learning the lines over the schedule")
     lines, signals = runs[0].lines, axes[0].signals
     names = [f"{f:g} Hz" for f in lines.frequency_hz]
-    tables = [learn_table("lines", names, [_rows(run) for run in runs])]
+    overlap = len(_apart(runs[0]))
+    tables = [learn_table("lines", names, [rows for run in runs for rows in _rows(run)], overlap)]
     if axes[0].fit is not None:
         say("learning the fitted parameters over the schedule")
         tables.append(_parameters(runs, axes[0].fit))
     machine, remark = _machine(runs, axes, say)
     return Baseline(
         lines,
+        runs[0].found["hop"],
         {role: getattr(signals, role) for role in _ROLES},
         axes[0].tracking.estimator,
         axes[0].tracking.quantity,
@@ -99,9 +101,19 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
             )
 
 
-def _rows(run: Run) -> Rows:
-    apart = Apart(run.lines.window, run.found["hop"])
-    return Rows.join([apart.of_responses(batch) for batch in run.batches()])
+def _apart(run: Run) -> list[Apart]:
+    window, hop = run.lines.window, run.found["hop"]
+    return [Apart(max(window, hop), place) for place in places(window, hop)]
+
+
+def _rows(run: Run) -> list[Rows]:
+    """Rows at each place of the period."""
+    each = _apart(run)
+    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.batches()])
+
+
+def _joined(batches: list[list[Rows]]) -> list[Rows]:
+    return [Rows.join(parts) for parts in zip(*batches)]
 
 
 def _parameters(runs: list[Run], section: FitSection) -> Table:
@@ -110,9 +122,10 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
     names = [name for name in model.model.names if name not in model.held]
     rows = []
     for run in runs:
-        fitter, apart = fitter_of(section, run.found["unit"]), Apart(run.lines.window, run.found["hop"])
-        rows.append(Rows.join([apart.of_parameters(fitter.process(b).only(names)) for b in run.batches()]))
-    return learn_table("parameters", names, rows)
+        fitter, each = fitter_of(section, run.found["unit"]), _apart(run)
+        fitted = (fitter.process(batch).only(names) for batch in run.batches())
+        rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
+    return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
 
 def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:

@@ -12,7 +12,6 @@ from livebode.design import Waveform
 from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, counted
 from livebode.session.axis import SAME_RATE, Axis
-from livebode.session.designed import ramp_periods
 from livebode.sources.live.settings import named_channels
 from livebode.structured_text import SMALLEST, Project, check_rate, check_signals
 
@@ -131,4 +130,4 @@ def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
 def _designed(waveform: Waveform) -> tuple[Floats, int, str]:
     """The same of a design."""
     note = "\n".join(f"{key}: {json.dumps(value)}" for key, value in waveform.about.items())
-    return waveform.samples, ramp_periods(waveform), note
+    return waveform.samples, waveform.ramp_periods, note

@@ -13,7 +13,8 @@ PERIOD_MAX = 16384
 """Longest period, samples: each is a line of text that the PLC's compiler reads."""
 SMALLEST = float(np.finfo(np.float64).tiny)
 """Size below which an LREAL loses digits, or is none to some controllers."""
-_UDINT_MAX = 2**32 - 1
+RAMP_PERIODS_MAX = (2**32 - 1) // PERIOD_MAX
+"""Longest ramp: its samples are counted in a UDINT."""
 _LOADED_AT_ONCE = 32  # samples a cycle while the table fills, so that the first cycle is as short as the others
 
 _BELOW = 1 - 1e-12  # so that the scaled samples' own rounding does not lead beyond the limit again
@@ -125,10 +126,8 @@ def multisine(
     if not (np.isfinite(limit) and limit > 0):
         raise InputError(f"{limit=} is no finite number above 0; give the most that drive and machine bear")
     check_rate(rate_hz)
-    if not 1 <= ramp_periods <= _UDINT_MAX // len(samples):
-        raise InputError(
-            f"{ramp_periods=} is not from 1 to {_UDINT_MAX // len(samples)} periods; 1 is enough for most axes"
-        )
+    if not 1 <= ramp_periods <= RAMP_PERIODS_MAX:
+        raise InputError(f"{ramp_periods=} is not from 1 to {RAMP_PERIODS_MAX} periods; 1 is enough for most axes")
     peak = float(np.max(np.abs(samples)))
     if peak > limit:
         raise InputError(

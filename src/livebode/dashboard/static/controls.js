@@ -129,7 +129,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     ["every response in the tracking's span as .mat", () => get("mat", true)],
   ]);
   $("axis").addEventListener("change", () => {
-    page.axis = Number($("axis").value);
+    page.axis = page.wanted = Number($("axis").value);
     page.quantity = null;
     if (page.frozen) freeze();
     timeline.atS = null;

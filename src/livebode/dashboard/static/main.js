@@ -63,6 +63,7 @@ const link = new Link({
     if (!up) page.facts && status();
   },
   onNews: (news) => {
+    if (news.facts && overtaken(news)) return;
     if (news.error) complain(news.error);
     if (news.facts) begin(news);
     if (news.span) {
@@ -95,6 +96,9 @@ const link = new Link({
     page.dirty.add("bode");
   },
 });
+
+// An answer to an earlier wish, which would undo the choice of another axis since.
+const overtaken = ({ facts, axes }) => page.wanted < axes.length && facts.axis !== (page.wanted ?? facts.axis);
 
 // The axis or its quantity is another one, the run has begun, or the link is new.
 function begin({ facts, axes, trends }) {

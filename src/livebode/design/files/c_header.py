@@ -37,6 +37,7 @@ def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
 #define {big}_SAMPLES {lines.window}
 #define {big}_LINES {len(lines)}
 #define {big}_RATE_HZ {lines.rate_hz!r}
+#define {big}_RAMP_PERIODS {waveform.ramp_periods}
 #define {big}_PEAK_N_M {waveform.peak.hex()}
 
 static const {big}_TYPE {word}[{big}_SAMPLES] = {{

@@ -15,6 +15,7 @@ bool constexpr false nullptr static_assert thread_local true typeof typeof_unqua
 and and_eq bitand bitor catch class compl const_cast delete dynamic_cast explicit export friend mutable namespace new
 not not_eq operator or or_eq private protected public reinterpret_cast static_cast template this throw try typeid
 typename using virtual wchar_t xor xor_eq
+NULL EOF INFINITY NAN I assert errno stdin stdout stderr offsetof va_arg va_start va_end
 """
 _MATLAB = """
 break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd
@@ -36,12 +37,12 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.nouns.errors.InputError: the name 'double' is a keyword of C or C++; take for example 'double_w'
+    livebode.nouns.errors.InputError: the name 'double' is a keyword or macro of C or C++; take for example 'double_w'
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:
-        whose = "C or C++" if language == "C" else language
-        raise InputError(f"the name {name!r} is a keyword of {whose}; take for example {f'{name}_w'!r}")
+        whose = "keyword or macro of C or C++" if language == "C" else f"keyword of {language}"
+        raise InputError(f"the name {name!r} is a {whose}; take for example {f'{name}_w'!r}")
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
         return name
     raise InputError(

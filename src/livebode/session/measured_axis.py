@@ -1,0 +1,108 @@
+"""The axis of an experiment that a run has measured: its machine, and what of the run's configuration goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from livebode.design import Machine, MeasuredResponse, measured_machine
+from livebode.design.machine import MOTION_KEYS
+from livebode.fitting import mean_response
+from livebode.nouns import InputError
+from livebode.records import Run
+from livebode.session.axis import LoopSection
+from livebode.session.fits import output_of
+from livebode.session.said import said
+
+_KEPT = ("differenced", "spikes")  # of the run's [tracking]: what the recording needs, not what was wished of it
+_UNITS = ("rad/s/(N m)", "rad/(N m)")
+_UNCHECKED = "the loop is not the run's own: whether it is stable is not looked at"
+
+
+class MeasuredSection(BaseModel):
+    """[measured]: a plant that a run measured, and what its motion does alone."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    run: Path
+    output: Literal["velocity", "position"] | None = None
+    radius_m: float = 1.0
+    noise: float = 0.0
+    stroke_s: float | None = None
+    torque_n_m: tuple[float, float] | None = None
+    speed_m_per_s: tuple[float, float] | None = None
+    position_m: tuple[float, float] | None = None
+    following_error_m: tuple[float, float] | None = None
+
+
+class MeasuredAxis:
+    """A run's mean plant, in the loop that the run was described with unless another is given.
+
+    Raises
+    ------
+    InputError
+        If there is no such run, the loop acts on another output than the run has, or the excitation is no torque.
+    """
+
+    def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
+        self._section, self._run = section, Run.open(section.run)
+        self._said = said(self._run.summary)
+        self._given = loop
+        self._loop = loop or LoopSection.model_validate(self._said.get("loop", {}))
+
+    def machine(self) -> Machine:
+        """The Machine of the run's mean response."""
+        if self._loop.excitation_at != "plant input":
+            raise InputError(
+                f"loop.excitation_at = {self._loop.excitation_at!r}, where an excitation is no torque; design for "
+                "'plant input'"
+            )
+        told, rate_hz = self._section, self._run.lines.rate_hz
+        motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
+        return measured_machine(
+            MeasuredResponse.of(mean_response(self._run.responses())), self._loop.build(rate_hz), rate_hz,
+            output=self._output(), radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
+            notes=self._notes(),
+        )  # fmt: skip
+
+    def loop_tables(self) -> dict[str, Any]:
+        """[loop] as the file or the run has it."""
+        if self._given is not None:
+            return self._given.model_dump(exclude_unset=True, exclude_none=True)
+        return dict(self._said.get("loop", {}))
+
+    def signal_names(self) -> dict[str, str]:
+        """[signals] of the run."""
+        return dict(self._said.get("signals", {}))
+
+    def tracking(self) -> dict[str, Any]:
+        """What of the run's [tracking] its recordings need."""
+        tracking = self._said.get("tracking", {})
+        return {name: tracking[name] for name in _KEPT if tracking.get(name)}
+
+    def _output(self) -> Literal["velocity", "position"]:
+        unit = self._run.found.get("unit", "")
+        own = output_of(unit)
+        if own and self._section.output and self._section.output != own:
+            raise InputError(
+                f"measured.output = {self._section.output!r}, but the run's plant is in {unit}; leave it out"
+            )
+        output = self._section.output or own or "velocity"
+        acts_on = "position" if self._loop.position_pd is not None else "velocity"
+        if output != acts_on and self._loop.build(self._run.lines.rate_hz).feedback is not None:
+            other = "loop.velocity" if acts_on == "position" else "loop.position_pd"
+            raise InputError(
+                f"the run's output is a {output}, and its loop as described acts on a {acts_on}; describe {other}, or "
+                f"track the {acts_on}"
+            )
+        return output
+
+    def _notes(self) -> tuple[str, ...]:
+        notes = [] if self._given is None else [_UNCHECKED]
+        if (unit := self._run.found.get("unit", "")) and unit not in _UNITS:
+            notes.append(f"the run's plant is in {unit}: what is called N m and rad here is to be read so")
+        if not unit and self._section.output is None:
+            notes.append("the run has no units: its output is taken as a velocity in rad/s, its input as N m")
+        return tuple(notes)
