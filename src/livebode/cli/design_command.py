@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from livebode.cli.options import Json
-from livebode.nouns import InputError
+from livebode.nouns import InputError, counted
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _show_lines(console: Console, design: Design) -> None:
     each = -(-len(relative) // _LINES_SHOWN)
     first = int(relative.argmax()) % each
     table = Table(box=None, header_style="bold", pad_edge=False)
-    for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {windows} window{'s' * (windows > 1)}"):
+    for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {counted(windows, 'window')}"):
         table.add_column(head, justify="right")
     shown = zip(
         design.waveform.lines.frequency_hz, design.waveform.amplitude, relative, design.accuracy.reached(windows)

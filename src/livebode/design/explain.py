@@ -11,6 +11,7 @@ from livebode.design.grid import Grid
 from livebode.design.limits import Bearable
 from livebode.design.machine import UNITS, Quantity
 from livebode.design.peaks import Peak, worst
+from livebode.nouns import counted
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
@@ -45,8 +46,7 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     ]
     rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
     if machine.noise > 0:
-        many = f"{design.windows} window{'s' * (design.windows > 1)}"
-        told = f"at {f[weakest]:g} Hz after {many}; σ = {machine.noise:g}"
+        told = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
         rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
     rows.append(Choice("recording", _duration(design.recording_s), recording_why))
     rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))

@@ -12,7 +12,7 @@ from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
 from livebode.excitation import check_band, chirp_lines, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
-from livebode.nouns import GridError, Lines
+from livebode.nouns import GridError, Lines, counted
 from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
@@ -103,7 +103,7 @@ def _stepped(wish: Wish, found: Grid) -> Grid:
         return found
     steps, periods = len(found.lines), wish.periods or _PERIODS
     whole = stepped_lines(found.lines, periods=periods)
-    why = f"{steps} step{'s' * (steps > 1)} of {periods} period{'s' * (periods > 1)} of {found.lines.window} samples"
+    why = f"{counted(steps, 'step')} of {counted(periods, 'period')} of {found.lines.window} samples"
     return Grid(whole, why, found.lines_why, base=found.lines, periods=periods)
 
 
@@ -181,5 +181,5 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
             f"a PRBS of order {order} with {held} ticks a bit has no line in {low:g} … {high:g} Hz; "
             f"take order {min(max(near, order + 1), ORDER_MAX)}"
         )
-    why = f"2^{order} − 1 bits of {held} tick{'s' * (held > 1)}"
+    why = f"2^{order} − 1 bits of {counted(held, 'tick')}"
     return Grid(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)

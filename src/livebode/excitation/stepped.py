@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.excitation.multisine import each, multisine
-from livebode.nouns import InputError, Lines
+from livebode.nouns import InputError, Lines, counted
 from livebode.nouns.lines import WINDOW_MAX
 
 Floats = NDArray[np.float64]
@@ -44,9 +44,9 @@ def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
     times = len(lines) * periods
     if times * lines.window > WINDOW_MAX:
         most = WINDOW_MAX // (lines.window * len(lines))
-        fits = f"at most {most} periods" if most else f"{WINDOW_MAX // lines.window} lines or fewer"
+        fits = f"at most {counted(most, 'period')}" if most else f"{WINDOW_MAX // lines.window} lines or fewer"
         raise InputError(
-            f"{len(lines)} steps of {periods} windows of {lines.window} samples are longer than the longest window "
-            f"{WINDOW_MAX}; take {fits}"
+            f"{counted(len(lines), 'step')} of {counted(periods, 'window')} of {lines.window} samples are longer than "
+            f"the longest window {WINDOW_MAX}; take {fits}"
         )
     return Lines(tuple(k * times for k in lines.bins), lines.window * times, lines.rate_hz)
