@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -377,13 +378,20 @@ def test_a_finished_run_is_only_looked_at(browser: Browser, whole: Path) -> None
         assert answer[0] == 400
 
 
-def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_path: Path) -> None:
-    with Watched(tmp_path / "other", loop=None) as other:
+@contextlib.contextmanager
+def two_axes(browser: Browser, whole: Path, folder: Path) -> Iterator[Tab]:
+    """A page of two finished runs, of which the second does not describe its loop."""
+    with Watched(folder / "other", loop=None) as other:
         other.go(12_000)
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     dashboard.view(other.directory)
     with dashboard, Tab(browser, dashboard.url) as tab:
+        yield tab
+
+
+def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_path: Path) -> None:
+    with two_axes(browser, whole, tmp_path) as tab:
         assert tab.page.locator("#axis option").all_inner_texts() == ["run", "other"]
         tab.page.keyboard.press("4")
         tab.until("page.quantity === 'sensitivity' && bode.curves.measured")
@@ -403,12 +411,7 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
 def test_an_answer_to_an_earlier_wish_undoes_no_choice_of_an_axis(
     browser: Browser, whole: Path, tmp_path: Path
 ) -> None:
-    with Watched(tmp_path / "other", loop=None) as other:
-        other.go(12_000)
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.view(whole)
-    dashboard.view(other.directory)
-    with dashboard, Tab(browser, dashboard.url) as tab:
+    with two_axes(browser, whole, tmp_path) as tab:
         for key in "42424242":  # another quantity, and in the same moment another axis: the answers cross the wishes
             tab.js(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }}))")
             tab.page.locator("#axis").select_option("1")
