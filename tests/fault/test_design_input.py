@@ -214,6 +214,12 @@ WRONG = [
     ({"amplitude_n_m": 1e-200}, "amplitude_n_m=1e-200"),
     ({"accuracy": 1e-300}, "accuracy=1e-300"),
     ({"crest_factor_max": 0.9}, "below 1"),
+    ({"crest_factor_max": 2.0, "resolution_n_m": 0.7, "amplitude_n_m": 0.5}, "rounding to steps of 0.7"),
+    ({"resolution_n_m": 1e-320}, "resolution_n_m=1e-320"),
+    ({"band_hz": [20, 140, 200]}, "at most 2 items"),
+    ({"band_hz": "20:140"}, "valid list"),
+    ({"kind": "prbs", "order": 20, "held_ticks": 10**21}, "fewer ticks"),
+    ({"kind": "prbs", "band_hz": [20, 20], "resolution_hz": 1}, "widen the band"),
     ({"lines": "20:140:20"}, "lines and band_hz both say"),
     ({"window": 400, "resolution_hz": 20}, "resolution_hz and window both say"),
     ({"kind": "prbs", "window": 400}, "no window of 400"),
@@ -246,6 +252,10 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
     [
         ({"excitation": {}}, "either a [belt]"),
         ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}, "belt": {}, "loop": {}}, "leave out [loop]"),
+        ({"excitation": {}, "measured": {"run": "x"}, "loop": {"velocity": {"foo": 1}}}, "known here: rate_hz"),
+        ({"excitation": {}, "belt": {}, "signals": {"input": "w"}}, "are both 'w'"),
+        ({"excitation": {}, "belt": {}, "signals": {"output": "a\x7fb"}}, "names no channel"),
         ({"excitation": {}, "measured": {"noise": 1.0}}, "'measured.run' is missing"),
         ({"excitation": {}, "belt": {"mechanic": {}}}, "did you mean 'mechanics'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load": 3}}}, "did you mean 'load_kg'?"),
@@ -338,6 +348,22 @@ def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experime
     (mine / "thesis.txt").write_text("years")
     assert "not what an earlier design left" in livebode("design", experiment, "--out", mine, "--force").err
     assert (mine / "thesis.txt").read_text() == "years"
+
+
+def test_a_recording_may_not_be_named_as_a_file_of_the_design(experiment, tmp_path):
+    whole = experiment.read_text()
+    for log, words in (("excitation.csv", "a file of the design"), ("", "no file of a recording")):
+        experiment.write_text(f'log = "{log}"\n{whole}')
+        assert words in livebode("design", experiment, "--out", tmp_path / "design").err
+
+
+def test_a_design_may_be_replaced_from_within(experiment, tmp_path, monkeypatch):
+    out = tmp_path / "design"
+    assert livebode("design", experiment, "--out", out).code == 0
+    monkeypatch.chdir(out)
+    done = livebode("design", experiment, "--out", ".", "--force")
+    assert done.code == 0, done.err
+    assert (out / "design.json").is_file()
 
 
 def test_a_disk_that_refuses_leaves_nothing(experiment, tmp_path):

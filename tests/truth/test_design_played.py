@@ -51,6 +51,27 @@ def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_
     assert max(at_once[1], -at_once[0]) > 1.02 * max(found[1], -found[0])
 
 
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {"kind": "chirp", "band_hz": (20, 140), "resolution_hz": 10},
+        {"kind": "prbs", "band_hz": (20, 140), "resolution_hz": 20},
+        {"kind": "prbs", "band_hz": (20, 400), "order": 3},
+        {"phases": "schroeder", "band_hz": (20, 140), "resolution_hz": 20, "resolution_n_m": 0.2},
+        {"phases": "schroeder", "band_hz": (60, 300), "resolution_hz": 20, "resolution_n_m": 0.3},
+    ],
+)
+def test_no_mean_carries_the_axis_beyond_its_peaks_when_the_excitation_is_brought_in(wish):
+    axis = BeltAxis()
+    design = choose(Wish(**wish, amplitude_n_m=1.0), belt_machine(axis), Bearable(torque_n_m_max=14.5))
+    samples = design.waveform.samples
+    assert abs(samples.sum()) <= 0.5 * wish.get("resolution_n_m", 1e-9)
+    ramp = round(design.ramp_s * RATE_HZ)
+    played = np.resize(samples, ramp + 4 * len(samples)) * np.minimum(np.arange(ramp + 4 * len(samples)) / ramp, 1.0)
+    found = extremes(axis, played, seconds=(len(played) - 1) / RATE_HZ, run_in_s=0.0)["following error"]
+    assert max(found[1], -found[0]) <= 1.1 * worst(design.peaks)["following error"].size
+
+
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """One recording of the axis at standstill, tracked as a velocity with its loop and as a position without."""
@@ -124,6 +145,18 @@ def test_a_run_that_the_loop_does_not_fit_is_refused(runs, measured, words):
     with pytest.raises(InputError) as caught:
         found.machine()
     assert words in str(caught.value)
+
+
+def test_a_design_from_an_indirect_run_needs_no_input(runs):
+    text = (runs / "speed.toml").read_text().replace('input = "iq"\n', "")
+    (runs / "indirect.toml").write_text(text.replace("[tracking]\n", '[tracking]\nestimator = "indirect"\n'))
+    assert livebode("run", runs / "indirect.toml", "--out", runs / "run-indirect").code == 0
+    path = runs / "from-indirect.toml"
+    path.write_text(f'{EXCITATION}[measured]\nrun = "run-indirect"\nradius_m = 0.019\n')
+    assert livebode("design", path, "--out", runs / "from-indirect").code == 0
+    (runs / "from-indirect" / "log.parquet").write_bytes((runs / "log.parquet").read_bytes())
+    done = livebode("run", runs / "from-indirect" / "axis.toml", "--out", runs / "tracked-indirect")
+    assert done.code == 0, done.err
 
 
 def test_a_loop_that_is_not_the_run_s_own_is_noted(runs):

@@ -13,7 +13,7 @@ from livebode.design.explain import Choice, explained
 from livebode.design.grid import grid
 from livebode.design.limits import Bearable, check, check_known, room
 from livebode.design.machine import UNITS, Machine
-from livebode.design.make import unit_waveform
+from livebode.design.make import REACHED, unit_waveform
 from livebode.design.peaks import Peak, peaks, worst
 from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
@@ -144,6 +144,11 @@ def _played(wish: Wish, unit: Waveform, factor: float, machine: Machine) -> tupl
     if wish.resolution_n_m is None:
         return waveform, predicted
     waveform = waveform.quantised(wish.resolution_n_m)
+    if wish.crest_factor_max is not None and waveform.crest_factor > wish.crest_factor_max * (1 + REACHED):
+        raise InputError(
+            f"rounding to steps of {wish.resolution_n_m:g} N m makes a crest factor of {waveform.crest_factor:.4f}, "
+            f"above {wish.crest_factor_max:g}; ask for {waveform.crest_factor + 5e-4:.3f}, or take finer steps"
+        )
     return waveform, peaks(waveform, machine)
 
 
@@ -180,7 +185,8 @@ def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> t
             raise InputError("neither noise nor limits are known, so no amplitude can be chosen; give one of the three")
         return largest * _WITHOUT_NOISE, "a tenth of what the limits leave; nothing says how much noise there is"
     if needed <= allowed:
-        return needed, f"the least for {100 * wish.accuracy:g} % at every line in one window"
+        rounded = "" if wish.resolution_n_m is None else ", before rounding"
+        return needed, f"the least for {100 * wish.accuracy:g} % at every line in one window{rounded}"
     assert first is not None
     return allowed, f"the most that the {first.quantity} bears, less {100 * _RESERVE:g} %"
 

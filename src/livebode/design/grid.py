@@ -173,13 +173,19 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
                 f"the highest is {ORDER_MAX}, with lines {finest:.3g} Hz apart"
             )
     window = (2**order - 1) * held
+    if window > WINDOW_MAX:
+        raise GridError(
+            f"2^{order} - 1 bits of {counted(held, 'tick')} are {window} samples, more than {WINDOW_MAX}; take a lower "
+            "order or fewer ticks"
+        )
     first, last = max(1, ceil(low * window / rate_hz - 1e-9)), floor(high * window / rate_hz + 1e-9)
     bins = [k for k in range(first, last + 1) if 2 * k < window and k % (window // gcd(held, window)) != 0]
     if not bins:
-        near = ceil(np.log2(rate_hz / held / max(high - low, 1e-9) + 1))
+        near = max(ceil(log2(rate_hz / held / (high - low) + 1)) if high > low else ORDER_MAX + 1, order + 1)
+        fits = near <= ORDER_MAX and (2**near - 1) * held <= WINDOW_MAX
         raise GridError(
-            f"a PRBS of order {order} with {held} ticks a bit has no line in {low:g} … {high:g} Hz; "
-            f"take order {min(max(near, order + 1), ORDER_MAX)}"
+            f"a PRBS of order {order} with {counted(held, 'tick')} a bit has no line in {low:g} … {high:g} Hz; "
+            f"{f'take order {near}' if fits else 'widen the band'}"
         )
     why = f"2^{order} − 1 bits of {counted(held, 'tick')}"
     return Grid(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)

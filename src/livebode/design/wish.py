@@ -17,6 +17,7 @@ Shape = Literal["flat", "equal snr"]
 
 _WHOSE = {"phases": "multisine", "order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
 _RESOLUTION_MIN_HZ = 1e-6
+_STEP_MIN = 1e-12
 _ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
 
 
@@ -137,6 +138,10 @@ class Wish:
         if self.resolution_hz is not None and self.resolution_hz < _RESOLUTION_MIN_HZ:
             raise InputError(
                 f"resolution_hz={self.resolution_hz} is below {_RESOLUTION_MIN_HZ:g}; ask for a coarser one"
+            )
+        if self.resolution_n_m is not None and self.resolution_n_m < _STEP_MIN:
+            raise InputError(
+                f"resolution_n_m={self.resolution_n_m} is below {_STEP_MIN:g}; leave it out for no rounding"
             )
         if not _ACCURACY_MIN <= self.accuracy <= 1:
             raise InputError(f"accuracy={self.accuracy} is no share of |G| from {_ACCURACY_MIN:g} to 1; 0.05 is 5 %")

@@ -254,14 +254,15 @@ def _sentence(error: ValidationError) -> str:
     # Behind a choice of types pydantic puts the name of the type that it tried.
     place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
-        return f"there is no setting {place!r}; {_nearest(first['loc'])}"
+        return f"there is no setting {place!r}; {nearest(first['loc'])}"
     if first["type"] == "missing":
         return f"{place!r} is missing; add it"
     value = "what it holds" if _MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
     return f"{place} = {value} is not usable: {first['msg'].lower()}"
 
 
-def _nearest(loc: tuple[int | str, ...]) -> str:
+def nearest(loc: tuple[int | str, ...]) -> str:
+    """What a key that is not known, at this place of an axis, may have been meant for."""
     section: Any = Axis
     for part in loc[:-1]:
         annotation = section.model_fields[part].annotation

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from livebode.records import to_json
 from livebode.session.experiment import Experiment
 from livebode.structured_text import PERIOD_MAX
 
-_MARK = "design.json"
+_MARK, _AXIS = "design.json", "axis.toml"
 Picture = Callable[[Design, Path], None]
 
 
@@ -60,8 +59,7 @@ def design_experiment(
     for kind in kinds or ():
         if kind not in FORMATS:
             raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
-    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
-        raise InputError(f"the name {name!r} is none of a file; take letters, digits and underscores")
+    _check_names(name, experiment.log)
     _check_free(directory, force)
     design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
     lines = design.waveform.lines
@@ -69,8 +67,9 @@ def design_experiment(
     if kinds is None and lines.window > PERIOD_MAX:
         left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} that a PLC's table takes"
     try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f".{directory.name[:100]}.partial-", dir=directory.parent) as folder:
+        there = directory.absolute()  # "." has no parent to stand beside in
+        there.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{there.name[:100]}.partial-", dir=there.parent) as folder:
             partial = Path(folder) / "whole"
             partial.mkdir()
             for kind in kinds or _all_that_hold(lines.window):
@@ -83,19 +82,41 @@ def design_experiment(
                 motion=experiment.motion_table(lines.window / lines.rate_hz),
                 tracking=experiment.tracking(),
             )
-            (partial / "axis.toml").write_text(configuration, encoding="utf-8")
+            (partial / _AXIS).write_text(configuration, encoding="utf-8")
             if draw is not None:
                 draw(design, partial / f"{name}.png")
             files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
             told = {"files": files} | design.plain()
             (partial / _MARK).write_text(to_json(told, indent=1) + "\n", encoding="utf-8")
             _check_free(directory, force)
-            if directory.exists():
-                shutil.rmtree(directory)
-            partial.rename(directory)
+            _put(partial, there, aside=Path(folder) / "before")
     except OSError as error:
-        raise InputError(f"{str(directory)!r} could not be written: {error.strerror}; nothing was left there") from None
+        raise InputError(
+            f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there"
+        ) from None
     return Designed(design, directory, files, left_out)
+
+
+def _put(made: Path, there: Path, aside: Path) -> None:
+    """Make it stand there; what stood there goes, or stays where that fails."""
+    before = there.exists()
+    if before:
+        there.rename(aside)
+    try:
+        made.rename(there)
+    except OSError:
+        if before:
+            aside.rename(there)
+        raise
+
+
+def _check_names(name: str, log: str) -> None:
+    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
+        raise InputError(f"the name {name!r} is none of a file; take letters, digits and underscores")
+    if not log.isprintable() or not Path(log).name:
+        raise InputError(f"log = {log!r} is no file of a recording; give one such as 'log.parquet'")
+    if log in (_MARK, _AXIS, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
+        raise InputError(f"log = {log!r} is a file of the design; give the recording another name")
 
 
 def _all_that_hold(window: int) -> list[str]:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.design import Bearable, Machine, Wish, belt_machine
 from livebode.nouns import InputError
-from livebode.session.axis import LoopSection
+from livebode.session.axis import LoopSection, nearest
 from livebode.session.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 
@@ -81,16 +81,9 @@ class Experiment(BaseModel):
         try:
             found = cls.model_validate(data)
         except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(map(str, first["loc"]))
-            if first["type"] == "extra_forbidden":
-                known = MeasuredSection if first["loc"][0] == "measured" else cls
-                raise InputError(
-                    f"{origin}: there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
-                ) from None
-            if first["type"] == "missing":
-                raise InputError(f"{origin}: {place!r} is missing; add it") from None
-            raise InputError(f"{origin}: {place} = {first['input']!r} is not usable: {first['msg'].lower()}") from None
+            raise InputError(f"{origin}: {_sentence(error)}") from None
+        if found.belt is not None and found.loop is not None:
+            raise InputError(f"{origin}: a [belt] axis has its loop in [belt.drive]; leave out [loop]")
         if (found.belt is None) == (found.measured is None):
             raise InputError(f"{origin}: describe either a [belt] axis by its constants, or one that was [measured]")
         return found
@@ -98,7 +91,7 @@ class Experiment(BaseModel):
     def wish(self) -> Wish:
         """What [excitation] asks for."""
         given = dict(self.excitation)
-        if isinstance(given.get("band_hz"), list) and len(given["band_hz"]) == 2:
+        if isinstance(given.get("band_hz"), list):
             given["band_hz"] = tuple(given["band_hz"])
         return _made(Wish, given, "excitation")
 
@@ -164,12 +157,37 @@ class Experiment(BaseModel):
         if self.belt is None:
             own = self._measured_axis().signal_names()
         else:
-            own = {"schedule": "x"} if "strokes" in self.belt else {}
-        return _SIGNALS | own | self.signals
+            own = _SIGNALS | ({"schedule": "x"} if "strokes" in self.belt else {})
+        names = own | self.signals
+        for role, name in names.items():
+            if not name or not name.isprintable():
+                raise InputError(f"signals.{role} = {name!r} names no channel; give the recording's name of it")
+            if twins := [other for other in names if other != role and names[other] == name]:
+                raise InputError(f"signals.{role} and signals.{twins[0]} are both {name!r}; they are two channels")
+        return names
 
     def tracking(self) -> dict[str, Any]:
         """What [tracking] of the axis.toml has to say of the recording."""
         return {} if self.belt is not None else self._measured_axis().tracking()
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first thing that is wrong, with its place and value."""
+    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo is why the other is missing
+    place = ".".join(map(str, first["loc"]))
+    if first["type"] == "extra_forbidden":
+        if first["loc"][0] == "loop":
+            return f"there is no {place!r}; {nearest(first['loc'])}"
+        known = MeasuredSection if first["loc"][0] == "measured" else Experiment
+        return f"there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
+    if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
+        return f"{place!r} is missing; add it"
+    return f"{place} = {first['input']!r} is not usable: {_plain(first['msg'])}"
+
+
+def _plain(why: str) -> str:
+    # TOML has lists, whatever they become here.
+    return why.lower().replace("tuple", "list")
 
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
@@ -181,7 +199,7 @@ def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
         try:
             TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
         except ValidationError as error:
-            why = error.errors()[0]["msg"].lower()
+            why = _plain(error.errors()[0]["msg"])
             raise InputError(f"{section}.{name} = {value!r} is not usable: {why}") from None
     return kind(**given)
 

@@ -16,6 +16,8 @@ from livebode.session.axis import LoopSection
 from livebode.session.fits import output_of
 from livebode.session.said import said
 
+Output = Literal["velocity", "position"]
+
 _KEPT = ("differenced", "spikes")  # of the run's [tracking]: what the recording needs, not what was wished of it
 _UNITS = ("rad/s/(N m)", "rad/(N m)")
 _UNCHECKED = "the loop is not the run's own: whether it is stable is not looked at"
@@ -27,7 +29,7 @@ class MeasuredSection(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     run: Path
-    output: Literal["velocity", "position"] | None = None
+    output: Output | None = None
     radius_m: float = 1.0
     noise: float = 0.0
     stroke_s: float | None = None
@@ -74,23 +76,24 @@ class MeasuredAxis:
         return dict(self._said.get("loop", {}))
 
     def signal_names(self) -> dict[str, str]:
-        """[signals] of the run."""
-        return dict(self._said.get("signals", {}))
+        """[signals] of the run; a design always has an excitation."""
+        return {"excitation": "w"} | dict(self._said.get("signals", {}))
 
     def tracking(self) -> dict[str, Any]:
         """What of the run's [tracking] its recordings need."""
         tracking = self._said.get("tracking", {})
-        return {name: tracking[name] for name in _KEPT if tracking.get(name)}
+        kept = {name: tracking[name] for name in _KEPT if tracking.get(name)}
+        return kept if "input" in self.signal_names() else {"estimator": "indirect"} | kept
 
-    def _output(self) -> Literal["velocity", "position"]:
+    def _output(self) -> Output:
         unit = self._run.found.get("unit", "")
         own = output_of(unit)
         if own and self._section.output and self._section.output != own:
             raise InputError(
                 f"measured.output = {self._section.output!r}, but the run's plant is in {unit}; leave it out"
             )
-        output = self._section.output or own or "velocity"
-        acts_on = "position" if self._loop.position_pd is not None else "velocity"
+        acts_on: Output = "position" if self._loop.position_pd is not None else "velocity"
+        output = self._section.output or own or acts_on
         if output != acts_on and self._loop.build(self._run.lines.rate_hz).feedback is not None:
             other = "loop.velocity" if acts_on == "position" else "loop.position_pd"
             raise InputError(
@@ -104,5 +107,6 @@ class MeasuredAxis:
         if (unit := self._run.found.get("unit", "")) and unit not in _UNITS:
             notes.append(f"the run's plant is in {unit}: what is called N m and rad here is to be read so")
         if not unit and self._section.output is None:
-            notes.append("the run has no units: its output is taken as a velocity in rad/s, its input as N m")
+            taken = {"velocity": "a velocity in rad/s", "position": "a position in rad"}[self._output()]
+            notes.append(f"the run has no units: its output is taken as {taken}, its input as N m")
         return tuple(notes)
