@@ -13,10 +13,12 @@ from tests.experiments import RUN_IN_S, extremes
 
 LINES = Lines.parse("20:140:20", 4000, 400)
 FINE = Lines.parse("10:150:5", 4000, 1600)
+ALONE = Lines.parse("40", 4000, 400)
 NOISE = Sensor(noise_rad_per_s=0.1)
 STANDING = {
     "Schroeder": (BeltAxis(), LINES, multisine(LINES)),
     "with noise, low crest": (BeltAxis(sensor=NOISE), LINES, multisine(LINES, 1.0, "low crest")),
+    "a line alone": (BeltAxis(), ALONE, multisine(ALONE)),
     "three masses, chirp": (
         BeltAxis(mechanics=Mechanics(masses=3)), chirp_lines(5, 250, 4000, 8000), chirp(5, 250, 4000, 8000, 2.0),
     ),
