@@ -111,6 +111,8 @@ def test_lines_off_or_closer_than_the_grid_are_refused_with_the_nearest_choice()
 def test_typed_lines_that_no_window_fits_are_refused():
     wild = "20.0001234567, 31.41592653589"
     assert "grid" in refused(lambda: choose(Wish(lines=wild, amplitude_n_m=1.0), MACHINE), GridError)
+    low = refused(lambda: choose(Wish(lines="0.0001", amplitude_n_m=1.0), MACHINE), GridError)
+    assert "no window of a useful length" in low
 
 
 @settings(deadline=None, max_examples=40)
@@ -252,6 +254,8 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
     [
         ({"excitation": {}}, "either a [belt]"),
         ({"excitation": {}, "belt": {}, "measured": {"run": "x"}}, "either a [belt]"),
+        ({"excitation": {}, "measured": {"run": "x", "noise": True}}, "measured.noise = True is not usable"),
+        ({"excitation": {}, "measured": {"run": "x", "torque_n_m": [True, 1]}}, "torque_n_m.0 = True is not usable"),
         ({"excitation": {}, "belt": {}, "loop": {}}, "leave out [loop]"),
         ({"excitation": {}, "measured": {"run": "x"}, "loop": {"velocity": {"foo": 1}}}, "known here: rate_hz"),
         ({"excitation": {}, "belt": {}, "signals": {"input": "w"}}, "are both 'w'"),

@@ -143,7 +143,8 @@ with io.BytesIO(archive(**WHOLE)) as whole, zipfile.ZipFile(whole) as members:
         (archive(**WHOLE | {"rate_hz": np.zeros(1)}), "is no .npz that"),
         (archive(**WHOLE | {"facts": json.dumps({"ramp_s": None})}), "is no .npz that"),
         (archive(**WHOLE | {"facts": json.dumps({"ramp_s": "long"})}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": 1e300})}), "periods; 1 is enough"),
+        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": 1e300})}), "is no .npz that"),
+        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": -5})}), "is no .npz that"),
     ],
 )
 def test_a_file_that_is_no_design_is_refused_in_a_sentence(data: bytes | None, said: str, tmp_path: Path) -> None:

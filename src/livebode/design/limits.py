@@ -111,7 +111,7 @@ def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None, pa
         what = f"an amplitude of {amplitude:.4g} N m brings"
         passes = f"the largest amplitude that passes is {passing:.4g} N m"
     if passing <= 0:
-        passes = "no smaller one is left in the drive's steps"
+        passes = "no smaller one is left in the drive's steps; take finer ones"
     raise InputError(
         f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
     )

@@ -192,7 +192,9 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
         f"{rate_hz:g} Hz; the nearest {'lines are' if len(near) > 1 else 'line is'} "
         f"{' and '.join(f'{float(f):.6g}' for f in near)} Hz"
     )
-    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**6).denominator for f in wanted))
+    # A rate of many digits must not hide the window; a line near 0 must not become 0, which every window fits.
+    shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in wanted]
+    unit = lcm(*(share.denominator for share in shares))
     multiples = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
     if unit > 100 * window:
         return sentence + ", and no window of a useful length would fit them all"

@@ -6,7 +6,6 @@ import json
 import os
 import zipfile
 import zlib
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from livebode.design import Waveform
 from livebode.nouns import InputError, Lines
+
+_RAMP_S_MAX = 3600.0
 
 
 def read_designed(path: Path) -> Waveform:
@@ -30,7 +31,7 @@ def read_designed(path: Path) -> Waveform:
             rate = float(rate_hz)
             about = json.loads(str(held["facts"]))
         bins = [round(f * samples.size / rate) for f in frequency_hz.tolist()]
-        if max(bins) > samples.size or not isfinite(float(about.get("ramp_s", 0.0))):
+        if max(bins) > samples.size or not 0 <= float(about.get("ramp_s", 0.0)) <= _RAMP_S_MAX:
             raise ValueError(bins, about)
         return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
     except OSError as error:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.design import Machine, MeasuredResponse, measured_machine
 from livebode.design.machine import MOTION_KEYS
@@ -17,6 +17,7 @@ from livebode.session.fits import output_of
 from livebode.session.said import said
 
 Output = Literal["velocity", "position"]
+Number = Annotated[float, Field(strict=True)]  # true is none
 
 _KEPT = ("differenced", "spikes")  # of the run's [tracking]: what the recording needs, not what was wished of it
 _UNITS = ("rad/s/(N m)", "rad/(N m)")
@@ -30,13 +31,13 @@ class MeasuredSection(BaseModel):
 
     run: Path
     output: Output | None = None
-    radius_m: float = 1.0
-    noise: float = 0.0
-    stroke_s: float | None = None
-    torque_n_m: tuple[float, float] | None = None
-    speed_m_per_s: tuple[float, float] | None = None
-    position_m: tuple[float, float] | None = None
-    following_error_m: tuple[float, float] | None = None
+    radius_m: Number = 1.0
+    noise: Number = 0.0
+    stroke_s: Number | None = None
+    torque_n_m: tuple[Number, Number] | None = None
+    speed_m_per_s: tuple[Number, Number] | None = None
+    position_m: tuple[Number, Number] | None = None
+    following_error_m: tuple[Number, Number] | None = None
 
 
 class MeasuredAxis:
