@@ -127,3 +127,10 @@ class Watched:
     def record(self) -> Run:
         """What is recorded by now."""
         return Run.open(self.directory)
+
+
+def whole_run(directory: Path, loop: dict[str, Any] | None = LOOP) -> Path:
+    """The directory of a run that is over."""
+    with Watched(directory, loop=loop) as run:
+        run.go(SAMPLES)
+    return directory

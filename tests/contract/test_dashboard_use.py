@@ -22,7 +22,7 @@ from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.nouns import Event, Lines
 from livebode.records import Run
 from tests.browser import TABLET, Tab, chromium, until
-from tests.dashboards import LINES, LOOP, Watched
+from tests.dashboards import LINES, LOOP, Watched, whole_run
 from tests.responses import made
 
 
@@ -41,10 +41,7 @@ def watched(tmp_path: Path) -> Iterator[Watched]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("whole") / "run"
-    with Watched(path) as run:
-        run.go(12_000)
-    return path
+    return whole_run(tmp_path_factory.mktemp("whole") / "run")
 
 
 def shown_s(tab: Tab) -> float:
@@ -107,11 +104,18 @@ def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0) -> None:
     hub.write(replace(rows, time_s=rows.time_s + from_s))
 
 
-def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_path: Path) -> None:
+@contextlib.contextmanager
+def page_of_a_run(browser: Browser, directory: Path) -> Iterator[tuple[Hub, Tab]]:
+    """A page on which a run has begun; the hub begins others."""
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     hub = dashboard.hub("axis")
-    begin(hub, tmp_path, LINES)
+    begin(hub, directory, LINES)
     with dashboard, Tab(browser, dashboard.url) as tab:
+        yield hub, tab
+
+
+def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_path: Path) -> None:
+    with page_of_a_run(browser, tmp_path) as (hub, tab):
         tab.page.keyboard.press("f")
         tab.page.keyboard.press("2")
         tab.until("bode.curves.reference?.frame.quantity === 'open loop'")
@@ -128,10 +132,7 @@ def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_
 
 
 def test_a_pause_goes_into_the_run_that_begins(browser: Browser, tmp_path: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
-    hub = dashboard.hub("axis")
-    begin(hub, tmp_path, LINES)
-    with dashboard, Tab(browser, dashboard.url) as tab:
+    with page_of_a_run(browser, tmp_path) as (hub, tab):
         tab.page.keyboard.press(" ")
         tab.until("timeline.atS !== null && !page.seeking")
         begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ), from_s=347.0)
@@ -381,11 +382,9 @@ def test_a_finished_run_is_only_looked_at(browser: Browser, whole: Path) -> None
 @contextlib.contextmanager
 def two_axes(browser: Browser, whole: Path, folder: Path) -> Iterator[Tab]:
     """A page of two finished runs, of which the second does not describe its loop."""
-    with Watched(folder / "other", loop=None) as other:
-        other.go(12_000)
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
-    dashboard.view(other.directory)
+    dashboard.view(whole_run(folder / "other", loop=None))
     with dashboard, Tab(browser, dashboard.url) as tab:
         yield tab
 

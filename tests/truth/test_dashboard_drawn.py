@@ -23,7 +23,7 @@ from livebode.nouns import Response
 from livebode.records import Run
 from livebode.session.axis import LoopSection
 from tests.browser import Tab, chromium
-from tests.dashboards import FIT, LINES, LOOP, RATE_HZ, Watched
+from tests.dashboards import FIT, LINES, LOOP, RATE_HZ, Watched, whole_run
 
 FEEDBACK = LoopSection.model_validate(LOOP).build(RATE_HZ).feedback_at(LINES.frequency_hz)
 # Curves travel as float32: of 100 dB or 200 degrees the last digit is 2e-5.
@@ -64,11 +64,7 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run that is over."""
-    path = tmp_path_factory.mktemp("whole") / "run"
-    with Watched(path) as run:
-        run.go(12_000)
-    return path
+    return whole_run(tmp_path_factory.mktemp("whole") / "run")
 
 
 def expected(one: Response, quantity: str) -> dict[str, np.ndarray]:
