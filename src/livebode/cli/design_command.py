@@ -14,6 +14,7 @@ from livebode.records import to_json
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
     from livebode.design import Design
 
@@ -80,10 +81,9 @@ def _draw(design: Design, path: Path) -> None:
 
 def _show(design: Design) -> None:
     from rich.console import Console
-    from rich.table import Table
 
     console = Console(highlight=False, markup=False)
-    table = Table(box=None, header_style="bold", pad_edge=False)
+    table = _table()
     table.add_column("chosen")
     table.add_column("value")
     table.add_column("why", overflow="fold")
@@ -96,14 +96,18 @@ def _show(design: Design) -> None:
         console.print(f"note: {note}", soft_wrap=True)
 
 
-def _show_lines(console: Console, design: Design) -> None:
-    """What each line tells; of many lines some, the weakest among them."""
+def _table() -> Table:
     from rich.table import Table
 
+    return Table(box=None, header_style="bold", pad_edge=False)
+
+
+def _show_lines(console: Console, design: Design) -> None:
+    """What each line tells; of many lines some, the weakest among them."""
     relative, windows = design.accuracy.relative, design.windows
     each = -(-len(relative) // _LINES_SHOWN)
     first = int(relative.argmax()) % each
-    table = Table(box=None, header_style="bold", pad_edge=False)
+    table = _table()
     for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {counted(windows, 'window')}"):
         table.add_column(head, justify="right")
     shown = zip(

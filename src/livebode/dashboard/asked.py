@@ -67,12 +67,7 @@ def wish(text: str, axes: int) -> Wish:
     """
     if len(text) > MESSAGE_BYTES_MAX:
         raise InputError(f"the message is longer than {MESSAGE_BYTES_MAX} bytes")
-    try:
-        said = json.loads(text)
-    except (ValueError, RecursionError):
-        raise InputError("the message is not JSON") from None
-    if not isinstance(said, dict):
-        raise InputError("the message is no object")
+    said = plain(text, "message")
     kind = said.get("kind")
     if kind == "watch":
         axis = said.get("axis", 0)
@@ -102,14 +97,14 @@ def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
     return _whole(str(axis)[:10], 0, axes - 1, "axis"), event
 
 
-def plain(data: bytes) -> dict[str, Any]:
+def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
     """An object of JSON; InputError where it is none."""
     try:
         said = json.loads(data)
     except (ValueError, RecursionError):
-        raise InputError("the body is not JSON") from None
+        raise InputError(f"the {what} is not JSON") from None
     if not isinstance(said, dict):
-        raise InputError("the body is no object of JSON")
+        raise InputError(f"the {what} is no object of JSON")
     return said
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -116,20 +117,13 @@ class Healthy:
         way = way if known[way] else int(np.argmax(known))
         mean = t.mean[bin, way]
         sigma = np.abs(mean) * np.sqrt(np.einsum("lii->l", t.covariance[bin, way]))
-        only = np.ones((1, len(mean)), dtype=bool)
-        return Responses(
-            lines=beside.lines,
+        return replace(
+            beside,
             value=mean[np.newaxis],
             sigma=sigma[np.newaxis],
             dof=np.array([float(known[way])]),
             coherence=np.full((1, len(mean)), np.nan),
-            valid=only,
-            first=beside.first,
-            sample=beside.sample,
-            time_s=beside.time_s,
-            schedule=beside.schedule,
-            quantity=beside.quantity,
-            unit=beside.unit,
+            valid=np.ones((1, len(mean)), dtype=bool),
         )
 
 

@@ -63,11 +63,11 @@ class Past:
         if self.overview is None:
             raise InputError("there is no response yet; wait for the first window")
         rows = max(1, min(rows, ROWS_MAX))
-        within = _within(self.overview, from_s, to_s)
+        within = self.overview.between(from_s, to_s)
         if (to_s - from_s) >= _WHOLE * (self.last_s - self.first_s):
             return _thinned(within, rows)
         if self.recent is not None and len(self.recent) and from_s >= self.recent.time_s[0]:
-            return _thinned(_within(self.recent, from_s, to_s), rows)
+            return _thinned(self.recent.between(from_s, to_s), rows)
         if not self.readable:
             return _thinned(within, rows)
         found = Overview()
@@ -84,7 +84,7 @@ class Past:
         elif self.recent is None or self.overview is None:
             raise InputError("there is no response yet; wait for the first window")
         else:
-            yield _within(self.recent if from_s >= self.recent.time_s[0] else self.overview, from_s, to_s)
+            yield (self.recent if from_s >= self.recent.time_s[0] else self.overview).between(from_s, to_s)
 
     def at(self, time_s: float) -> Responses:
         """The response with a valid line nearest to a moment, one row, as exactly as it is known."""
@@ -96,10 +96,6 @@ class Past:
         if best is None:
             raise InputError("no response has a valid line yet; wait for the first window")
         return best
-
-
-def _within(responses: Responses, from_s: float, to_s: float) -> Responses:
-    return responses[np.flatnonzero((responses.time_s >= from_s) & (responses.time_s <= to_s))]
 
 
 def _thinned(responses: Responses, rows: int) -> Responses:

@@ -11,7 +11,7 @@ import numpy as np
 from livebode.design.accuracy import Accuracy, accuracy_of
 from livebode.design.explain import Choice, explained
 from livebode.design.grid import grid
-from livebode.design.limits import Bearable, check, check_known, room
+from livebode.design.limits import Bearable, beyond, check_known, room
 from livebode.design.machine import UNITS, Machine
 from livebode.design.make import REACHED, unit_waveform
 from livebode.design.peaks import Peak, peaks, worst
@@ -49,8 +49,6 @@ class Design:
         How long to record for that.
     hop
         Samples between responses.
-    ramp_s
-        In how long to bring the excitation in, whole periods: the peaks are those of the periodic state.
     choices
         All of it as rows of a table.
     """
@@ -65,8 +63,12 @@ class Design:
     windows: int
     recording_s: float
     hop: int
-    ramp_s: float
     choices: tuple[Choice, ...]
+
+    @property
+    def ramp_s(self) -> float:
+        """In how long to bring the excitation in, whole periods: the peaks are those of the periodic state."""
+        return self.waveform.ramp_periods * self.waveform.lines.window / self.waveform.lines.rate_hz
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -108,10 +110,14 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     check_known(machine, limits)
     found = grid(wish, machine.rate_hz)
     unit = unit_waveform(wish, found, machine)
-    factor, why = _factor(wish, unit, machine, limits)
-    waveform, predicted = _played(wish, unit, factor, machine)
-    if room(predicted, limits)[0] < 1:
-        check(predicted, limits, None if wish.listed else factor, _passing(wish, unit, factor, machine, limits))
+    of_unit = peaks(unit, machine)  # refused where it has power beyond what is known of the machine
+    factor, why = _factor(wish, unit, of_unit, machine, limits)
+    waveform = _played(wish, unit, factor)
+    predicted = peaks(waveform, machine)
+    share, first = room(predicted, limits)
+    if share < 1 and first is not None:
+        passing = _passing(wish, unit, factor, share, machine, limits)
+        raise InputError(beyond(first, limits, share, None if wish.listed else factor, passing))
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
     ramp_s = ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz
@@ -131,53 +137,53 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         windows=windows,
         recording_s=recording_s,
         hop=default_hop(waveform.lines.window),
-        ramp_s=ramp_s,
         choices=(),
     )
     return replace(design, choices=explained(design, found, why, recording_why))
 
 
-def _played(wish: Wish, unit: Waveform, factor: float, machine: Machine) -> tuple[Waveform, tuple[Peak, ...]]:
-    """The waveform as the drive plays it, and its peaks."""
+def _played(wish: Wish, unit: Waveform, factor: float) -> Waveform:
+    """The waveform as the drive plays it."""
     waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": wish.listed or factor})
-    predicted = peaks(waveform, machine)  # refused where it has power beyond what is known of the machine
     if wish.resolution_n_m is None:
-        return waveform, predicted
+        return waveform
     waveform = waveform.quantised(wish.resolution_n_m)
     if wish.crest_factor_max is not None and waveform.crest_factor > wish.crest_factor_max * (1 + REACHED):
         raise InputError(
             f"rounding to steps of {wish.resolution_n_m:g} N m makes a crest factor of {waveform.crest_factor:.4f}, "
             f"above {wish.crest_factor_max:g}; ask for {waveform.crest_factor + 5e-4:.3f}, or take finer steps"
         )
-    return waveform, peaks(waveform, machine)
+    return waveform
 
 
-def _passing(wish: Wish, unit: Waveform, factor: float, machine: Machine, limits: Bearable) -> float:
+def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: Machine, limits: Bearable) -> float:
     """A factor near the largest whose excitation keeps to the limits, in four digits; 0 where there is none.
 
-    Rounding to the drive's steps is not linear: what the peaks at one factor promise may fail at another.
+    `share` is the room at the factor that does not. Rounding to the drive's steps is not linear: what the peaks at one
+    factor promise may fail at another.
     """
     for _ in range(_TRIES):
+        if share <= 0:
+            break
+        factor = rounded_down(factor * min(share, 1 - 1e-3))
         try:
-            share, _ = room(_played(wish, unit, factor, machine)[1], limits)
+            share, _ = room(peaks(_played(wish, unit, factor), machine), limits)
         except InputError:  # too small for the steps
             break
         if share >= 1:
             return factor
-        if share <= 0:
-            break
-        factor = rounded_down(factor * min(share, 1 - 1e-3))
     return 0.0
 
 
-def _factor(wish: Wish, unit: Waveform, machine: Machine, limits: Bearable) -> tuple[float, str]:
+def _factor(
+    wish: Wish, unit: Waveform, of_unit: tuple[Peak, ...], machine: Machine, limits: Bearable
+) -> tuple[float, str]:
     """What the unit waveform is to be multiplied by, and why."""
     if wish.amplitude_n_m is not None:
         return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
-    predicted = peaks(unit, machine)
-    largest, first = room(predicted, limits)
+    largest, first = room(of_unit, limits)
     if first is not None and largest <= 0:
-        check(predicted, limits, 1.0, 0.0)
+        raise InputError(beyond(first, limits, largest, None, 0.0))
     needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
     allowed = largest * (1 - _RESERVE)
     if needed == 0:

@@ -87,21 +87,19 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     return largest, first
 
 
-def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None, passing: float) -> None:
-    """InputError where a limit is broken; the sentence has `passing`, an amplitude that is borne, 0 where none is.
+def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, passing: float) -> str:
+    """Why a peak that leaves only this share of the excitation is refused, and what would pass.
 
-    Without an amplitude the lines have one each, and `passing` is what to multiply them by.
+    That is `passing`, an amplitude that is borne, 0 where none is. Without an amplitude the lines have one each, and it
+    is what to multiply them by.
     """
-    factor, peak = room(found, limits)
-    if factor >= 1 or peak is None:
-        return
     low, high = limits.of(peak.quantity)
     unit, name = UNITS[peak.quantity], peak.quantity
     above = peak.high - high > low - peak.low
     value, limit, added = (peak.high, high, peak.excited[1]) if above else (peak.low, low, peak.excited[0])
     where = f" ({peak.place})" if peak.place else ""
-    if factor <= 0:
-        raise InputError(
+    if share <= 0:
+        return (
             f"the motion alone has a {name} of {value - added:.4g} {unit}{where} and leaves no room to the limit of "
             f"{limit:.4g} {unit}; change the motion, or correct the limit"
         )
@@ -112,6 +110,4 @@ def check(found: tuple[Peak, ...], limits: Bearable, amplitude: float | None, pa
         passes = f"the largest amplitude that passes is {passing:.4g} N m"
     if passing <= 0:
         passes = "no smaller one is left in the drive's steps; take finer ones"
-    raise InputError(
-        f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
-    )
+    return f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"

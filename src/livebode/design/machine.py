@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from livebode.nouns import InputError, Loop, Model
 
@@ -28,7 +28,14 @@ Extremes = dict[Quantity, tuple[float, float]]
 STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
 """What an axis does that stands, nobody says where."""
 
+_EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
 _NOISE_MIN, _NOISE_MAX = 1e-15, 1e9  # beyond them is a slip of the pen
+
+
+def within(frequency_hz: ArrayLike, band_hz: tuple[float, float]) -> NDArray[np.bool_]:
+    """Which frequencies lie in a band, its ends included."""
+    f = np.asarray(frequency_hz)
+    return np.asarray((f >= band_hz[0] * (1 - _EDGE)) & (f <= band_hz[1] * (1 + _EDGE)))
 
 
 def check_noise(noise: float) -> None:

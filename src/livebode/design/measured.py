@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.design.machine import STANDING, Extremes, Machine, Place
+from livebode.design.machine import STANDING, Extremes, Machine, Place, within
 from livebode.nouns import GridError, InputError, Loop, Responses
 from livebode.nouns.controllers import integral
 from livebode.nouns.model import Algebra, Gain, Model, as_model
@@ -16,8 +16,6 @@ from livebode.nouns.model import Algebra, Gain, Model, as_model
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Output = Literal["velocity", "position"]
-
-_EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +42,17 @@ class MeasuredResponse(Algebra):
             raise InputError(f"the response is valid at {np.sum(valid)} lines; at least two are needed")
         return cls(responses.lines.frequency_hz[valid], responses.value[0, valid])
 
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """From its first line to its last."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
+
     def response(self, frequency_hz: ArrayLike) -> Complex:
         f = np.asarray(frequency_hz, dtype=np.float64)
-        low, high = self.frequency_hz[0], self.frequency_hz[-1]
-        outside = (f < low * (1 - _EDGE)) | (f > high * (1 + _EDGE))
+        outside = ~within(f, self.band_hz)
         if np.any(outside):
             raise GridError(
-                f"the response was measured from {low:g} to {high:g} Hz and is asked for at "
+                f"the response was measured from {self.band_hz[0]:g} to {self.band_hz[1]:g} Hz and is asked for at "
                 f"{float(f[outside].flat[0]):g} Hz; choose lines within, or measure further"
             )
         # Over ln f a straight stretch of the Bode plot is met exactly.
@@ -134,7 +136,7 @@ def measured_machine(
     way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
     speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
     own = _motion(motion or {}, stroke_s)
-    band_hz = (given.frequency_hz[0], given.frequency_hz[-1]) if isinstance(given, MeasuredResponse) else None
+    band_hz = given.band_hz if isinstance(given, MeasuredResponse) else None
     place = Place(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
     return Machine(
         places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz

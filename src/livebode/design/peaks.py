@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design.machine import QUANTITIES, Machine, Place, Quantity
+from livebode.design.machine import QUANTITIES, Machine, Place, Quantity, within
 from livebode.design.waveform import Waveform
 
 Floats = NDArray[np.float64]
 
 _POWERLESS = 1e-12  # of the largest bin: rounding
-_EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
 
 
 @dataclass(frozen=True)
@@ -69,8 +68,7 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
     excited = np.flatnonzero(np.abs(spectrum) > _POWERLESS * np.max(np.abs(spectrum)))
     excited = excited[excited > 0]
     if machine.band_hz is not None and "resolution_n_m" in waveform.about:
-        low, high = np.array(machine.band_hz) * window / rate_hz
-        excited = excited[(excited >= low * (1 - _EDGE)) & (excited <= high * (1 + _EDGE))]
+        excited = excited[within(excited * rate_hz / window, machine.band_hz)]
     return tuple(
         _peak(quantity, place, response, spectrum, excited, window)
         for place in machine.places

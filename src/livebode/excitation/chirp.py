@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.excitation.odd import check_band
+from livebode.excitation.odd import check_band, wider
 from livebode.nouns import GridError, InputError, Lines
-from livebode.nouns.lines import WINDOW_MAX, check_window
+from livebode.nouns.lines import check_window
 
 Floats = NDArray[np.float64]
 Sweep = Literal["linear", "logarithmic"]
@@ -67,11 +67,8 @@ def chirp_lines(low_hz: float, high_hz: float, rate_hz: float, window: int) -> L
     first, last = int(np.ceil(low_hz * window / rate_hz - 1e-9)), int(np.floor(high_hz * window / rate_hz + 1e-9))
     first = max(first, 1)
     if last - first < 2:
-        longer = ""
-        if (high_hz - low_hz) * WINDOW_MAX >= 3 * rate_hz:
-            longer = f"a window of {int(np.ceil(3 * rate_hz / (high_hz - low_hz)))} samples, or "
         raise GridError(
             f"{low_hz:g} … {high_hz:g} Hz is not wider than two bins of {rate_hz / window:g} Hz; "
-            f"take {longer}a wider band"
+            f"take {wider(high_hz - low_hz, 3, window, rate_hz)}"
         )
     return Lines.of_bins(list(range(first, last + 1)), window, rate_hz)

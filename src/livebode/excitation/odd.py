@@ -48,13 +48,9 @@ def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, gro
     odd = np.arange(first + (first + 1) % 2, last + 1, 2)
     odd = odd[2 * odd < window]
     if odd.size < group:
-        longer = ""
-        if (high_hz - low_hz) * WINDOW_MAX >= 2 * group * rate_hz:
-            needed = int(np.ceil(2 * group * rate_hz / (high_hz - low_hz)))
-            longer = f"a window of {max(needed, window + 1)} samples, or "
         raise GridError(
             f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {resolution_hz:g} Hz grid, less than one "
-            f"group of {group}; take {longer}a wider band"
+            f"group of {group}; take {wider(high_hz - low_hz, 2 * group, window, rate_hz)}"
         )
     generator = np.random.default_rng(seed)
     groups = [odd[i : i + group] for i in range(0, odd.size, group)]
@@ -73,3 +69,10 @@ def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:
             f"the band ends at {high_hz:g} Hz, not below the Nyquist frequency {rate_hz / 2:g} Hz of {rate_hz:g} Hz; "
             f"end it at {0.45 * rate_hz:g} Hz, or sample at {2.5 * high_hz:g} Hz"
         )
+
+
+def wider(band_hz: float, bins: int, window: int, rate_hz: float) -> str:
+    """The remedy where a band is narrower than so many bins: a longer window where one is enough, or a wider band."""
+    if band_hz * WINDOW_MAX < bins * rate_hz:
+        return "a wider band"
+    return f"a window of {max(int(np.ceil(bins * rate_hz / band_hz)), window + 1)} samples, or a wider band"

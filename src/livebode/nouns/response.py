@@ -151,6 +151,10 @@ class Responses(Sequence[Response]):
             rows[name] = rows[name].item()
         return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
 
+    def between(self, from_s: float, to_s: float) -> Responses:
+        """Those that speak for a span of time, ends included."""
+        return self[np.flatnonzero((self.time_s >= from_s) & (self.time_s <= to_s))]
+
     def __iter__(self) -> Iterator[Response]:
         return (self[i] for i in range(len(self)))
 

@@ -88,9 +88,8 @@ class Run:
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Those that speak for a span of time, ends included, in parts; segments outside of it are not read."""
         for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
-            within = (part.time_s >= from_s) & (part.time_s <= to_s)
-            if within.any():
-                yield part[np.flatnonzero(within)]
+            if len(within := part.between(from_s, to_s)):
+                yield within
 
     def _in_parts(self, tables: Iterator[pa.Table]) -> Iterator[Responses]:
         lines = self.lines

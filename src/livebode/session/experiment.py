@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -123,9 +124,11 @@ class Experiment(BaseModel):
         axis = self.axis()
         if axis is not None:
             return belt_machine(axis)
-        return self._measured_axis().machine()
+        return self._measured_axis.machine()
 
+    @cached_property
     def _measured_axis(self) -> MeasuredAxis:
+        """The run is opened once."""
         assert self.measured is not None
         return MeasuredAxis(self.measured, self.loop)
 
@@ -133,7 +136,7 @@ class Experiment(BaseModel):
         """[loop] of the axis.toml, as docs/configuration.md has it."""
         axis = self.axis()
         if axis is None:
-            return _finite(self._measured_axis().loop_tables())
+            return _finite(self._measured_axis.loop_tables())
         drive = axis.drive
         velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
                     "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
@@ -155,7 +158,7 @@ class Experiment(BaseModel):
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
             raise InputError(f"there is no signals.{unknown[0]}; {_near(unknown[0], (*_SIGNALS, 'schedule'))}")
         if self.belt is None:
-            own = self._measured_axis().signal_names()
+            own = self._measured_axis.signal_names()
         else:
             own = _SIGNALS | ({"schedule": "x"} if "strokes" in self.belt else {})
         names = own | self.signals
@@ -168,7 +171,7 @@ class Experiment(BaseModel):
 
     def tracking(self) -> dict[str, Any]:
         """What [tracking] of the axis.toml has to say of the recording."""
-        return {} if self.belt is not None else self._measured_axis().tracking()
+        return {} if self.belt is not None else self._measured_axis.tracking()
 
 
 def _sentence(error: ValidationError) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.design import Machine, MeasuredResponse, measured_machine
 from livebode.design.machine import MOTION_KEYS
+from livebode.design.measured import Output
 from livebode.fitting import mean_response
 from livebode.nouns import InputError
 from livebode.records import Run
@@ -16,7 +17,6 @@ from livebode.session.axis import LoopSection
 from livebode.session.fits import output_of
 from livebode.session.said import said
 
-Output = Literal["velocity", "position"]
 Number = Annotated[float, Field(strict=True)]  # true is none
 
 _KEPT = ("differenced", "spikes")  # of the run's [tracking]: what the recording needs, not what was wished of it

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.design import Waveform
+from livebode.design.files.facts import as_lines
 from livebode.excitation import multisine
 from livebode.nouns import InputError, Lines, counted
 from livebode.session.axis import SAME_RATE, Axis
@@ -129,5 +129,4 @@ def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
 
 def _designed(waveform: Waveform) -> tuple[Floats, int, str]:
     """The same of a design."""
-    note = "\n".join(f"{key}: {json.dumps(value)}" for key, value in waveform.about.items())
-    return waveform.samples, waveform.ramp_periods, note
+    return waveform.samples, waveform.ramp_periods, "\n".join(as_lines(waveform.about))

@@ -1,6 +1,6 @@
 """IEC 61131-3 Structured Text: the excitation, the sliding DFT and the ring that livebode reads, as function blocks."""
 
-from livebode.structured_text.multisine import PERIOD_MAX, RAMP_PERIODS_MAX, SMALLEST, multisine
+from livebode.structured_text.multisine import PERIOD_MAX, SMALLEST, multisine
 from livebode.structured_text.names import as_name, check_name
 from livebode.structured_text.project import Project, check_signals
 from livebode.structured_text.ring import ring_block, ring_type
@@ -10,7 +10,6 @@ from livebode.structured_text.twincat import twincat
 
 __all__ = [
     "PERIOD_MAX",
-    "RAMP_PERIODS_MAX",
     "SMALLEST",
     "Project",
     "as_name",

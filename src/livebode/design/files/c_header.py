@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from livebode.design.files.c_names import identifier
-from livebode.design.files.facts import facts
+from livebode.design.files.facts import as_lines, facts
 from livebode.design.waveform import Waveform
 
 _PER_ROW = 4
@@ -22,7 +21,7 @@ def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
     big = word.upper()
     lines = waveform.lines
     # A comment ends where the facts hold its end.
-    said = "\n".join(f" * {key}: {json.dumps(value)}".replace("*/", "* /") for key, value in facts(waveform).items())
+    said = "\n".join(f" * {line}".replace("*/", "* /") for line in as_lines(facts(waveform)))
     values = [float(value).hex() for value in waveform.samples]
     text = f"""/* One period of an excitation, N m.
 {said}

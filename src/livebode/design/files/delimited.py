@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from livebode.design.files.facts import facts
+from livebode.design.files.facts import as_lines, facts
 from livebode.design.waveform import Waveform
 from livebode.nouns import InputError
 
@@ -17,7 +16,7 @@ def write_csv(path: Path, waveform: Waveform, name: str) -> None:
     """
     if not name.isprintable() or not name.strip() or set(name) & set(',;"\t[]#%'):
         raise InputError(f"{name=} cannot head a column of a CSV file; choose letters, digits and underscores")
-    head = [f"# {key}: {json.dumps(value)}" for key, value in facts(waveform).items()]
+    head = [f"# {line}" for line in as_lines(facts(waveform))]
     rate_hz = waveform.lines.rate_hz
     rows = (f"{n / rate_hz!r},{value!r}" for n, value in enumerate(waveform.samples.tolist()))
     path.write_text("\n".join([*head, f"time [s],{name} [N m]", *rows]) + "\n", encoding="utf-8")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from typing import Any
 
 from livebode.design.waveform import Waveform
@@ -23,3 +25,8 @@ def facts(waveform: Waveform) -> dict[str, Any]:
         "rms": waveform.rms,
         "crest_factor": waveform.crest_factor,
     }
+
+
+def as_lines(known: Mapping[str, Any]) -> list[str]:
+    """Each fact as a line of text, its value as JSON."""
+    return [f"{key}: {json.dumps(value)}" for key, value in known.items()]

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from livebode.design.files.facts import facts
+from livebode.design.files.facts import as_lines, facts
 from livebode.design.waveform import Waveform
-from livebode.structured_text import RAMP_PERIODS_MAX, check_name, multisine
+from livebode.structured_text import check_name, multisine
 
 
 def write_st(path: Path, waveform: Waveform, name: str) -> None:
     """``FB_name``, limited to the period's own peak where the program gives no other w_max; exactly the doubles."""
     check_name(name, "excitation")
-    note = "\n".join(f"{key}: {json.dumps(value)}" for key, value in facts(waveform).items())
+    note = "\n".join(as_lines(facts(waveform)))
     text = multisine(
         waveform.samples, rate_hz=waveform.lines.rate_hz, limit=waveform.peak, name=f"FB_{name}", note=note,
-        ramp_periods=min(waveform.ramp_periods, RAMP_PERIODS_MAX),
+        ramp_periods=waveform.ramp_periods,
     )  # fmt: skip
     path.write_text(text, encoding="ascii")
