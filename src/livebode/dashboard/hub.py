@@ -11,6 +11,7 @@ from typing import Any
 
 from livebode.nouns import Block, Event, Parameters, Responses
 from livebode.session import Audience
+from livebode.session.overview import Overview
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -35,6 +36,7 @@ class Hub(Audience):
         self.begun: Mapping[str, Any] | None = None
         self.ended: Mapping[str, Any] | None = None
         self.health: Callable[[], Health] | None = None
+        self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
         self._lock = threading.Lock()
@@ -42,6 +44,9 @@ class Hub(Audience):
         self._values = 0
         self._events: deque[Event] = deque(maxlen=EVENTS_MAX)
         self._sayings: list[Event] = []
+
+    def share(self, overview: Overview) -> None:
+        self.overview = overview
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         with self._lock:  # what waits is of a run before, whose lines may be others

@@ -54,7 +54,9 @@ class State:
 
     def _empty(self) -> None:
         self.newest: Responses | None = None
-        self.recent, self.overview = Recent(), Overview()
+        self.recent = Recent()
+        self._shared = None if self.hub is None else self.hub.overview
+        self.overview = self._shared or Overview()
         self.trends, self.notices = Trends(), Notices()
         self.first_s = self.last_s = float("nan")
         self.finished = False
@@ -129,7 +131,8 @@ class State:
             return
         self._seen += len(responses)
         self._grew = time.monotonic()
-        self.overview.add(responses)
+        if self._shared is None:
+            self.overview.add(responses)
         self.recent.add(responses)
         use = np.flatnonzero(responses.valid.any(axis=1))
         at = int(use[-1]) if use.size else len(responses) - 1

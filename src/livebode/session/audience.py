@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.nouns import Block, Event, Parameters, Responses
 from livebode.records import RunDirectory
+from livebode.session.overview import Overview
 from livebode.sources.live import Health
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ class Audience:
     It is called in the thread that tracks, after the record has taken the same, so every method must return at once and
     may not raise. What it needs time for it does elsewhere, on what it kept; all that it is given is immutable.
     """
+
+    def share(self, overview: Overview) -> None:
+        """The thinned copy of the run that begins next, which grows with it: there need not be another one."""
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time.
@@ -52,6 +56,9 @@ class Relay(Audience):
 
     def __init__(self, audience: Audience) -> None:
         self._audience = audience
+
+    def share(self, overview: Overview) -> None:
+        self._audience.share(overview)
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         self._audience.begin(directory, summary, health)

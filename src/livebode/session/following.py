@@ -167,6 +167,7 @@ class Tracking:
         """Every Block through the pipeline into the record; InputError where there is none."""
         fits, watching = self.pipeline.fits, self.pipeline.watching
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
+        self.to.audience.share(self._overview)
         self.to.audience.begin(self.to.directory, begun, _health(self.source))
         blocks = self._blocks
         if not isinstance(self.recorder, RunDirectory):
