@@ -13,6 +13,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.nouns import Block, Channel, Event, Responses
 from livebode.records import Run
 from livebode.session.axis import RecordSection
+from livebode.session.event_groups import each_event
 from livebode.session.tracking import Outcome, record
 from tests.command import LINES, RATE_HZ, signals
 
@@ -104,7 +105,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
     assert number.size >= sample_min
     due = int(np.count_nonzero(responses.sample < number.size))
     assert len(found) == due
-    said = [event for event in run.events() if not event.kind.startswith(OWN)]
+    said = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
     # An event is written before the rows that belong to it are committed.
     assert said == list(events[: len(said)])
     assert len(said) >= sum(event.sample < number.size for event in events)

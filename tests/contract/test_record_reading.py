@@ -19,6 +19,7 @@ from livebode.estimation import Tracker
 from livebode.nouns import Block, Event, InputError
 from livebode.records import Run, RunDirectory
 from livebode.session.axis import RecordSection
+from livebode.session.event_groups import each_event
 from livebode.session.tracking import record
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 from tests.recorded import (
@@ -54,6 +55,11 @@ def record_until(sample: int, directory: Path, **options: object) -> None:
         record_machine(machine(SAMPLES), directory, progress=stop_at(sample), **options)
 
 
+def each(run: Run) -> list[Event]:
+    """Its events as they happened, before they were grouped."""
+    return [one for event in run.events() for one in each_event(event)]
+
+
 def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
     record(
@@ -63,7 +69,8 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     check_whole(tmp_path / "segments", SAMPLES)
     runs = [Run.open(tmp_path / name) for name in ("segments", "piece")]
     assert same(runs[0].responses(), runs[1].responses())
-    assert runs[0].events() == runs[1].events() == list(expected(SAMPLES)[1])
+    assert runs[0].events() == runs[1].events()
+    assert each(runs[0]) == list(expected(SAMPLES)[1])
     assert runs[0].summary["counts"] == runs[1].summary["counts"]
     assert [run.finished for run in runs] == [True, True]
     assert len(runs[0].segments) == 2 * SAMPLES // RATE_HZ
@@ -94,7 +101,7 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
         while not going.wait(0.001):
             if (directory / "run.json").exists():
                 run = Run.open(directory)
-                seen, said = run.responses(), run.events()
+                seen, said = run.responses(), each(run)
                 number = np.concatenate([np.zeros(0, int), *(t["sample"].to_numpy() for t in run.tables("samples"))])
                 assert same(seen, responses[: len(seen)])
                 assert said == list(events[: len(said)])

@@ -116,7 +116,7 @@ class Tracking:
         self._newest: Fit | None = None
         self._origin_s = 0.0
         self.recorder = self._recorder(again, before)
-        self._out = Outlet(self.recorder, to.audience)
+        self._out = Outlet(self.recorder, to.audience, self._tally.groups)
 
     def _recorder(self, again: bool, before: Before | None) -> RunDirectory | SegmentedRun:
         if self._kept is None:
@@ -200,6 +200,7 @@ class Tracking:
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
+        self._out.report_groups(self.position[1])
         if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
             self.recorder.keep(kept)
 
@@ -242,6 +243,7 @@ class Tracking:
         self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, self._overview.responses())
         if watching is not None:
             self._done["monitoring"] = watching.finish(self._out.write_event)
+        self._out.finish_groups()
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

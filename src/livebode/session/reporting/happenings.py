@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from livebode.nouns import Event
 from livebode.nouns.document import Paragraph, Part, Table
+from livebode.session.event_groups import each_event
 from livebode.session.reporting.wording import many, seconds
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
@@ -38,7 +39,8 @@ class Happenings:
     def of(cls, events: Iterable[Event]) -> Happenings:
         found = cls()
         for event in events:
-            found._add(event)
+            for one in each_event(event):
+                found._add(one)
         return found
 
     def _add(self, event: Event) -> None:
