@@ -17,7 +17,7 @@ from livebode.nouns import Event, InputError
 from livebode.session import Session, StoppedError
 from livebode.session.axis_thread import AxisThread
 
-_COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "last event")
+_COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
 _EVENT_LETTERS = 60
 _LOOKS_A_REDRAW = 5
 
@@ -78,7 +78,7 @@ def table_of(threads: list[AxisThread]) -> Table:
     """One line for each axis."""
     table = Table(box=None, pad_edge=False)
     for column in _COLUMNS:
-        table.add_column(column, justify="right" if column in _COLUMNS[2:7] else "left", no_wrap=True)
+        table.add_column(column, justify="right" if column in _COLUMNS[2:8] else "left", no_wrap=True)
     for thread in threads:
         table.add_row(*map(Text, _row(thread)))
     return table
@@ -103,6 +103,7 @@ def _row(thread: AxisThread) -> tuple[str, ...]:
         str(status.responses),
         "" if health is None else str(health.lost),
         "" if status.latency_s is None else f"{1e3 * status.latency_s:.1f} ms",
+        "" if health is None else f"{health.waiting_s:.1f} s",
         event if len(event) <= _EVENT_LETTERS else event[:_EVENT_LETTERS] + "…",
     )
 

@@ -65,7 +65,8 @@ def counted(summary: dict[str, Any]) -> str:
     gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     return (
         f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
-        f"from {counts['samples']} samples{gaps}: "
+        f"from {counts['samples']} samples{gaps}, one in {_many(found['hop'], 'sample')} "
+        f"({found['rate_hz'] / found['hop']:.4g}/s): "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s"
     )
 

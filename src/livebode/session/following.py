@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.estimation import response_unit
 from livebode.fitting import Fit
-from livebode.nouns import Block, Channel, Event, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import RunDirectory
 from livebode.session import summary
 from livebode.session.audience import Audience, Outlet
@@ -21,9 +21,11 @@ from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
 from livebode.session.continuing import Before, Numbering
 from livebode.session.destination import Destination
+from livebode.session.fits import Fits
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.overview import Overview
 from livebode.session.pipeline import Pipeline
+from livebode.session.shedding import LoadShedding
 from livebode.session.tally import Tally
 from livebode.sources.live import Health, LiveSource
 
@@ -102,6 +104,9 @@ class Tracking:
         _keep_freed_memory()
         self.source, self.pipeline, self.to, self._kept = source, pipeline, to, kept
         self._orders, self._numbering = orders or Orders(), numbering or Numbering()
+        self._shedding: LoadShedding | None = None
+        if isinstance(source, LiveSource):
+            self._shedding = LoadShedding(source, lambda: self._orders.ended)
         self._follower, settings = pipeline.follower, pipeline.follower.settings
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
@@ -178,7 +183,8 @@ class Tracking:
                     fits.take(responses[0:0], self._out)  # which tells it the lines
             blocks = self.recorder.feed(blocks)
         if watching is not None:
-            blocks = watching.over(blocks, self._out.write_event)
+            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
+            blocks = watching.over(blocks, self._out.write_event, has_time)
         for block in _told(blocks, self.to.audience):
             if self._orders.ended and not isinstance(self.source, LiveSource):
                 raise StoppedError("ended before the end of the recording")
@@ -198,6 +204,8 @@ class Tracking:
             self._tally.take(responses, time.perf_counter() - before)
             self._publish(responses)
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
+        if self._shedding is not None:
+            events += self._shedding.drain_events(*self.position)
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
         self._out.report_groups(self.position[1])
@@ -208,9 +216,15 @@ class Tracking:
         fits, watching = self.pipeline.fits, self.pipeline.watching
         self._overview.add(responses)
         self._out.write(responses)
-        parameters = None if fits is None else fits.take(responses, self._out)
-        if watching is not None:
+        parameters = None if fits is None else self._fitted(fits, responses)
+        if watching is not None and (self._shedding is None or self._shedding.to_monitor(responses)):
             watching.follow(responses, parameters, self._out.write_event)
+
+    def _fitted(self, fits: Fits, responses: Responses) -> Parameters:
+        if self._shedding is None:
+            return fits.take(responses, self._out)
+        with self._shedding.fitting(responses) as chosen:
+            return fits.take(chosen, self._out)
 
     def _drained(self) -> list[Event]:
         """What a live source has to say; a recording says it all at once."""
@@ -234,7 +248,8 @@ class Tracking:
                 raise
             # What was recorded stays, and says what is wrong with it.
             self._out.write_event(Event("doubtful", *self.position, str(error)))
-        for event in self._drained() + self._orders.drain_events(*self.position):
+        left = [] if self._shedding is None else self._shedding.finish(*self.position)
+        for event in self._drained() + self._orders.drain_events(*self.position) + left:
             self._out.write_event(event)
         fits, watching = self.pipeline.fits, self.pipeline.watching
         self._done = summary.begun(self._about, self._follower, self._begun["found"]["unit"])

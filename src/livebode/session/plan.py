@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.estimation import Settings, SpectraTracker, Tracker
+from livebode.estimation.settings import nearest_hop
 from livebode.nouns import InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
@@ -12,6 +13,8 @@ from livebode.session.follower import Follower
 from livebode.session.spectra_plan import check_spectra
 from livebode.sources import Log
 
+LIVE_RESPONSES_PER_S = 20.0
+"""Default of a live source: what a person sees, at a tenth of the work of a hop of a twentieth of the window."""
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
 
 
@@ -31,7 +34,9 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
             "lines or window are 'auto', which needs a recording to look at first; give lines.frequencies and "
             "lines.window for a live source"
         )
-    return _follower(axis, _settings(axis, rate_hz, Lines.parse(frequencies, rate_hz, window)))
+    lines = Lines.parse(frequencies, rate_hz, window)
+    hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
+    return _follower(axis, _settings(axis, rate_hz, lines, hop))
 
 
 def _follower(axis: Axis, settings: Settings) -> Follower:

@@ -11,6 +11,9 @@ INBOX_S_MAX = 60.0
 """The machine's time that may wait: longer than any pause of a tracker that works."""
 INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
 """What may wait however long it is, and what may not however short: many axes share one computer."""
+RESUMES_AT = 0.75
+"""A queue that was full takes batches again when no more than this share of it is used: what is dropped is in few long
+spans, and the windows between them are whole."""
 _ENTRY_BYTES = 1000
 
 
@@ -24,6 +27,12 @@ class Inbox:
         self._seconds = 0.0
         self._changed = threading.Condition()
         self._closed = False
+        self._full = False
+
+    @property
+    def seconds(self) -> float:
+        """The machine's time that waits."""
+        return self._seconds
 
     @property
     def bytes(self) -> int:
@@ -36,19 +45,22 @@ class Inbox:
             return self._closed and not self._batches
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
-        """Whether the batch was taken. A full inbox refuses it, or with `wait` lets the sender wait."""
+        """Whether the batch was taken. A full inbox refuses it and those behind it until a quarter is free, or with
+        `wait` lets the sender wait.
+        """
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._closed or self._has_room(batch))
-            if self._closed or not self._has_room(batch):
+            self._full = not self._has_room(batch, RESUMES_AT if self._full else 1.0)
+            if self._closed or self._full:
                 return False
             self._batches.append(batch)
             self._count(batch, 1)
             return True
 
-    def _has_room(self, batch: AnyBatch) -> bool:
-        size = self._bytes + _size_bytes(batch)
-        return size <= self._bytes_max and (size <= INBOX_BYTES_MIN or self._seconds + _seconds(batch) <= INBOX_S_MAX)
+    def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
+        size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
+        return size <= share * self._bytes_max and (size <= share * INBOX_BYTES_MIN or seconds <= share * INBOX_S_MAX)
 
     def _count(self, batch: AnyBatch, sign: int) -> None:
         self._bytes += sign * _size_bytes(batch)

@@ -15,6 +15,7 @@ import numpy as np
 from livebode.nouns import Channel, Event, InputError, SpectraLayout, missing_channel
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
@@ -50,6 +51,7 @@ class LiveSource(ABC):
         self.settings, self.address = settings, address
         self._said = Said()
         self._inbox = Inbox()
+        self._dropped = Dropped(self._said)
         self._sequencer = Sequencer(
             self._said,
             reorder=settings.reorder_batches if self.reorders else 0,
@@ -121,7 +123,13 @@ class LiveSource(ABC):
             clock_offset_s=None if clock is None else clock.offset_s,
             latency_s=None if newest is None else newest[1],
             waiting_bytes=self._inbox.bytes,
+            waiting_s=self.waiting_s,
         )
+
+    @property
+    def waiting_s(self) -> float:
+        """The machine's time that was received and is not tracked yet: the backlog."""
+        return self._inbox.seconds
 
     def open(self) -> Self:
         """Begin to receive, and wait for the first batch; InputError where none comes within `timeout_s`."""
@@ -222,6 +230,7 @@ class LiveSource(ABC):
             self._failure = error
         finally:
             self._connected = False
+            self._dropped.finish()
             self._inbox.close()
 
     def _stands(self) -> None:
@@ -249,5 +258,7 @@ class LiveSource(ABC):
         self._first = self._first or (now, self._received)
         if np.isnan(batch.arrived_s):
             batch = replace(batch, arrived_s=now)
-        if not self._inbox.put(batch, self.waits) and not self._stop.is_set():
-            self._said.say("overflow", f"{batch.samples} samples came faster than they were taken and were dropped")
+        if self._inbox.put(batch, self.waits):
+            self._dropped.finish()
+        elif not self._stop.is_set():
+            self._dropped.take(batch)
