@@ -205,7 +205,11 @@ class Tracking:
             self._publish(responses)
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
         if self._shedding is not None:
-            events += self._shedding.drain_events(*self.position)
+            shed = self._shedding.drain_events(*self.position)
+            for event in shed:
+                if event.kind != "thinned":
+                    self.to.tell(event)
+            events += shed
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
         self._out.report_groups(self.position[1])
