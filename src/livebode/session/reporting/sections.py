@@ -174,7 +174,8 @@ _COUNTS = {
 _SOURCE = {
     "connected": "connection stood at the end", "lost": "lost samples", "silent_s": "silent, s",
     "measured_hz": "rate by arrival, Hz", "clock_offset_s": "sender's clock at sample 0",
-    "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "first_sample": "first sample", "counts": "events",
+    "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "waiting_s": "backlog, s",
+    "first_sample": "first sample", "counts": "events",
 }  # fmt: skip
 
 
