@@ -1,8 +1,8 @@
 """`python -m bench.overload`: a live run whose model does not fit, at 200 responses a second.
 
 A sender in another process sends 4 kHz over UDP in batches of 25 ms, as a drive would. `two-mass-gain` is fitted to a
-delay, which it does not describe, at a hop of 20 samples: each fit is scanned again and fails. Printed are samples lost,
-the longest backlog, how many responses were fitted, lines and groups of events, and how long the end took.
+delay, which it does not describe, at a hop of 20 samples: each fit is scanned again and fails. Printed are samples
+lost, the longest backlog, how many responses were fitted, lines and groups of events, and how long the end took.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Backlog(Audience):
         self.longest_s = 0.0
         self._orders = orders
 
-    def followed(self, block: Block) -> None:
+    def followed(self, _: Block) -> None:
         if self._orders.source is not None:
             self.longest_s = max(self.longest_s, self._orders.source.waiting_s)
 
