@@ -83,7 +83,8 @@ def measured(seconds: float, folder: Path) -> dict[str, float]:
     run.start()
     sender.start()
     sender.join()
-    asked = time.monotonic()
+    assert orders.source is not None
+    asked, waited_s = time.monotonic(), orders.source.waiting_s
     orders.end()
     run.join()
     stop_s, found = time.monotonic() - asked, Run.open(folder)
@@ -97,6 +98,7 @@ def measured(seconds: float, folder: Path) -> dict[str, float]:
         "lines of events": len(events),
         "groups of events": len({event.details.get("group", id(event)) for event in events}),
         "events": sum(1 for event in events for _ in each_event(event)),
+        "backlog at the end, s": waited_s,
         "stop, s": stop_s,
     }
 

@@ -12,7 +12,7 @@ SHARE = 0.5
 """Of one core, for the fits of all axes of a process: Python runs one thread at a time, and samples come first."""
 CREDIT_S_MAX = 2.0
 """What a pause may save up."""
-RELIEF_FROM_S, RELIEF_TO_S = 2.0, 10.0
+RELIEF_FROM_S, RELIEF_TO_S = 2.0, 8.0
 """Fits get less time when the run is further behind than the first, and none from the second on."""
 _FIRST_ROW_S = 0.02
 

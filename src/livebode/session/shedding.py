@@ -15,6 +15,8 @@ MONITORING_STOPS_S, MONITORING_RESUMES_S = 15.0, 1.0
 """So far behind, monitoring is left out, until the run has caught up to the second."""
 ALARM_S, CLEARED_S = 10.0, 1.0
 """So far behind, an event reports it, and so far another one reports that it is over."""
+ENDING_S = 0.5
+"""A run that was told to end makes no fits while more than this waits."""
 REPORT_S = 10.0
 """What was left out is reported at most so often, in seconds of the machine."""
 
@@ -70,7 +72,8 @@ class LoadShedding:
         """Those that there is time to fit, evenly spread, the newest among them; they are fitted inside."""
         fitted = responses
         if self._limited and len(responses):
-            rows = self._budget.rows(len(responses), self.behind_s)
+            behind_s = np.inf if self._ended() and self.behind_s > ENDING_S else self.behind_s
+            rows = self._budget.rows(len(responses), behind_s)
             stride = -(-len(responses) // rows) if rows else 0
             fitted = responses[(len(responses) - 1) % stride :: stride] if rows else responses[0:0]
             self._leave_out("fits", len(responses) - len(fitted), responses)
