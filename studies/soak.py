@@ -2,9 +2,9 @@
 
 Four axes at 4 kHz come over TCP, 21 lines at 20 responses a second, with a record in segments; the first one has fits
 and margins. A dashboard serves them, and one client reads all that the page would. Every 30 s of the machine a batch is
-missing. The senders wait until livebode has tracked what they sent, so that the machine's clock runs as fast as the
-computer permits; they are less than a second ahead, so that nothing is left out as in a backlog. Resident memory is
-read each half minute of the machine; the slope is that of a least-squares line after the warm-up.
+missing. The senders keep in step and wait until livebode has tracked what they sent, so that the machine's clock runs as
+fast as the computer permits; they are less than a second ahead, so that nothing is left out as in a backlog. Resident
+memory is read each half minute of the machine; the slope is that of a least-squares line after the warm-up.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ def machines(listeners: list[socket.socket], done: list[Synchronized[int]], url:
         link.sendall(encode_layout(CHANNELS, RATE_HZ, epoch=7))
     turns = [0] * len(links)
     while not end.is_set():
-        due = [n for n, turn in enumerate(turns) if turn * BATCH - done[n].value <= AHEAD]
+        slowest = min(one.value for one in done)
+        due = [n for n, turn in enumerate(turns) if turn * BATCH - slowest <= AHEAD]
         if not due:
             time.sleep(0.002)
         for n in due:
