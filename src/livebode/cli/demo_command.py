@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +17,8 @@ from livebode.nouns import Responses
 from livebode.records import to_json
 from livebode.session import Relay
 from livebode.session.axis import ServeSection
+
+_SHOWN = 4
 
 
 def demo_command(
@@ -32,11 +36,17 @@ def demo_command(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from livebode.session.demo import demo  # with the simulation
+    from livebode.session.demo import LEARNED_S, demo, demo_baseline  # with the simulation
 
     console = Console(stderr=True, highlight=False)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
+    with (
+        console.status(f"Learning the healthy axis from {LEARNED_S:g} s of its strokes")
+        if not as_json
+        else nullcontext()
+    ):
+        baseline = demo_baseline(seed + 1)
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # Whoever tries it is shown the page while the machine works; the port that others expect is left to them.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
@@ -52,27 +62,29 @@ def demo_command(
             def progress(done: int, total: int | None) -> None:
                 bar.update(task, completed=seconds * done / (total or done))
 
-            outcome, found = demo(
+            outcome = demo(
                 out,
                 seconds=seconds,
                 seed=seed,
                 real_time=not fast,
+                baseline=baseline,
                 progress=progress,
                 audience=Numbers(audience_of("demo")),
                 draw=drawing("simulated belt axis", ("u", "velocity")),
             )
         if as_json:
-            print(to_json({"directory": str(outcome.directory), "finding": found} | outcome.summary), flush=True)
+            print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
             return
         show(outcome)
-        print(f"\n{found}", flush=True)
+        sys.stdout.flush()
 
 
 def _numbers(responses: Responses) -> str:
-    """The newest response in a line: where the cart is, and the magnitude at each line."""
+    """The newest response in a line: where the cart is, and the magnitude at some of the lines."""
     if not len(responses) or not responses.valid[-1].any():
         return "waiting for the first whole window"
     newest = responses[-1]
     f = newest.lines.frequency_hz
-    levels = " ".join(f"{db:+.1f}" for db in newest.magnitude_db)
-    return f"cart at {newest.schedule:.2f} m, dB at {f[0]:.0f} … {f[-1]:.0f} Hz: {levels}"
+    some = slice(None, None, max(1, len(f) // _SHOWN))
+    levels = ", ".join(f"{hz:.0f} Hz {db:+.1f} dB" for hz, db in zip(f[some], newest.magnitude_db[some]))
+    return f"cart at {newest.schedule:.2f} m: {levels}"
