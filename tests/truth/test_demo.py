@@ -45,7 +45,7 @@ def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(tmp_p
         if (event := json.loads(line))["kind"] == "change"
     ]
     assert (change["details"]["what"], change["details"]["place_m"]) == ("stiffness", None)
-    assert change["details"]["since_s"] == pytest.approx(10.0, abs=2 * _WINDOW_S)
+    assert change["details"]["since_s"] == pytest.approx(11.0, abs=2 * _WINDOW_S)
     assert abs(change["details"]["amount_percent"] + 100 * LOSS) < 2 * change["details"]["bound_percent"]
     monitoring = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))["monitoring"]
     assert done.out.splitlines()[-2:] == [change["message"], monitoring["message"]]
@@ -54,7 +54,7 @@ def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(tmp_p
     assert re.search(f"ALARM {re.escape(change['message'])}", page.text)
     heard = Heard()
     demo(
-        tmp_path / "again", seconds=20, seed=1, real_time=False, baseline=baseline(), progress=lambda *_: None,
+        tmp_path / "again", seconds=22, seed=1, real_time=False, baseline=baseline(), progress=lambda *_: None,
         audience=heard, draw=lambda *_: None,
     )  # fmt: skip
     assert change["message"] in [event.message for event in heard.events]

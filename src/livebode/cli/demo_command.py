@@ -22,7 +22,7 @@ _SHOWN = 4
 
 
 def demo_command(
-    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 22.0,
     fast: Annotated[bool, typer.Option("--fast", help="As fast as it can, not at the machine's pace.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the noise; the same seed gives the same run.")] = 1,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; an earlier demo there is replaced.")] = Path(
