@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
+from pyarrow.fs import LocalFileSystem
 
 from livebode.nouns import InputError
 from livebode.records.plain_json import to_json
@@ -63,33 +65,47 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
     except ImportError:
         raise InputError("DuckDB is not installed; pip install 'livebode[query]'") from None
     with duckdb.connect(":memory:") as database:
-        known = _show(run, database)
+        try:
+            asked = {str(name).lower() for name in database.get_table_names(sql)}
+        except duckdb.Error:
+            asked = set(_TABLES)  # it is no SELECT, and will be refused below
+        known = _show(run, database, asked)
         for setting in _CONFINED:
             database.execute(setting)
         try:
             answer = database.execute(sql)
-            rows = answer.fetchmany(rows_max + 1)
+            rows = answer.fetchmany(rows_max + 1) if answer is not None else []
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
             raise InputError(f"the query cannot be run: {sentence} (this run has {', '.join(known)})") from None
+        if answer is None:
+            raise InputError(f"the query is empty; write SQL on {', '.join(known)}")
         columns = tuple(column[0] for column in answer.description or ())
     return Found(columns, rows[:rows_max], len(rows) > rows_max)
 
 
-def _show(run: Run, database: Any) -> list[str]:
-    """Make the tables of the run known to the database; their names."""
+def _dataset(files: list[tuple[Path, list[int] | None]]) -> ds.Dataset:
+    if all(groups is None for _, groups in files):
+        return ds.dataset([path for path, _ in files], format="parquet")
+    parquet, disk = ds.ParquetFileFormat(), LocalFileSystem()
+    fragments = [parquet.make_fragment(str(path), disk, row_groups=groups) for path, groups in files]
+    return ds.FileSystemDataset(fragments, fragments[0].physical_schema, parquet, disk)
+
+
+def _show(run: Run, database: Any, asked: set[str]) -> list[str]:
+    """Make the tables of the run known to the database, those that are not asked for without rows; their names."""
     known = ["events"]
-    events = [asdict(event) | {"details": to_json(event.details)} for event in run.events()]
-    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
     for table in _TABLES:
-        files, rows = run.parts(table)
+        files, rows = run.parts(table, check=table in asked)
         if not files and not rows:
             continue
-        parts = [ds.dataset(files, format="parquet")] if files else []
+        parts: list[Any] = [_dataset(files)] if files else []
         for number, part in enumerate([*parts, *rows]):
             database.register(f"_{table}_{number}", part)
         united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts) + len(rows)))
         database.execute(f"CREATE VIEW {table} AS {united}")
         known.append(table)
+    events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
+    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
     return known
