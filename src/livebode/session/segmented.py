@@ -188,6 +188,7 @@ class SegmentedRun:
         # What was held back at the end was written since the last commit, and belongs to the states as they are now.
         self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(self._named(summary), finished=self._ends or ends)
+        self._hear()
 
     def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
         last = self._store.last
