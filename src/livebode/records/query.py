@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -12,7 +11,7 @@ from pyarrow.fs import LocalFileSystem
 
 from livebode.nouns import InputError
 from livebode.records.plain_json import to_json
-from livebode.records.run import Run
+from livebode.records.run import Files, Run
 
 _TABLES = ("responses", "parameters", "samples")
 _EVENTS = pa.schema(
@@ -69,7 +68,7 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
             asked = {str(name).lower() for name in database.get_table_names(sql)}
         except duckdb.Error:
             asked = set(_TABLES)  # it is no SELECT, and will be refused below
-        known = _show(run, database, asked)
+        _show(run, database, asked)
         for setting in _CONFINED:
             database.execute(setting)
         try:
@@ -78,34 +77,33 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
-            raise InputError(f"the query cannot be run: {sentence} (this run has {', '.join(known)})") from None
+            raise InputError(f"the query cannot be run: {sentence} (this run has {_known(run)})") from None
         if answer is None:
-            raise InputError(f"the query is empty; write SQL on {', '.join(known)}")
+            raise InputError(f"the query is empty; write SQL on {_known(run)}")
         columns = tuple(column[0] for column in answer.description or ())
     return Found(columns, rows[:rows_max], len(rows) > rows_max)
 
 
-def _dataset(files: list[tuple[Path, list[int] | None]]) -> ds.Dataset:
-    if all(groups is None for _, groups in files):
-        return ds.dataset([path for path, _ in files], format="parquet")
-    parquet, disk = ds.ParquetFileFormat(), LocalFileSystem()
-    fragments = [parquet.make_fragment(str(path), disk, row_groups=groups) for path, groups in files]
-    return ds.FileSystemDataset(fragments, fragments[0].physical_schema, parquet, disk)
+def _known(run: Run) -> str:
+    return ", ".join(["events", *run.files(_TABLES)])
 
 
-def _show(run: Run, database: Any, asked: set[str]) -> list[str]:
-    """Make the tables of the run known to the database, those that are not asked for without rows; their names."""
-    known = ["events"]
-    for table in _TABLES:
-        files, rows = run.parts(table, check=table in asked)
-        if not files and not rows:
-            continue
-        parts: list[Any] = [_dataset(files)] if files else []
-        for number, part in enumerate([*parts, *rows]):
+def _show(run: Run, database: Any, asked: set[str]) -> None:
+    """Make the tables of the run that are asked for known to the database, and its events."""
+    found = run.files([table for table in _TABLES if table in asked])
+    for table, files in found.items():
+        parts = ([_dataset(files)] if files.paths else []) + [pa.Table.from_batches([rows]) for rows in files.rows]
+        for number, part in enumerate(parts):
             database.register(f"_{table}_{number}", part)
-        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts) + len(rows)))
+        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
-        known.append(table)
     events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
     database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
-    return known
+
+
+def _dataset(files: Files) -> ds.Dataset:
+    if files.groups is None:
+        return ds.dataset(files.paths, format="parquet")
+    parquet = ds.ParquetFileFormat()
+    fragment = parquet.make_fragment(str(files.paths[0]), LocalFileSystem(), row_groups=files.groups)
+    return ds.FileSystemDataset([fragment], fragment.physical_schema, parquet, LocalFileSystem())

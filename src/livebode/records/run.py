@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,15 @@ from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import RUN, read_summary
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where the rows of a table are: Parquet files, of a single one perhaps only some row groups, and batches."""
+
+    paths: list[Path]
+    groups: list[int] | None
+    rows: list[pa.RecordBatch]
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
@@ -167,20 +176,22 @@ class Run:
         """The closed segments that stand, by age; none where the run is not kept in segments."""
         return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
 
-    def parts(self, name: str, *, check: bool = True) -> tuple[list[tuple[Path, list[int] | None]], list[pa.Table]]:
-        """The Parquet files of a table with their whole row groups, None for all, and the rows that are in none yet.
-
-        Without `check`, segments are named as they are, and not read.
-        """
+    def files(self, tables: Collection[str]) -> dict[str, Files]:
+        """Of these tables, those that were recorded: the Parquet files that are whole, and the rows in none yet."""
         try:
             if not reading.in_segments(self.path):
-                piece = self._piece(name)
-                return ([] if piece is None else [(self.path / f"{name}.parquet", piece.groups())]), []
-            segments, rows = reading.parts(self.path, name, self.tell, finished=self.finished)
-            whole = [one for one in segments if not check or reading.whole(self.path, one, self.tell) is not None]
+                pieces = {name: piece for name in tables if (piece := self._piece(name)) is not None}
+                return {
+                    name: Files([self.path / f"{name}.parquet"], piece.groups(), []) for name, piece in pieces.items()
+                }
+            segments, rows = reading.parts(self.path, self.tell, finished=self.finished)
+            found = {name: Files([], None, rows.get(name, [])) for name in tables}
+            for segment in segments:
+                if segment.table in found and reading.whole(self.path, segment, self.tell) is not None:
+                    found[segment.table].paths.append(self.path / segment.name)
         except (OSError, pa.ArrowException) as error:
-            raise InputError(f"the {name} of {str(self.path)!r} cannot be read: {error}") from None
-        return [(self.path / segment.name, None) for segment in whole], rows
+            raise InputError(f"the record in {str(self.path)!r} cannot be read: {error}") from None
+        return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
         """What is in events.jsonl, with an event of kind "record-damaged" in the place of each damaged line."""

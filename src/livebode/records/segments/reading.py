@@ -6,14 +6,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from livebode.nouns import Event, InputError
 from livebode.records.inside import is_folder
-from livebode.records.segments import journal, segment_file
+from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal
 from livebode.records.segments.manifest import NAME, Manifest, Segment
+from livebode.records.segments.segment_file import open_segment
 
+_ROWS = 1 << 14
 Tell = Callable[[Event], None]
 
 
@@ -22,8 +25,11 @@ def in_segments(run: Path) -> bool:
     return is_folder(run / journal.FOLDER)
 
 
-def parts(run: Path, table: str, tell: Tell, *, finished: bool) -> tuple[list[Segment], list[pa.Table]]:
-    """Closed segments of a table, by age, and the rows behind them that are still in a journal."""
+Rows = dict[str, list[pa.RecordBatch]]
+
+
+def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
+    """Closed segments of all tables, by age, and the rows of each behind them that are still in a journal."""
     # The newest first: what is before a journal that is there is complete. And before the manifest: a journal that is
     # closed in between is then in both, and not in neither.
     journals: dict[int, Journal] = {}
@@ -37,8 +43,11 @@ def parts(run: Path, table: str, tell: Tell, *, finished: bool) -> tuple[list[Se
     for number in left:
         if places := journals[number].damages:
             tell(event_of(journal.name_of(number), places, None))
-    rows = [pa.Table.from_batches(journals[number].rows[table]) for number in left if table in journals[number].rows]
-    return [segment for segment in found.segments if segment.table == table], rows
+    rows: Rows = {}
+    for number in left:
+        for table, batches in journals[number].rows.items():
+            rows.setdefault(table, []).extend(batches)
+    return found.segments, rows
 
 
 def tables(
@@ -60,20 +69,34 @@ def tables(
     OSError
         If something cannot be read.
     """
-    segments, rows = parts(run, table, tell, finished=finished)
+    segments, rows = parts(run, tell, finished=finished)
+    segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
-    for segment in segments if size_bytes_max is None else _newest(segments, size_bytes_max):
-        data = whole(run, segment, tell)
-        if data is not None:
-            yield segment_file.rows(data)
-    yield from rows
+    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), tell)
+    if table in rows:
+        yield pa.Table.from_batches(rows[table])
 
 
-def whole(run: Path, segment: Segment, tell: Tell) -> bytes | None:
+def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table]:
+    """The rows of segments, small ones together: what is done with each part costs more than its rows."""
+    held: list[pa.Table] = []
+    for segment in segments:
+        if (file := whole(run, segment, tell)) is None:
+            continue
+        # Without Arrow's threads, which a short process may not outlive in peace.
+        held.append(file.read(use_threads=False))
+        if sum(table.num_rows for table in held) >= _ROWS:
+            yield pa.concat_tables(held)
+            held = []
+    if held:
+        yield pa.concat_tables(held)
+
+
+def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
     """The file of a segment; None where it is damaged, which is told, or was removed to keep the budget."""
     try:
-        return segment_file.read(run, segment)
+        return open_segment(run, segment)
     except FileNotFoundError:
         if segment not in Manifest.read(run).segments:
             return None  # it was removed since we looked

@@ -18,8 +18,8 @@ _VERIFIED_MAX = 100_000
 _verified: set[tuple[object, ...]] = set()
 
 
-def read(run: Path, segment: Segment) -> bytes:
-    """All of the file. Its checksum is computed once in a process, as long as the file is not touched.
+def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
+    """The file, read. Its checksum is computed once in a process, as long as the file is not touched.
 
     Raises
     ------
@@ -35,24 +35,18 @@ def read(run: Path, segment: Segment) -> bytes:
     if key not in _verified:
         if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
             raise InputError("its checksum is not that of the manifest")
-        _check_size(data, segment)
         if len(_verified) >= _VERIFIED_MAX:
             _verified.clear()
         _verified.add(key)
-    return data
-
-
-def rows(data: bytes) -> pa.Table:
-    """The rows in such a file."""
-    # Without Arrow's threads, which a short process may not outlive in peace.
-    return pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
-
-
-def _check_size(data: bytes, segment: Segment) -> None:
     try:
-        about = pq.ParquetFile(pa.BufferReader(data)).metadata
+        file = pq.ParquetFile(pa.BufferReader(data))
     except pa.ArrowException as error:
         raise InputError(f"it is not Parquet ({error})") from None
+    _check_size(file.metadata, segment)
+    return file
+
+
+def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
     if about.num_rows != segment.rows:
         raise InputError(f"it has {about.num_rows} rows, where the manifest says {segment.rows}")
     size_bytes = sum(about.row_group(group).total_byte_size for group in range(about.num_row_groups))
