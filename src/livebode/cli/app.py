@@ -13,6 +13,8 @@ import os
 import signal
 import sys
 import traceback
+import warnings
+from typing import Any
 
 import typer
 
@@ -30,7 +32,7 @@ from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
-from livebode.nouns import InputError
+from livebode.nouns import DamageWarning, InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -100,10 +102,18 @@ def _explained(error: Exception) -> tuple[str, int]:
 def _prepare_process() -> None:
     for number in _ENDING:
         signal.signal(number, _end)
+    warnings.showwarning = _warn
     for stream in (sys.stdout, sys.stderr):
         # A terminal that lacks a letter shows another one, rather than nothing and an error.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
+    if issubclass(category, DamageWarning):
+        print(f"livebode: {message}", file=sys.stderr)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
 def _end(number: int, _frame: object) -> None:

@@ -13,8 +13,10 @@ from typing import Any
 
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
+from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
@@ -131,7 +133,7 @@ class SegmentedRun:
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
         if self._continued or self._continues:
-            run = Run.open(self.path)
+            run = Run.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # none are told from no run by their lines
             yield from newest
@@ -186,6 +188,7 @@ class SegmentedRun:
         # What was held back at the end was written since the last commit, and belongs to the states as they are now.
         self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(self._named(summary), finished=self._ends or ends)
+        self._hear()
 
     def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
         last = self._store.last
@@ -204,11 +207,15 @@ class SegmentedRun:
         for event in self._store.drain_events():
             self._tell(event)
 
+    def _found_damaged(self, damage: Event) -> None:
+        if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # of journals the store tells
+            self._tell(damage)
+
     def _states(self) -> dict[str, bytes]:
         return {name: part.snapshot() for name, part in self._parts.items()}
 
     def _restore(self, states: Mapping[str, bytes]) -> None:
-        before = Run.open(self.path).summary
+        before = Run.open(self.path, self._found_damaged).summary
         now = json.loads(to_json(self._summary))
         if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
             raise InputError(
@@ -233,13 +240,12 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
 
 def make_way(path: Path) -> None:
     """Remove the run that stands there; InputError where something else stands there."""
-    if not path.exists():
+    if not os.path.lexists(path):
         return
-    if not (path / "run.json").is_file() and (not path.is_dir() or any(path.iterdir())):
-        raise InputError(f"{str(path)!r} is not the directory of a run, so --force leaves it; take another --out")
+    check_removable(path)
     lock = Lock(path)
     try:
-        shutil.rmtree(path)
+        remove(path)
     except OSError as error:
         raise InputError(f"the run in {str(path)!r} cannot be removed: {why(error)}") from None
     finally:

@@ -12,19 +12,21 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.nouns import Event, InputError
-from livebode.records.plain_json import to_json
+from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing
+from livebode.records.segments.damage import total
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
-from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
+from livebode.records.segments.recovery import EVENTS, Found, recover
 from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import Waiting
+from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table import Table
 
 
@@ -121,7 +123,7 @@ class Store:
         try:
             self._settle(self._syncing.done())
             self._log.write(self._events)
-            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
+            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states), dict(self._waiting.rows))
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             parts = self._waiting.written()
             full = self._full(sample)
@@ -162,7 +164,7 @@ class Store:
             self._not_paused()
             self._write_summary(summary, finished=finished)
             if finished:
-                self._shelf.discard(journal.path_of(self.path, self._number))
+                self._shelf.discard(journal.name_of(self._number))
 
     def _not_paused(self) -> None:
         if self._pause is not None:
@@ -173,12 +175,18 @@ class Store:
         return self._journal.length >= limits.journal_bytes_max or sample - self._began >= limits.segment_samples
 
     def _go_on(self, found: Found) -> None:
-        self.last, self._number = found.commit, found.number
+        self.last = found.commit
+        self._waiting.rows |= found.commit.rows
         self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
-        self._journal = AppendFile(journal.path_of(self.path, found.number), found.length)
+        if found.length is None:
+            self._open_journal(found.number, found.commit)
+        else:
+            self._journal = AppendFile(self.path, journal.name_of(found.number), found.length)
+            self._number, self._safe_bytes = found.number, found.length
+            self._began = self._committed = found.commit.sample
         self._files.callback(self._close_open_journal)
-        self._safe_bytes = found.length
-        self._began = self._committed = found.commit.sample
+        if found.sealed:
+            self._begin_closing()
         away_s = max(0.0, time.time() - found.commit.unix_s)
         self._log.say(
             "record-continued",
@@ -194,17 +202,24 @@ class Store:
         self._files.callback(self._shelf.close)
         self._closing = Closing(self._shelf)
         self._files.callback(self._closing.wait)
-        self._events = AppendFile(self.path / EVENTS, events_bytes)
+        self._named = len(found.retained)
+        self._events = AppendFile(self.path, EVENTS, events_bytes)
         self._files.callback(self._events.close)
 
     def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
-        text = to_json(summary | {"record": {"finished": finished, "tables": list(self._tables)}}, indent=2) + "\n"
-        put_whole(self.path / RUN, text.encode())
+        record: dict[str, Any] = {"finished": finished, "tables": list(self._tables)}
+        if retained := self._shelf.retained:
+            places = [place for one in retained for place in one.damages]
+            record["damaged"] = {"files": [journal.set_aside_name(one.number) for one in retained], **total(places)}
+        data = to_document(summary | {"record": record})
+        for name in (RUN, COPY):
+            put_whole(self.path / name, data)
 
     def _open_journal(self, number: int, commit: Commit) -> None:
-        path = journal.path_of(self.path, number)
-        put_whole(path, journal.head(self._tables) + commit.to_frame())
-        self._journal, self._number = AppendFile(path), number
+        name = journal.name_of(number)
+        check_own(self.path, name)
+        put_whole(self.path / name, journal.head(self._tables, commit))
+        self._journal, self._number = AppendFile(self.path, name), number
         self._safe_bytes = self._journal.length
         self._began = self._committed = commit.sample
 
@@ -232,13 +247,19 @@ class Store:
         self._open_journal(number + 1, self.last)
         before.close()
         self._shelf.seal(number)
+        self._begin_closing()
+
+    def _begin_closing(self) -> None:
         budget = self.limits.budget_bytes
         used = self._events.length + JOURNALS * self.limits.journal_bytes_max
         self._closing.begin(None if budget is None else budget - used)
 
     def _closed(self) -> OSError | None:
-        """Wait until the journal before is turned, and say what was removed; what the disk said where it refused."""
+        """Wait until the journal before is turned, and say what was removed or damaged; the error where it failed."""
         gone, error = self._closing.result()
+        for retained in self._shelf.retained[self._named :]:
+            self._log.say_event(retained.event)
+            self._named += 1
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
