@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
@@ -29,12 +30,11 @@ def demo_command(
     as_json: Json = False,
 ) -> None:
     """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     from livebode.session.demo import demo  # with the simulation
 
-    console = Console(stderr=True, highlight=False)
+    console = terminal.console(stderr=True)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
