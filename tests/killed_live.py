@@ -36,10 +36,10 @@ LIFE_S = 1.3
 """Longest life of a process: the kill falls anywhere in it, also before its first commit."""
 
 
-def _work(source: dict[str, Any], directory: Path, say: Connection, fifo: Path | None) -> None:
+def _work(configuration: dict[str, Any], directory: Path, say: Connection, fifo: Path | None) -> None:
     if fifo is not None:
         sys.stdin = os.fdopen(os.open(fifo, os.O_RDONLY))
-    axis = Axis.model_validate({"source": source, **REST})
+    axis = Axis.model_validate(configuration)
     say.send("begun")
     run_live(axis, Destination(directory, lambda *_: None), Orders())
 
@@ -49,7 +49,9 @@ def start(feed: Feed, directory: Path) -> ForkServerProcess:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.killed_live"])
     said, say = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(feed.source, directory, say, feed.fifo))
+    process = context.Process(
+        target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, say, feed.fifo)
+    )
     process.start()
     say.close()
     assert said.poll(PATIENCE_S)
@@ -62,7 +64,7 @@ def kill(process: ForkServerProcess) -> None:
     process.join()
 
 
-def recorded(directory: Path) -> tuple[np.ndarray, np.ndarray]:
+def recorded(directory: Path, channel: str) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the samples in the record, and the numbers that the sender gave them."""
     if not (directory / "run.json").exists():
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -70,7 +72,7 @@ def recorded(directory: Path) -> tuple[np.ndarray, np.ndarray]:
     if not tables:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     return tuple(
-        np.concatenate([table[name].to_numpy() for table in tables]).astype(np.int64) for name in ("sample", "n")
+        np.concatenate([table[name].to_numpy() for table in tables]).astype(np.int64) for name in ("sample", channel)
     )  # type: ignore[return-value]
 
 
@@ -85,21 +87,21 @@ def kill_often(feed: Feed, directory: Path, kills: int, rng: np.random.Generator
         time.sleep(rng.uniform(0, LIFE_S))
         sent = feed.sent
         kill(process)
-        number = recorded(directory)[1]
+        number = recorded(directory, feed.number)[1]
         if number.size > held:
             yield max(0, sent - int(number[-1]) - 1)
         held = number.size
     process = start(feed, directory)
-    until(lambda: recorded(directory)[1].size >= held + RATE_HZ, "a second more in the record")
+    until(lambda: recorded(directory, feed.number)[1].size >= held + RATE_HZ, "a second more in the record")
     kill(process)
 
 
-def check_exact(directory: Path, *, whole: bool) -> int:
+def check_exact(directory: Path, channel: str, *, whole: bool) -> int:
     """That no sample is twice in the record, that each is at its time, and that each loss is named; how many are lost.
 
     `whole` asks for every sample from the first one on.
     """
-    sample, number = recorded(directory)
+    sample, number = recorded(directory, channel)
     assert np.all(np.diff(number) > 0), "a sample is in the record twice"
     assert np.all(sample - number == sample[0] - number[0]), "a sample is at a wrong time"
     holes = np.flatnonzero(np.diff(sample) != 1)

@@ -8,20 +8,27 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pyarrow as pa
+from pyads import constants
+from pyads.testserver import PLCVariable
 from pyarrow import parquet
 
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
+from livebode.sources.live.ring import HEADER, MAGIC, VERSION
 from tests.command import RATE_HZ
 from tests.peers.broker import TOPIC, Mosquitto, publisher, stop
 from tests.peers.machine import CHANNELS, data
-from tests.peers.peer import free_port
+from tests.peers.opcua import OpcUaPeer
+from tests.peers.peer import CHANNELS as OPC_UA_CHANNELS
+from tests.peers.peer import STAMP_S, free_port
 from tests.peers.plain import TcpPeer
+from tests.peers.plc import NET_ID, Memory, Server
 
 BATCH = 20
 PERIOD = 1_000
@@ -41,6 +48,10 @@ class Feed:
     """Sends in real time, in a thread of its own, from `first` on."""
 
     fifo: Path | None = None
+    rest: ClassVar[dict[str, Any]] = {}
+    """Sections of the configuration that differ from those of other kinds."""
+    number = "n"
+    """The channel that holds the number of the sample."""
     source: dict[str, Any]
     first = 70_000
 
@@ -189,6 +200,56 @@ class DirectoryFeed(Feed):
             self._waiting.clear()
 
 
+class RingFeed(Feed):
+    """A PLC's ring of 16 s: what livebode missed while it was away is read from it."""
+
+    length = 16_384
+
+    def open(self) -> None:
+        self._data = np.zeros((self.length, len(CHANNELS)))
+        self._variable = PLCVariable("MAIN.livebode", b"", constants.ADST_BIGTYPE, "ST_LivebodeRing")
+        memory, port = Memory(), free_port()
+        self._lock = memory.lock
+        self.send(batch(self.first - self.length, self.length))  # it has been full for long
+        memory.add_variable(self._variable)
+        self._server = Server(memory, "127.0.0.1", port, logging=False)
+        self._server.server.listen()
+        self._server.start()
+        channels = [f"{channel.name} [{channel.unit}]" for channel in CHANNELS]
+        url = f"ads://127.0.0.1:{port}"
+        self.source = {"url": url, "net_id": NET_ID, "symbol": "MAIN.livebode", "channels": channels}
+
+    def send(self, batch: Batch) -> None:
+        self._data[np.arange(batch.first_sample, batch.stop) % self.length] = batch.data.T
+        head = HEADER.pack(MAGIC, VERSION, len(CHANNELS), self.length, EPOCH, float(RATE_HZ), 0, batch.stop)
+        with self._lock:
+            self._variable.value = head + self._data.tobytes()
+
+    def close(self) -> None:
+        self._server.close()
+
+
+class OpcUaFeed(Feed):
+    """The server has no epoch; its two channels are the sample's number and noise."""
+
+    rest: ClassVar[dict[str, Any]] = {
+        "signals": {"input": "w", "output": "y"},
+        "tracking": {"hop": 20, "estimator": "direct"},
+    }
+    number = "w"
+
+    def open(self) -> None:
+        self._peer = OpcUaPeer(self.folder).__enter__()
+        self.source = self._peer.settings | {"rate_hz": float(RATE_HZ)}
+
+    def send(self, batch: Batch) -> None:
+        stamp_s = STAMP_S + batch.first_sample / RATE_HZ
+        self._peer.send(replace(batch, data=batch.data[[3, 2]], channels=OPC_UA_CHANNELS, stamp_s=stamp_s))
+
+    def close(self) -> None:
+        self._peer.__exit__()
+
+
 def rows(batch: Batch) -> str:
     time_s = np.arange(batch.first_sample, batch.stop) / RATE_HZ
     return "".join(
@@ -215,6 +276,8 @@ FEEDS: dict[str, Callable[[Path], Feed]] = {
     "file": FileFeed,
     "counted-file": CountedFileFeed,
     "directory": DirectoryFeed,
+    "ads": RingFeed,
+    "opc.tcp": OpcUaFeed,
 }
-WHOLE = {"file", "counted-file", "directory"}
+WHOLE = {"file", "counted-file", "directory", "ads"}
 """Kinds of which nothing may be lost at all."""

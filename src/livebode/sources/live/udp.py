@@ -44,11 +44,9 @@ class UdpSource(LiveSource):
                     datagram, (host, *_) = port.recvfrom(_DATAGRAM_BYTES_MAX)
                 except TimeoutError:
                     continue
-                if sender is not None and plain_address(host) != sender:
-                    self._said.say(
-                        "foreign", f"a datagram from {plain_address(host)} was dropped; source.sender is {sender}"
-                    )
-                    self._trouble = f"datagrams come from {plain_address(host)} only, and source.sender is {sender}"
+                if sender is not None and (other := plain_address(host)) != sender:
+                    self._said.say("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
+                    self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
                     continue
                 try:
                     batch = decoder.decode(datagram)
