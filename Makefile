@@ -61,8 +61,9 @@ fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sour
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -s tests/fault/test_live_killed.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
@@ -33,12 +34,11 @@ def demo_command(
     as_json: Json = False,
 ) -> None:
     """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     from livebode.session.demo import LEARNED_S, demo, demo_baseline  # with the simulation
 
-    console = Console(stderr=True, highlight=False)
+    console = terminal.console(stderr=True)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
     with (
