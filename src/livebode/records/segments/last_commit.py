@@ -10,5 +10,5 @@ from livebode.records.segments.journal import Commit, Journal
 
 def last_commit(run: Path) -> Commit | None:
     """What an unfinished run in this directory is continued from, as `recover` chooses it; None where there is none."""
-    newest = [Journal.read(journal.path_of(run, number)).commit for number in journal.numbers(run)[-2:]]
+    newest = [Journal.read(run, number).commit for number in journal.numbers(run)[-2:]]
     return max((commit for commit in newest if commit is not None), key=lambda commit: commit.position, default=None)
