@@ -74,6 +74,10 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         try:
             answer = database.execute(sql)
             rows = answer.fetchmany(rows_max + 1) if answer is not None else []
+        except (duckdb.InterruptException, RuntimeError) as error:
+            if "interrupted" not in str(error).lower():
+                raise
+            raise KeyboardInterrupt from None  # as which DuckDB's driver does not pass it on
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
