@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring fuzz crash system-packages lock clean
+.PHONY: help demo test lint bench peers studies monitoring fuzz crash damage system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -60,6 +60,10 @@ fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sour
 	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
+
+damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_bit_flips.py
+	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_hostile.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py

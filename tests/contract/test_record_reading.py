@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -283,3 +284,24 @@ def test_signals_that_mean_nothing_are_said_and_kept(tmp_path: Path) -> None:
     assert run.finished
     assert len(run.responses()) == SAMPLES // SETTINGS.step
     assert ["constant at 0" in event.message for event in run.events() if event.kind == "doubtful"] == [True]
+
+
+def test_an_empty_or_interrupted_query_ends_in_a_sentence(tmp_path: Path) -> None:
+    record_machine(machine(SAMPLES), tmp_path / "run")
+    for sql in ("", "  ;", "/* nothing */"):
+        done = livebode("query", tmp_path / "run", sql)
+        assert (done.code, done.out) == (2, "")
+        assert "the query is empty; write SQL on events, responses, samples" in done.err
+    command = [str(Path(sys.executable).with_name("livebode")), "query", str(tmp_path / "run")]
+    # What runs the tests may ignore the signal, and what it starts with it.
+    process = subprocess.Popen(
+        [*command, "SELECT 1; SELECT count(*) FROM range(100000000) a, range(100000) b WHERE a.range * b.range = 3"],
+        stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    while process.poll() is None:
+        time.sleep(0.2)
+        # It uses the processor for longer than it takes to start.
+        if sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13])) > 200:
+            process.send_signal(signal.SIGINT)
+    assert process.communicate()[1].strip() in ("", "Aborted.")
+    assert process.returncode == 130

@@ -13,7 +13,7 @@ import numpy as np
 
 from tests.damaged import check_flip, make_runs
 
-FLIPS = int(os.environ.get("LIVEBODE_DAMAGE_FLIPS", "9"))
+FLIPS = int(os.environ.get("LIVEBODE_DAMAGE_FLIPS", "6"))
 
 
 def test_each_flipped_bit_is_named_and_the_rest_is_read(tmp_path: Path) -> None:
@@ -25,6 +25,8 @@ def test_each_flipped_bit_is_named_and_the_rest_is_read(tmp_path: Path) -> None:
         kind, known = check_flip(run, tmp_path, rng)
         kinds[run.name, kind] += 1
         named += known
+        if not (number + 1) % 100:
+            print(f"{number + 1} flips", flush=True)
     for (run_name, kind), count in sorted(kinds.items()):
         print(f"{run_name:10} {kind:20} {count:5} flips")
     print(f"{FLIPS} flips: {named} named, {FLIPS - named} without effect, none silent; all else was read")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -72,16 +73,34 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         for setting in _CONFINED:
             database.execute(setting)
         try:
-            answer = database.execute(sql)
-            rows = answer.fetchmany(rows_max + 1) if answer is not None else []
+            found = _answered(database, sql, rows_max)
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
             raise InputError(f"the query cannot be run: {sentence} (this run has {_known(run)})") from None
+    if found is None:
+        raise InputError(f"the query is empty; write SQL on {_known(run)}")
+    return found
+
+
+def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
+    """The answer; None where the SQL is empty. Ctrl-C ends the query."""
+
+    def ask() -> Found | None:
+        answer = database.execute(sql)
         if answer is None:
-            raise InputError(f"the query is empty; write SQL on {_known(run)}")
-        columns = tuple(column[0] for column in answer.description or ())
-    return Found(columns, rows[:rows_max], len(rows) > rows_max)
+            return None
+        columns, rows = tuple(column[0] for column in answer.description or ()), answer.fetchmany(rows_max + 1)
+        return Found(columns, rows[:rows_max], len(rows) > rows_max)
+
+    # In another thread, since DuckDB looks for signals now and then only.
+    with ThreadPoolExecutor(1) as worker:
+        running = worker.submit(ask)
+        try:
+            return running.result()
+        except KeyboardInterrupt:
+            database.interrupt()
+            raise
 
 
 def _known(run: Run) -> str:

@@ -21,6 +21,7 @@ from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import RUN, read_summary
+from livebode.records.summary_shape import what_is_wrong
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
 
@@ -73,15 +74,9 @@ class Run:
         """
         summary, damaged = read_summary(path)
         run = cls(path, summary, told=told)
-        try:
-            named = all(isinstance(run.found[name], str) for name in ("quantity", "unit"))
-            sections = all(isinstance(summary.get(name, {}), dict) for name in ("record", "files"))
-            if not (named and sections and len(run.lines)):
-                raise ValueError
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-            raise InputError(
-                f"{str(path / 'run.json')!r} does not name its lines as a run does; run the recording again"
-            ) from None
+        if wrong := what_is_wrong(summary):
+            raise InputError(f"{str(path / RUN)!r} is not what a run writes ({wrong}); run the recording again")
+        len(run.lines)  # or InputError
         if damaged:
             run.tell(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
         return run
@@ -180,10 +175,9 @@ class Run:
         """Of these tables, those that were recorded: the Parquet files that are whole, and the rows in none yet."""
         try:
             if not reading.in_segments(self.path):
-                pieces = {name: piece for name in tables if (piece := self._piece(name)) is not None}
-                return {
-                    name: Files([self.path / f"{name}.parquet"], piece.groups(), []) for name, piece in pieces.items()
-                }
+                groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
+                whole = {name: found for name, found in groups.items() if found != []}
+                return {name: Files([self.path / f"{name}.parquet"], found, []) for name, found in whole.items()}
             segments, rows = reading.parts(self.path, self.tell, finished=self.finished)
             found = {name: Files([], None, rows.get(name, [])) for name in tables}
             for segment in segments:

@@ -66,6 +66,7 @@ class Store:
         self._waiting = Waiting(tuple(self._tables))
         self._log = EventLog()
         self._pause: Event | None = None
+        self._attempts = 0  # to close a segment that failed since the last one that was closed
         self._committed_s = self._synced_s = 0.0
         self._syncing = Syncing()
 
@@ -139,8 +140,10 @@ class Store:
         self._go_on_after_pause(sample, time_s)
         if full:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
-            with contextlib.suppress(OSError):
+            try:
                 self._close_segment()
+            except OSError as error:
+                self._not_closed(error, "with the next commit")
         elif self._closing.done:
             self._closed()
         return True
@@ -270,7 +273,37 @@ class Store:
                 f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
                 removed=[segment.name for segment in gone],
             )
+        if error is not None:
+            self._not_closed(
+                error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
+            )
+        elif self._attempts and not self._shelf.sealed:
+            self._say_closed()
         return error
+
+    def _not_closed(self, error: OSError, retried: str) -> None:
+        """Say that a segment cannot be closed: the first, second, fourth, eighth … time."""
+        self._attempts += 1
+        if self._attempts & (self._attempts - 1):
+            return
+        assert self.last is not None
+        waiting = [*self._shelf.sealed, self._number]
+        self._log.say(
+            "record-unclosed",
+            self.last.sample,
+            self.last.time_s,
+            f"no segment could be closed: {why(error)} (attempt {self._attempts}); it is retried {retried}, and the "
+            f"record remains in {len(waiting)} journal{'s' * (len(waiting) > 1)}",
+            attempts=self._attempts,
+            journals=waiting,
+            errno=error.errno,
+        )
+
+    def _say_closed(self) -> None:
+        assert self.last is not None
+        message = f"segments are closed again, after {self._attempts} failed attempt{'s' * (self._attempts > 1)}"
+        self._log.say("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
+        self._attempts = 0
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
         with contextlib.suppress(OSError):  # what was being synced may be safe all the same
