@@ -50,6 +50,8 @@ class Feed:
     fifo: Path | None = None
     rest: ClassVar[dict[str, Any]] = {}
     """Sections of the configuration that differ from those of other kinds."""
+    keeps = False
+    """Whether what is sent while nobody records waits for the next process, so that every loss is a kill's."""
     number = "n"
     """The channel that holds the number of the sample."""
     source: dict[str, Any]
@@ -123,6 +125,8 @@ class TcpFeed(Feed):
 class MqttFeed(Feed):
     """The broker keeps what comes while nobody is there."""
 
+    keeps = True
+
     def open(self) -> None:
         self._broker = Mosquitto(self.folder, ("allow_anonymous true", "max_queued_messages 0")).__enter__()
         url = f"mqtt://127.0.0.1:{self._broker.port}/{TOPIC}"
@@ -139,6 +143,8 @@ class MqttFeed(Feed):
 
 class StdinFeed(Feed):
     """A pipe with a name, that this end keeps open: what is in it when its reader is killed the next one reads."""
+
+    keeps = True
 
     def open(self) -> None:
         self.source = {"url": "stdin:"}
@@ -159,6 +165,7 @@ class StdinFeed(Feed):
 
 
 class FileFeed(Feed):
+    keeps = True
     first = 0
 
     def open(self) -> None:
@@ -185,6 +192,7 @@ class CountedFileFeed(FileFeed):
 class DirectoryFeed(Feed):
     """Whole recordings, some batches long, each put in its place by its name."""
 
+    keeps = True
     first = 0
 
     def open(self) -> None:
@@ -203,6 +211,7 @@ class DirectoryFeed(Feed):
 class RingFeed(Feed):
     """A PLC's ring of 16 s: what livebode missed while it was away is read from it."""
 
+    keeps = True
     length = 16_384
 
     def open(self) -> None:
