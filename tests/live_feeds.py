@@ -56,6 +56,8 @@ class Feed:
     """The channel that holds the number of the sample."""
     source: dict[str, Any]
     first = 70_000
+    samples = BATCH
+    """Of a batch."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.sent = folder, self.first
@@ -76,9 +78,9 @@ class Feed:
         began = time.monotonic()
         while not self._done.wait(0.005):
             due = self.first + int((time.monotonic() - began) * RATE_HZ)
-            while self.sent + BATCH <= due and not self._done.is_set():
-                self.send(batch(self.sent))
-                self.sent += BATCH
+            while self.sent + self.samples <= due and not self._done.is_set():
+                self.send(batch(self.sent, self.samples))
+                self.sent += self.samples
 
     def open(self) -> None:
         raise NotImplementedError
@@ -239,8 +241,9 @@ class RingFeed(Feed):
 
 
 class OpcUaFeed(Feed):
-    """The server has no epoch; its two channels are the sample's number and noise."""
+    """The server has no epoch, and cannot keep up with small batches; its channels are the number and noise."""
 
+    samples = 100
     rest: ClassVar[dict[str, Any]] = {
         "signals": {"input": "w", "output": "y"},
         "tracking": {"hop": 20, "estimator": "direct"},
