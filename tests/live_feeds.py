@@ -50,10 +50,14 @@ class Feed:
     fifo: Path | None = None
     rest: ClassVar[dict[str, Any]] = {}
     """Sections of the configuration that differ from those of other kinds."""
+    keeps = False
+    """Whether what is sent while nobody records waits for the next process, so that every loss is a kill's."""
     number = "n"
     """The channel that holds the number of the sample."""
     source: dict[str, Any]
     first = 70_000
+    samples = BATCH
+    """Of a batch."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.sent = folder, self.first
@@ -74,9 +78,9 @@ class Feed:
         began = time.monotonic()
         while not self._done.wait(0.005):
             due = self.first + int((time.monotonic() - began) * RATE_HZ)
-            while self.sent + BATCH <= due and not self._done.is_set():
-                self.send(batch(self.sent))
-                self.sent += BATCH
+            while self.sent + self.samples <= due and not self._done.is_set():
+                self.send(batch(self.sent, self.samples))
+                self.sent += self.samples
 
     def open(self) -> None:
         raise NotImplementedError
@@ -123,6 +127,8 @@ class TcpFeed(Feed):
 class MqttFeed(Feed):
     """The broker keeps what comes while nobody is there."""
 
+    keeps = True
+
     def open(self) -> None:
         self._broker = Mosquitto(self.folder, ("allow_anonymous true", "max_queued_messages 0")).__enter__()
         url = f"mqtt://127.0.0.1:{self._broker.port}/{TOPIC}"
@@ -139,6 +145,8 @@ class MqttFeed(Feed):
 
 class StdinFeed(Feed):
     """A pipe with a name, that this end keeps open: what is in it when its reader is killed the next one reads."""
+
+    keeps = True
 
     def open(self) -> None:
         self.source = {"url": "stdin:"}
@@ -159,6 +167,7 @@ class StdinFeed(Feed):
 
 
 class FileFeed(Feed):
+    keeps = True
     first = 0
 
     def open(self) -> None:
@@ -185,6 +194,7 @@ class CountedFileFeed(FileFeed):
 class DirectoryFeed(Feed):
     """Whole recordings, some batches long, each put in its place by its name."""
 
+    keeps = True
     first = 0
 
     def open(self) -> None:
@@ -203,6 +213,7 @@ class DirectoryFeed(Feed):
 class RingFeed(Feed):
     """A PLC's ring of 16 s: what livebode missed while it was away is read from it."""
 
+    keeps = True
     length = 16_384
 
     def open(self) -> None:
@@ -230,8 +241,9 @@ class RingFeed(Feed):
 
 
 class OpcUaFeed(Feed):
-    """The server has no epoch; its two channels are the sample's number and noise."""
+    """The server has no epoch, and cannot keep up with small batches; its channels are the number and noise."""
 
+    samples = 100
     rest: ClassVar[dict[str, Any]] = {
         "signals": {"input": "w", "output": "y"},
         "tracking": {"hop": 20, "estimator": "direct"},

@@ -15,13 +15,14 @@ from tests.live_feeds import FEEDS, WHOLE
 KILLS = int(os.environ.get("LIVEBODE_CRASH_KILLS_EACH", "1"))
 
 
+# The PLC of the tests does not expect that who asks it is killed.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("kind", FEEDS)
 def test_a_kill_costs_at_most_a_second_doubles_nothing_and_every_loss_is_exact(kind: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(sorted(FEEDS).index(kind))
     with FEEDS[kind](tmp_path) as feed:
         costs = list(kill_often(feed, tmp_path / "run", KILLS, rng))
-    lost = check_exact(tmp_path / "run", feed.number, whole=kind in WHOLE)
-    print(
-        f"{kind}: {KILLS} kills; the longest cost {max(costs, default=0) / RATE_HZ:.2f} s; {lost} samples lost in all"
-    )
-    assert max(costs, default=0) <= RATE_HZ
+    longest = check_exact(tmp_path / "run", feed.number, whole=kind in WHOLE)
+    longest = longest if feed.keeps else max(costs)
+    print(f"{kind}: {KILLS} kills; the longest cost {longest / RATE_HZ:.2f} s; nothing twice, each loss exact")
+    assert longest <= RATE_HZ

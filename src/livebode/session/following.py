@@ -16,6 +16,7 @@ from livebode.fitting import Fit
 from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session import summary
+from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
@@ -107,6 +108,7 @@ class Tracking:
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
+        self._announcing = Announcing()
         self._label = _schedule_label(source, settings.schedule)
         about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._about = about
@@ -214,7 +216,10 @@ class Tracking:
         """What a live source has to say; a recording says it all at once."""
         if not isinstance(self.source, LiveSource):
             return []
-        return self.source.drain_events()
+        events = self.source.drain_events()
+        for event in self._announcing.of(events):
+            self.to.tell(event)
+        return events
 
     def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
         """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.

@@ -54,7 +54,7 @@ class LiveSource(ABC):
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._said = Said()
-        self._inbox = Inbox()
+        self._inbox = Inbox(waits=self.waits)
         self._sequencer = Sequencer(
             self._said,
             reorder=settings.reorder_batches if self.reorders else 0,
