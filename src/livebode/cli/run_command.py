@@ -69,6 +69,10 @@ def run_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
+    accept_roles: Annotated[
+        bool,
+        typer.Option("--accept-roles", help="Keep these roles, whatever the recording shows."),
+    ] = False,
     go_on: Annotated[
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
@@ -83,7 +87,13 @@ def run_command(
     """
     given: dict[str, dict[str, Any]] = {
         "source": {"rate_hz": rate, "time": time},
-        "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
+        "signals": {
+            "output": output,
+            "input": input,
+            "excitation": excitation,
+            "schedule": schedule,
+            "accept_roles": accept_roles or None,
+        },
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {
             "estimator": estimator,

@@ -29,12 +29,13 @@ class _Section(BaseModel):
 
 
 class SignalsSection(_Section):
-    """[signals]: channel names."""
+    """[signals]: channel names; whether their roles are taken as they are, whatever the recording shows."""
 
     output: str
     input: str | None = None
     excitation: str | None = None
     schedule: str | None = None
+    accept_roles: bool = False
 
 
 class LinesSection(_Section):
