@@ -128,7 +128,7 @@ def test_accepted_roles_run_and_the_record_says_what_was_suspected(tmp_path: Pat
     done = ran(tmp_path, columns, *arguments)
     assert (done.code, "hold the same samples" in done.err) == (0, True)
     assert events(tmp_path) == ["roles-doubtful"]
-    assert json.loads((tmp_path / "run" / "run.json").read_text())["configuration"]["signals"]["accept_roles"]
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["configuration"]["tracking"]["accept_roles"]
 
 
 def events(tmp_path: Path) -> list[str]:

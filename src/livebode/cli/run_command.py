@@ -87,13 +87,7 @@ def run_command(
     """
     given: dict[str, dict[str, Any]] = {
         "source": {"rate_hz": rate, "time": time},
-        "signals": {
-            "output": output,
-            "input": input,
-            "excitation": excitation,
-            "schedule": schedule,
-            "accept_roles": accept_roles or None,
-        },
+        "signals": {"output": output, "input": input, "excitation": excitation, "schedule": schedule},
         "lines": {"frequencies": lines, "window": _window(window)},
         "tracking": {
             "estimator": estimator,
@@ -105,6 +99,7 @@ def run_command(
             "differenced": difference or None,
             "spikes": spikes or None,
             "hann": hann,
+            "accept_roles": accept_roles or None,
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }

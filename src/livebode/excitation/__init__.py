@@ -3,7 +3,7 @@
 from livebode.excitation.chirp import chirp, chirp_lines
 from livebode.excitation.low_crest import crest_between_samples, low_crest_phases
 from livebode.excitation.multisine import Phases, multisine, schroeder_phases
-from livebode.excitation.odd import check_band, odd_lines
+from livebode.excitation.odd import check_band, odd_bins, odd_lines
 from livebode.excitation.prbs import check_order, prbs
 from livebode.excitation.quantised import quantised
 from livebode.excitation.recognise import Excitation, recognise
@@ -21,6 +21,7 @@ __all__ = [
     "equal_snr",
     "low_crest_phases",
     "multisine",
+    "odd_bins",
     "odd_lines",
     "prbs",
     "quantised",

@@ -29,13 +29,12 @@ class _Section(BaseModel):
 
 
 class SignalsSection(_Section):
-    """[signals]: channel names; whether their roles are taken as they are, whatever the recording shows."""
+    """[signals]: channel names."""
 
     output: str
     input: str | None = None
     excitation: str | None = None
     schedule: str | None = None
-    accept_roles: bool = False
 
 
 class LinesSection(_Section):
@@ -46,7 +45,7 @@ class LinesSection(_Section):
 
 
 class TrackingSection(_Section):
-    """[tracking]: the options of `livebode.estimation.Settings`."""
+    """[tracking]: the options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
     quantity: Quantity = "plant"
@@ -58,6 +57,7 @@ class TrackingSection(_Section):
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
+    accept_roles: bool = False
 
 
 class MotionSection(_Section):

@@ -83,7 +83,7 @@ def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) 
         spikes=tuple(tracking.spikes),
         dtype=tracking.dtype,
     )
-    if not signals.accept_roles:
+    if not tracking.accept_roles:
         check_distinct(settings)
     return settings
 
@@ -141,4 +141,4 @@ def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
     channels = list(dict.fromkeys(names.values()))
     rows = dict(zip(channels, beginnings(log, channels, samples)))
     signals = {role: rows[name] for role, name in names.items()}
-    return check_roles(signals, settings, accepted=axis.signals.accept_roles)
+    return check_roles(signals, settings, accepted=axis.tracking.accept_roles)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROLES: tuple[Role, ...] = ("excitation", "input", "output")
-_ACCEPT = "to keep these roles, set signals.accept_roles or give --accept-roles"
+_ACCEPT = "to keep these roles, set tracking.accept_roles or give --accept-roles"
 # What repeats of an excitation's variance: all of a command, next to nothing of an axis that moves.
 _REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
 _WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer say nothing of noise
