@@ -79,7 +79,7 @@ def test_the_axis_file_tracks_what_was_designed(kind, tmp_path):
 
 def test_the_axis_file_frees_the_responses_of_a_moving_axis_from_its_motion(tmp_path):
     machine = "[belt.strokes]\nstart_m = 0.6\nend_m = 1.2\n[belt.sensor]\nnoise_rad_per_s = 0.1\n"
-    path = described(tmp_path, "band_hz = [20, 140]\nresolution_hz = 10\n", machine)
+    path = described(tmp_path, 'lines = "20:140:20"\nwindow = 400\n', machine)
     out = tmp_path / "design"
     told = json.loads(livebode("design", path, "--out", out, "--json").out)
     played(path, np.load(out / "excitation.npz")["samples"], told["recording_s"], out / "log.parquet")
@@ -87,7 +87,7 @@ def test_the_axis_file_frees_the_responses_of_a_moving_axis_from_its_motion(tmp_
     assert ran.code == 0, ran.err
     found = Run.open(tmp_path / "run").responses()
     found = found[np.flatnonzero(found.valid.all(axis=1))]
-    assert len(found) > 350
+    assert len(found) > 700
     assert found.schedule.min() < 0.65
     assert found.schedule.max() > 1.15
     axis = Experiment.read(path).axis()

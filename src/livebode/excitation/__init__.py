@@ -8,17 +8,20 @@ from livebode.excitation.prbs import check_order, prbs
 from livebode.excitation.quantised import quantised
 from livebode.excitation.recognise import Excitation, recognise
 from livebode.excitation.shaped import equal_snr
+from livebode.excitation.slips import Slip, find_slips
 from livebode.excitation.stepped import stepped_lines, stepped_sine
 
 __all__ = [
     "Excitation",
     "Phases",
+    "Slip",
     "check_band",
     "check_order",
     "chirp",
     "chirp_lines",
     "crest_between_samples",
     "equal_snr",
+    "find_slips",
     "low_crest_phases",
     "multisine",
     "odd_bins",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from livebode.nouns import Event
+from livebode.session.aligned import AlignedLog, slip_event, slips_of
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
 from livebode.session.following import Outcome, Tracking
@@ -30,13 +31,18 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
     assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     pipeline = Pipeline.of(axis, make_follower(axis, log))
+    settings = pipeline.follower.settings
+    noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
+    slips = slips_of(log, settings)
+    if slips:
+        noticed.append(slip_event(slips, settings))
     orders = orders or Orders()
-    doubts = roles_in_doubt(axis, log, pipeline.follower.settings)
-    for message in doubts:
-        orders.say("roles-doubtful", message)
-    found = {"format": log.format, "rate_from": log.rate_origin}
+    for event in noticed:
+        orders.say(event.kind, event.message, **event.details)
+    found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
-    outcome = whole(Tracking(log, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))
-    for message in doubts:
-        to.tell(Event("roles-doubtful", 0, 0.0, message))
+    source = AlignedLog(log, slips) if slips else log
+    outcome = whole(Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))
+    for event in noticed:
+        to.tell(event)
     return outcome
