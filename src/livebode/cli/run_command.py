@@ -73,6 +73,9 @@ def run_command(
         bool,
         typer.Option("--accept-roles", help="Keep these roles, whatever the recording shows."),
     ] = False,
+    all_periods: Annotated[
+        bool, typer.Option("--all-periods", help="Keep a transient at the beginning of a recording.")
+    ] = False,
     go_on: Annotated[
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
@@ -100,6 +103,7 @@ def run_command(
             "spikes": spikes or None,
             "hann": hann,
             "accept_roles": accept_roles or None,
+            "all_periods": all_periods or None,
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }

@@ -1,4 +1,4 @@
-"""A recording whose excitation leaps in phase, on one grid of periods: what was dropped becomes a gap."""
+"""A recording on one grid of periods: what was dropped becomes a gap, a known transient is left out."""
 
 from __future__ import annotations
 
@@ -57,10 +57,11 @@ def _bridged(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class AlignedLog:
-    """A recording with its leaps as gaps: numbers go on by what is missing, and what came twice is left out."""
+    """A recording from a sample on, with its leaps as gaps: numbers count what is missing, not what came twice."""
 
     log: Log
     slips: tuple[Slip, ...]
+    first: int = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -69,10 +70,15 @@ class AlignedLog:
     @property
     def samples(self) -> int | None:
         known = self.log.samples
-        return None if known is None else known - sum(max(-slip.missing, 0) for slip in self.slips)
+        return None if known is None else known - self.first - sum(max(-slip.missing, 0) for slip in self.slips)
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
-        """The Blocks of the recording, cut at the leaps."""
+        """The Blocks of the recording behind its first samples, cut at the leaps."""
+        for block in self._aligned(channels):
+            if block.stop > self.first:
+                yield block.cut(max(self.first - block.start, 0), len(block))
+
+    def _aligned(self, channels: Sequence[str] | None) -> Iterator[Block]:
         shift, again, ahead = 0, 0, list(self.slips)
         for block in self.log.blocks(channels):
             while len(block):

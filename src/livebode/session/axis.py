@@ -58,6 +58,7 @@ class TrackingSection(_Section):
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
     accept_roles: bool = False
+    all_periods: bool = False
 
 
 class MotionSection(_Section):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 
 from livebode.estimation import Settings, SpectraTracker, Tracker
-from livebode.nouns import InputError, Lines, SpectraLayout
+from livebode.nouns import Block, InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.session.follower import Follower
@@ -17,6 +18,12 @@ from livebode.sources import Log
 
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
 _ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # that the roles are judged by, whichever is longer
+
+
+class Recorded(Protocol):
+    """What has Blocks to begin with."""
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
 
 
 def make_follower(axis: Axis, log: Log) -> Follower:
@@ -121,7 +128,7 @@ def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
     return np.asarray(beginnings(log, [channel], samples)[0])
 
 
-def beginnings(log: Log, channels: Sequence[str], samples: int) -> np.ndarray:
+def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarray:
     """The same of several channels, shape (channels, samples)."""
     parts: list[np.ndarray] = []
     size = 0
