@@ -83,6 +83,13 @@ def _show_excitation(found: Inspection, console: Console) -> None:
         console.print(f"transient: the first {first} from the steady state")
     if excitation.outlying:
         console.print(f"outlying (spikes, pauses): periods {', '.join(map(str, excitation.outlying))}")
+    if slips := excitation.slips:
+        missing = sum(slip.missing for slip in slips)
+        console.print(
+            f"phase slips: {len(slips)}, first at sample {slips[0].sample}; {abs(missing)} samples "
+            f"{'missing' if missing >= 0 else 'repeated'} in all without a gap; realigned here, and by a run",
+            soft_wrap=True,
+        )
     console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
     table = Table(box=None, header_style="bold")
     for heading in ("line Hz", "amplitude", "SNR at output dB"):

@@ -70,6 +70,13 @@ def run_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
+    accept_roles: Annotated[
+        bool,
+        typer.Option("--accept-roles", help="Keep these roles, whatever the recording shows."),
+    ] = False,
+    all_periods: Annotated[
+        bool, typer.Option("--all-periods", help="Keep a transient at the beginning of a recording.")
+    ] = False,
     go_on: Annotated[
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
@@ -96,6 +103,8 @@ def run_command(
             "differenced": difference or None,
             "spikes": spikes or None,
             "hann": hann,
+            "accept_roles": accept_roles or None,
+            "all_periods": all_periods or None,
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
