@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.offset import Offset
 from livebode.motion import MovingModel
-from livebode.motion.replay import PLACE_M, advance, engine, torque_only
+from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, torque_only
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Replay:
         the velocity drift away slowly.
         """
         factors = np.exp(offset.logarithms)
-        inputs = np.zeros((8, u.size))
+        inputs = np.zeros((INPUTS, u.size))
         inputs[0], inputs[2] = PLACE_M / self._radius_m, u
         inputs[4] = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
         inputs[5] = np.interp(position_m, self._at, self._damping) * factors[2]
