@@ -1,9 +1,9 @@
 """False alarms of healthy machines that are not as the model takes them, and what is detected there.
 
-`python -m studies.healthy` learns a baseline for each condition (torque ripple, torque noise, an eccentric pulley, friction
-that falls, a differenced encoder, a delay, any start) from 5 × 60 s of strokes at random 30 … 100 % of 0.38 m/s with
-friction of 15 N ± 20 %, then judges `--runs` healthy runs of 60 s and `--trials` of two strokes with 0.5 % less stiffness.
-It prints the alarms of each condition, and writes healthy.json into `--out`.
+`python -m studies.healthy` learns a baseline for each condition from 5 × 60 s of strokes, from any start, at random
+30 … 100 % of 0.38 m/s, with friction of 15 N ± 20 %. The conditions are torque ripple, torque noise, an eccentric
+pulley, friction that falls, a differenced encoder and a delay. Then it judges `--runs` healthy runs of 60 s, and
+`--trials` of two strokes with 0.5 % less stiffness. It prints the alarms of each condition, and writes healthy.json.
 """
 
 from __future__ import annotations
@@ -194,10 +194,11 @@ def main() -> None:
     for condition in (c for c in CONDITIONS.values() if options.only in c.name):
         begun = time.time()
         numbers[condition.name] = row = assessed(condition, options.runs, options.trials, options.processes)
+        smallest = np.round(row["smallest_percent"], 2).tolist()
         print(
-            f"{condition.name:32} healthy runs with alarms {row['runs_with_alarms']} of {row['runs']}; 0.5 % of stiffness "
-            f"detected {row['detected']}, named {row['named_stiffness']} of {row['trials']}; smallest "
-            f"{np.round(row['smallest_percent'], 2).tolist()} %; {time.time() - begun:.0f} s",
+            f"{condition.name:28} healthy runs with alarms {row['runs_with_alarms']} of {row['runs']}; 0.5 % of "
+            f"stiffness detected {row['detected']}, named {row['named_stiffness']} of {row['trials']}; "
+            f"smallest {smallest} %; {time.time() - begun:.0f} s",
             flush=True,
         )
         for message in row["alarms"]:

@@ -163,7 +163,7 @@ def test_an_eccentric_pulley_moves_the_cart_off_by_its_share_of_the_radius() -> 
 
 
 def test_friction_and_torque_noise_act_behind_the_logged_torque() -> None:
-    """Viscous friction that falls to half takes half of the torque; noise of 0.1 N m moves a free motor as it should."""
+    """Viscous friction that falls to half takes half of the torque; noise of 0.1 N m moves a free motor."""
     drag, half = (
         np.mean(cruise(friction=Friction(motor_viscous_n_m_s=0.05), faults=faults)["u"][-2000:])
         for faults in ((), (FrictionChange(factor=0.5),))
