@@ -15,10 +15,10 @@ _BELIEVED = 2.0  # times what the differences show beyond the learned noise
 class NoiseLevel:
     """Bounds what rows say of their own noise by how much neighbouring rows differ.
 
-    A response's sigma comes from how periods scatter, and for some periods after a step of the machine the step is in
-    it: rows behind the step would weigh a hundredth of those before it. A step moves one difference of neighbouring rows;
-    noise moves all of them. The median over the newest five rows, of all components of a line, is blind to the one and
-    sees the other. A row's noise beyond the learned one is believed up to twice what that median shows.
+    A response's sigma comes from how periods scatter. For some periods after a step of the machine the step is in it,
+    so that rows behind the step would weigh a hundredth of those before it. A step moves one difference of neighbouring
+    rows; noise moves all of them. The median over the newest five rows and all components of a line shows the second
+    alone. A row's noise beyond the learned one counts up to twice what that median shows.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class NoiseLevel:
         self._squares = np.full((0, components), np.nan)
 
     def step(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
-        """The variance of a row from its deviation, the learned variance and what it says beyond, (components,) each."""
+        """Variance of a row from its deviation, the learned variance and what it says beyond, (components,) each."""
         here = np.stack([np.where(np.isfinite(own), deviation, np.nan), np.where(np.isfinite(own), own, np.nan)])
         square = (here[0] - self._before[0]) ** 2 / (here[1] + self._before[1])
         self._before = here

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.monitoring.machine import Machine
 from livebode.monitoring.evidence import JUDGED
+from livebode.monitoring.machine import Machine
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.stretches import Stretches

@@ -48,10 +48,11 @@ class OrderSpectrum:
     """Power spectrum of a residual over the position, in cycles a metre, mean over steady strokes.
 
     Over time a ripple's frequency follows the speed; over the position it stays. Each stroke is averaged onto an even
-    grid of positions (boxcar), weighted with a Blackman–Harris window, and its power divided by the noise around (median over 32
-    widths of a peak), so that without a ripple it is exponentially distributed with mean 1. Around the excitation's lines
-    a stroke does not count: there the model may lack something, at a place that moves with the speed. The sum over
-    strokes is Gamma distributed; an order is a peak whose chance, times the places looked at, is below 1e-4.
+    grid of positions (boxcar) and weighted with a Blackman–Harris window. Its power is divided by the noise around
+    (median over 32 widths of a peak), so that without a ripple it is exponentially distributed with mean 1. Around
+    the excitation's lines a stroke does not count: there the model may lack something, at a place that moves with the
+    speed. The sum over strokes is Gamma distributed. An order is a peak whose chance, times the places looked at, is
+    below 1e-4.
 
     Bias: a ripple whose order meets a line in every stroke is not found, because the machine's response and the ripple
     are then the same to every method. Strokes at two speeds tell them apart.
