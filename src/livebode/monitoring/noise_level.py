@@ -30,21 +30,20 @@ class NoiseLevel:
 
     def __init__(self, components: int, together: int) -> None:
         self._together = together
-        self._before = np.full((2, components), np.nan)
-        self._squares = np.full((0, components), np.nan)
+        self._before = np.full((2, 1, components), np.nan)
+        self._squares = np.full((_ROWS - 1, components), np.nan)
 
-    def step(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
-        """Variance of a row from its deviation, the learned variance and what it says beyond, (components,) each."""
-        here = np.stack([np.where(np.isfinite(own), deviation, np.nan), np.where(np.isfinite(own), own, np.nan)])
-        square = (here[0] - self._before[0]) ** 2 / (here[1] + self._before[1])
-        self._before = here
-        self._squares = np.vstack([self._squares, square])[-_ROWS:]
-        of_line = self._squares.reshape(len(self._squares), -1, self._together)
-        level = np.ones(of_line.shape[1])
-        seen = np.isfinite(of_line).any(axis=(0, 2))
-        level[seen] = np.nanmedian(of_line[:, seen], axis=(0, 2)) / _MEDIAN
-        shown = np.repeat(np.maximum(level - 1.0, 0.0), self._together)
-        return np.asarray(own + np.minimum(more, _BELIEVED * shown * np.where(np.isfinite(own), own, 0.0)))
+    def process(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
+        """Variance of rows from their deviation, the learned variance and what they say beyond, (rows, components)."""
+        known = np.where(np.isfinite(own), own, np.nan)
+        both = np.concatenate([self._before, np.stack([np.where(np.isfinite(own), deviation, np.nan), known])], axis=1)
+        square = np.diff(both[0], axis=0) ** 2 / (both[1, 1:] + both[1, :-1])
+        squares = np.concatenate([self._squares, square])
+        self._before, self._squares = both[:, -1:], squares[len(square) :]
+        newest = np.lib.stride_tricks.sliding_window_view(squares, _ROWS, axis=0)
+        level = _median(newest.reshape(len(own), -1, self._together * _ROWS)) / _MEDIAN
+        shown = np.repeat(np.maximum(level - 1.0, 0.0), self._together, axis=1)
+        return np.asarray(own + np.minimum(more, np.nan_to_num(_BELIEVED * shown * known)))
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         return {"level before": self._before.copy(), "level squares": self._squares.copy()}
@@ -52,3 +51,11 @@ class NoiseLevel:
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         self._before = np.array(state["level before"], dtype=np.float64)
         self._squares = np.array(state["level squares"], dtype=np.float64)
+
+
+def _median(values: Floats) -> Floats:
+    """Over the last axis, of those that are known; 0 where none is."""
+    count = np.isfinite(values).sum(axis=-1, keepdims=True)
+    order = np.sort(values, axis=-1)  # what is not known comes last
+    middle = [np.take_along_axis(order, np.maximum(count - 1 + i, 0) // 2, axis=-1) for i in (0, 1)]
+    return np.where(count > 0, (middle[0] + middle[1]) / 2, 0.0)[..., 0]

@@ -66,14 +66,16 @@ class TableMonitor:
         """Events of these rows."""
         cell, known = self._table.place(rows)
         deviation, own, more = self._table.deviation_parts(rows, cell)
+        judged = np.flatnonzero(rows.ok & known)
+        variance = np.full(own.shape, np.inf)
+        variance[judged] = self._noise.process(deviation[judged], own[judged], more[judged])
+        information = 1 / variance / self._table.accuracy.inflation
+        score = np.where(information > 0, deviation, 0.0) * information
         events: list[Event] = []
         for i in np.flatnonzero(rows.ok):
             moment = (float(rows.schedule[i]), int(rows.sample[i]), float(rows.time_s[i]))
             if known[i]:
-                variance = self._noise.step(deviation[i], own[i], more[i])
-                information = 1 / variance / self._table.accuracy.inflation
-                score = np.where(information > 0, deviation[i], 0.0) * information
-                events += self._row(score, information, (*moment, float(cell[i])))
+                events += self._row(score[i], information[i], (*moment, float(cell[i])))
             elif not self._told_unknown:
                 self._told_unknown = True
                 events.append(unknown(*moment))

@@ -36,7 +36,7 @@ def shaft_position(position_m: Floats, velocity: Floats, window: int, rate_hz: f
     position_m, velocity
         Of the schedule, and of the motor, rad/s, shape (samples,) each; at least a window.
     """
-    angle = np.cumsum(velocity) / rate_hz
+    angle = (np.cumsum(velocity) - velocity / 2) / rate_hz
     ends = np.arange(0, position_m.size, window)
     travel, turned = np.diff(position_m[ends]), np.diff(angle[ends])
     total = float(turned @ turned)
@@ -76,7 +76,8 @@ class OrderSpectrum:
         self._points = 1 << int(np.ceil(np.log2(_PADDED * way_m / wanted_m)))
         self._step_m = _PADDED * way_m / self._points
         self.cycles_per_m = np.arange(self._points // 2 + 1) / (_PADDED * way_m)
-        self._sum, self._count = np.zeros(self.cycles_per_m.size), np.zeros(self.cycles_per_m.size, dtype=np.int64)
+        self._sum, self._whole = np.zeros((2, self.cycles_per_m.size))
+        self._count = np.zeros(self.cycles_per_m.size, dtype=np.int64)
 
     def add(self, residual: Floats, position_m: Floats) -> None:
         """A steady stroke: what the model leaves, and where, shape (samples,) each."""
@@ -95,19 +96,21 @@ class OrderSpectrum:
         use = (frequency_hz > self._least_hz) & (frequency_hz < self._most_hz) & (noise > 0)
         beside = np.abs(frequency_hz[:, np.newaxis] - self._lines_hz).min(axis=1)
         use &= beside > _MASKED * width * self.cycles_per_m[1] * speed
-        self._sum[use] += np.minimum(power[use] / noise[use], _CAP)
+        ratio = power[use] / noise[use]
+        self._sum[use] += np.minimum(ratio, _CAP)
+        self._whole[use] += ratio
         self._count += use
 
     def found(self) -> Floats:
         """Orders in cycles a metre, the strongest first, at most eight."""
         enough = self._count >= _STROKES_MIN
-        excess = np.where(enough, self._sum / np.maximum(self._count, 1), 0.0)
+        strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
         chance = np.where(enough, gamma.logsf(self._sum, np.maximum(self._count, 1)), 0.0)
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
         orders, apart = list[float](), round(_APART * _PADDED)
         left = chance < limit
         while left.any() and len(orders) < _MOST:
-            peak = int(np.argmax(np.where(left, excess, 0.0)))
+            peak = int(np.argmax(np.where(left, strength, 0.0)))
             orders.append(float(self.cycles_per_m[peak]))
             left[max(peak - apart, 0) : peak + apart + 1] = False
         return np.array(orders)
