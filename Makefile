@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring fuzz crash damage system-packages lock clean
+.PHONY: help demo test lint bench peers studies monitoring healthy fuzz crash damage system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -53,6 +53,10 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
+
+HEALTHY_RUNS ?= 1000
+healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricity, delay and others (2 h; HEALTHY_RUNS=20: 10 min)
+	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
 
 fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
