@@ -2,9 +2,9 @@
 
 Four axes at 4 kHz come over TCP, 21 lines at 20 responses a second, with a record in segments; the first one has fits
 and margins. A dashboard serves them, and one client reads all that the page would. Every 30 s of the machine a batch is
-missing. The senders keep in step and wait until livebode has tracked what they sent, so that the machine's clock runs as
-fast as the computer permits; they are less than a second ahead, so that nothing is left out as in a backlog. Resident
-memory is read each half minute of the machine; the slope is that of a least-squares line after the warm-up.
+missing. The senders keep in step and wait until livebode has tracked what they sent, so that the machine's clock runs
+as fast as the computer permits; they are less than a second ahead, so that nothing is left out as in a backlog.
+Resident memory is read each half minute of the machine; the slope is that of a least-squares line after the warm-up.
 """
 
 from __future__ import annotations

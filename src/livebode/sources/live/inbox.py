@@ -14,14 +14,20 @@ INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
 RESUMES_AT = 0.75
 """A queue that was full takes batches again when no more than this share of it is used: what is dropped is in few long
 spans, and the windows between them are whole."""
+WAITING_S_MAX = 0.1
+"""The same where the sender can wait: what it still has is not lost when this process is killed."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
-    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB."""
+    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB.
 
-    def __init__(self, bytes_max: int = INBOX_BYTES_MAX) -> None:
+    Where the sender waits, at most 0.1 s, or one batch.
+    """
+
+    def __init__(self, bytes_max: int = INBOX_BYTES_MAX, *, waits: bool = False) -> None:
         self._bytes_max = bytes_max
+        self._bytes_min, self._seconds_max = (0, WAITING_S_MAX) if waits else (INBOX_BYTES_MIN, INBOX_S_MAX)
         self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
         self._seconds = 0.0
@@ -60,7 +66,8 @@ class Inbox:
 
     def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
         size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
-        return size <= share * self._bytes_max and (size <= share * INBOX_BYTES_MIN or seconds <= share * INBOX_S_MAX)
+        short = size <= share * self._bytes_min or seconds <= share * self._seconds_max
+        return size <= share * self._bytes_max and (short or not self._batches)
 
     def _count(self, batch: AnyBatch, sign: int) -> None:
         self._bytes += sign * _size_bytes(batch)
