@@ -103,6 +103,7 @@ def _prepare_process() -> None:
     for number in _ENDING:
         signal.signal(number, _end)
     warnings.showwarning = _warn
+    warnings.simplefilter("default", DamageWarning)
     for stream in (sys.stdout, sys.stderr):
         # A terminal that lacks a letter shows another one, rather than nothing and an error.
         if isinstance(stream, io.TextIOWrapper):
