@@ -305,10 +305,9 @@ def test_an_empty_or_interrupted_query_ends_in_a_sentence(tmp_path: Path) -> Non
         [*command, "SELECT 1; SELECT count(*) FROM range(100000000) a, range(100000) b WHERE a.range * b.range = 3"],
         stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
-    while process.poll() is None:
-        time.sleep(0.2)
-        # It uses the processor for longer than it takes to start.
-        if sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13])) > 200:
-            process.send_signal(signal.SIGINT)
+    # It is asking once it has used the processor for longer than it takes to start.
+    while sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13])) < 250:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
     assert process.communicate()[1].strip() in ("", "Aborted.")
     assert process.returncode == 130

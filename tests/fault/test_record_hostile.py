@@ -19,12 +19,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 
 from livebode.nouns import DamageWarning, InputError
 from livebode.records import Run, RunDirectory
 from livebode.records.query import query
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
+from livebode.report.pictures import save
+from livebode.report.style import style
 from livebode.session.segmented import make_way
 from tests.command import livebode
 from tests.damaged import StopError, commands, make_runs, record_run
@@ -178,21 +181,32 @@ def test_continuing_removes_no_file_that_it_did_not_write(tmp_path: Path, runs: 
     assert Run.open(tmp_path / "run").finished
 
 
-def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(tmp_path: Path, runs: dict[str, Path]) -> None:
+def test_a_picture_replaces_a_link_and_not_what_it_names(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    (tmp_path / "margins.png").symlink_to(tmp_path / "thesis.tex")
+    save(Figure(), tmp_path / "margins.png", style(False))
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+    assert not (tmp_path / "margins.png").is_symlink()
+
+
+def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
+    tmp_path: Path, runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = tmp_path / "run"
     shutil.copytree(runs["segments"], run)
     lines = [json.loads(line) for line in (run / "manifest.jsonl").read_text().splitlines()[::2]]
     segment = next(s for s in lines[0]["segments"] if s["table"] == "samples")
-    n = 1 << 25
-    zeros = pa.DictionaryArray.from_arrays(pa.array(np.zeros(1 << 20, np.int8)), pa.array([0.0]))
-    columns = [pa.chunked_array([zeros] * (n >> 20))] * 5
+    n = 1 << 18
+    monkeypatch.setattr("livebode.records.segments.segment_file._VALUES_MAX", 1 << 20)
+    zeros = pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int8)), pa.array([0.0]))
+    columns = [pa.chunked_array([zeros])] * 5
     pq.write_table(pa.table(dict(zip("abcde", columns))), run / segment["name"], compression="zstd")
     content = (run / segment["name"]).read_bytes()
     segment |= {"rows": n, "size_bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     for line in lines:
         del line["crc32"]
     (run / "manifest.jsonl").write_bytes(b"".join(to_line(line) * 2 for line in lines))
-    assert len(content) < 2 << 20
+    assert len(content) < n // 8
     with pytest.warns(DamageWarning, match="more than a segment holds"):
         assert sum(table.num_rows for table in Run.open(run).tables("samples")) < 2600
 

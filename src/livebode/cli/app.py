@@ -104,6 +104,7 @@ def _prepare_process() -> None:
         signal.signal(number, _end)
     protect()
     warnings.showwarning = _warn
+    warnings.simplefilter("default", DamageWarning)
 
 
 def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
