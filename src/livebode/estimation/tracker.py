@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
+from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.watch import Watch
-from livebode.nouns import Block, InputError, Responses
+from livebode.nouns import Block, Event, InputError, Responses
 
 
 class Tracker(AroundLines[Watch]):
@@ -57,13 +60,23 @@ class Tracker(AroundLines[Watch]):
             settings.dtype,
         )
         self._centre = Centre(window)
+        self._repeating = RepeatingErrors(settings)
         self._watch = Watch(window)
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
             "centre": self._centre,
+            "repeating": self._repeating,
             "watch": self._watch,
         }
+
+    def found(self) -> dict[str, Any]:
+        """What the responses stand on, as plain data for a record, and which lines have a reason against them."""
+        return super().found() | self._repeating.found()
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call: what is missing, what was left out, and how lines were judged."""
+        return sorted(super().drain_events() + self._repeating.drain(), key=lambda event: event.sample)
 
     def _named(self, channels: tuple[str, ...]) -> NDArray[np.bool_]:
         return np.array([self.settings.channel(role) in channels for role in self._roles])
@@ -93,10 +106,15 @@ class Tracker(AroundLines[Watch]):
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()
+            self._repeating.restart(block.start)
         rows = self._spectra.process(channels)
         self._watch.take(block, rows)
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
-        responses = self._lines.process(rows, (rows.sample + 1) % s.lines.window, centre, block.channels)
+        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
+        moment = (block.start, float(block.time_s[0]), block.channels)
+        repeating = self._repeating.process(channels, left_out, schedule, rows.sample - block.start, moment)
+        place = (rows.sample + 1) % s.lines.window
+        responses = self._lines.process(rows, place, centre, block.channels, repeating)
         self._nothing = responses[0:0]
         return responses
