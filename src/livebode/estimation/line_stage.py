@@ -101,7 +101,7 @@ class LineStage:
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
-            "noise": {"rule": self._settings.noise, "moving_responses": self._moving},
+            "noise": {"rule": self._settings.noise, "from_detection_lines": self._moving},
         }
 
     def excitation_power(self) -> Floats:
@@ -215,7 +215,9 @@ class LineStage:
     def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which windows see a machine that moves; an Event for the first where its noise is judged otherwise."""
         moving = self._movement.process(series, centre[1])
-        if self._detection is not None and self._moving == 0 and moving.any():
+        if self._detection is None:
+            return np.zeros(len(sample), dtype=np.bool_)
+        if self._moving == 0 and moving.any():
             at = int(np.argmax(moving))
             self._events.append(
                 Event(

@@ -12,6 +12,8 @@ from livebode.nouns import InputError, Responses
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_DISTORTION_DOF = 4.0  # of detection lines behind a distortion: four, if they are all on one side of a line
+
 
 def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     """Mean of the valid responses at each line as a batch of one: the ratio of the averages.
@@ -36,6 +38,9 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     The sigmas of single responses scatter and lag, so that weights of 1/sigma² would trust windows that have just
     become noisy. For the same reason no bound of the mean is made from them. What repeats does not average out: the
     newest known `distortion` of each line is added to sigma² as it is.
+
+    A line that was valid at first only, for fewer responses than it was invalid while others were valid, and for two
+    windows at least, has a reason against it that was found later; it is not valid in the mean.
 
     Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
     and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
@@ -86,6 +91,7 @@ class RunningMean:
         self._least, self._dof = np.full(n, np.inf), 0.0
         self._coherence, self._input_coherence = _Mean(n), _Mean(n)
         self._distortion = np.full(n, np.nan)
+        self._since, self._last = np.zeros((2, n), dtype=np.int64)
         self._moment, self._schedule, self._scheduled = 0.0, 0.0, 0
         self._first = np.iinfo(np.int64).max
 
@@ -104,18 +110,26 @@ class RunningMean:
         self._pair.add(used, part.value * weight, weight)
         self._overlap.add(part.sample + 1, used.astype(np.float64))
         known = used & np.isfinite(part.sigma)
+        self._follow_newest(used, part)
         self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
         self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
         self._coherence.add(used, part.coherence)
         self._input_coherence.add(used, part.input_coherence)
-        for distortion in part.distortion[np.isfinite(part.distortion).any(axis=1)][-1:]:
-            self._distortion = np.where(np.isfinite(distortion), distortion, self._distortion)
         self.rows += len(part)
         self._moment += part.time_s.sum()
         placed = np.isfinite(part.schedule)
         self._schedule += part.schedule[placed].sum()
         self._scheduled += int(placed.sum())
         self._first = min(self._first, int(part.first[0]))
+
+    def _follow_newest(self, used: NDArray[np.bool_], part: Responses) -> None:
+        """At each line the newest distortion, the newest valid sample, and how many responses came since."""
+        after, known = np.argmax(used[::-1], axis=0), used.any(axis=0)
+        self._since = np.where(known, after, self._since + len(used))
+        self._last = np.where(known, part.sample[len(used) - 1 - after], self._last)
+        finite = used & np.isfinite(part.distortion)
+        newest = np.take_along_axis(part.distortion, len(used) - 1 - np.argmax(finite[::-1], axis=0)[np.newaxis], 0)[0]
+        self._distortion = np.where(finite.any(axis=0), newest, self._distortion)
 
     def response(self) -> Responses:
         """The mean so far; InputError where no line was ever valid."""
@@ -126,7 +140,10 @@ class RunningMean:
 
     def _mean_of_all(self, newest: Responses) -> Responses:
         pair = self._pair
-        valid = pair.count > 0
+        lost = (self._since > pair.count) & (newest.sample[0] - self._last >= 2 * newest.lines.window)
+        valid = (pair.count > 0) & ~lost
+        if not valid.any():
+            raise InputError("none of the responses is valid at any line at the end; the run's events say why")
         count = np.where(valid, pair.count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             windows = count**2 / self._overlap.total()
@@ -134,12 +151,18 @@ class RunningMean:
             value = pair.numerator / pair.denominator
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
-        together = np.hypot(scatter, np.where(np.isfinite(self._distortion), self._distortion, 0.0))
+        added = np.where(np.isfinite(self._distortion) & valid, self._distortion, 0.0)
+        together = np.hypot(scatter, added)
+        dof = windows[several].min() - 1 if several.any() else self._dof or np.nan
+        if several.any() and added.any():
+            with np.errstate(invalid="ignore", divide="ignore"):
+                of_line = together**4 / (scatter**4 / dof + added**4 / _DISTORTION_DOF)
+            dof = min(dof, float(np.min(of_line, where=several & np.isfinite(of_line), initial=np.inf)))
         return Responses(
             lines=newest.lines,
             value=np.where(valid, value, complex(np.nan, np.nan))[np.newaxis],
             sigma=np.where(several, together, single)[np.newaxis],
-            dof=np.array([windows[several].min() - 1 if several.any() else self._dof or np.nan]),
+            dof=np.array([dof]),
             coherence=self._coherence.value[np.newaxis],
             valid=valid[np.newaxis],
             first=np.array([self._first]),
