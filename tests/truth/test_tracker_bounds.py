@@ -117,11 +117,11 @@ def test_windows_further_apart_are_covered_too() -> None:
 
 
 def test_quiet_bins_are_safe_if_somewhat_wide() -> None:
-    # Interpolating Ĝ between lines 2 bins apart adds to the noise near the resonance, so coverage may only be high.
+    # The larger of two estimates, of which one is high near the resonance, so coverage may only be high.
     found = responses(400, "joint", noise="quiet")
     error = errors(400, found, 4)
     within = [np.mean(error <= np.array([r[3].bound(c) for r in found])) for c in (1, 2)]
-    assert 0.60 <= within[0] <= 0.75
+    assert 0.60 <= within[0] <= 0.80
     assert 0.97 <= within[1] <= 1.0
 
 

@@ -70,13 +70,10 @@ _REASONS = {
 def _judged(found: dict[str, Any]) -> list[str]:
     """Where the noise came from if not from the scatter between periods, and lines with a reason against them."""
     lines = []
-    noise = found.get("noise", {})
-    if noise.get("from_detection_lines"):
-        lines.append(
-            f"the schedule moves: noise of {_many(noise['from_detection_lines'], 'response')} from detection lines "
-            "(non-excited bins)"
-        )
-    for kind, frequency_hz in found.get("invalid_lines_hz", {}).items():
+    judged = found.get("judged", {})
+    if moved := judged.get("noise_from_detection_lines"):
+        lines.append(f"the schedule moves: noise of {_many(moved, 'response')} from detection lines (non-excited bins)")
+    for kind, frequency_hz in judged.get("invalid_lines_hz", {}).items():
         where = ", ".join(f"{f:g}" for f in frequency_hz)
         lines.append(f"not valid at {where} Hz: {_REASONS[kind]} (see events.jsonl)")
     return lines

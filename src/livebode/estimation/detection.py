@@ -38,11 +38,26 @@ class Interpolation:
 
     def at(self, ratio: Complex) -> Complex:
         left, right = ratio[..., self._left], ratio[..., self._right]
-        falls = (right * left.conj()).imag < 0
-        share = self._share
-        return np.asarray(
-            np.where(falls, left * right / (right + (left - right) * share), left + (right - left) * share)
-        )
+        falls = times(right, left.conj()).imag < 0
+        straight = left + _scaled(right - left, self._share)
+        across = right + _scaled(left - right, self._share)
+        size = power(across)
+        inverse = times(times(left, right), across.conj())
+        return np.where(falls, _scaled(inverse, 1 / size), straight)
+
+
+def times(one: Complex, other: Complex) -> Complex:
+    """Product by real operations: NumPy's of complex numbers rounds otherwise in the last elements of an array."""
+    product = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
+    product.real = one.real * other.real - one.imag * other.imag
+    product.imag = one.real * other.imag + one.imag * other.real
+    return product
+
+
+def _scaled(one: Complex, factor: Floats) -> Complex:
+    product = np.empty(one.shape, dtype=np.complex128)
+    product.real, product.imag = one.real * factor, one.imag * factor
+    return product
 
 
 class Groups:
@@ -68,8 +83,8 @@ class Groups:
         beside = powers[:, self._at]  # (rows, sides, lines, bins of a side)
         known = self._member & np.isfinite(beside)
         with np.errstate(invalid="ignore", divide="ignore"):
-            # Not by a product of matrices, whose sums may depend on how many rows there are.
-            side = np.where(known, beside, 0.0).sum(axis=3) / known.sum(axis=3)
+            # One by one: the order of NumPy's own sums depends on how many rows there are.
+            side = sum(np.moveaxis(np.where(known, beside, 0.0), 3, 0)) / known.sum(axis=3)
         below, above = side[:, 0], side[:, 1]
         between = below + (above - below) * self._share
         return np.asarray(np.where(np.isnan(below), above, np.where(np.isnan(above), below, between)))
@@ -117,7 +132,7 @@ class DetectionNoise:
         excited
             Power of the excitation at the detection lines over that at the lines; bins that have some do not count.
         """
-        rest = power(numerator - self._interpolation.at(ratio) * denominator)
+        rest = power(numerator - times(self._interpolation.at(ratio), denominator))
         if excited is not None:
             rest = np.where(excited > _POWERLESS, np.nan, rest)
         return self._groups.at(rest)

@@ -101,7 +101,7 @@ class LineStage:
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
-            "noise": {"rule": self._settings.noise, "from_detection_lines": self._moving},
+            "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving},
         }
 
     def excitation_power(self) -> Floats:

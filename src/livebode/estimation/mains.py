@@ -13,8 +13,7 @@ MAINS_HZ = (50.0, 60.0)
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 _HARMONICS = 10
 _BESIDE = np.array([-8, -6, -4, -2, 2, 4, 6, 8])  # an even distance: where distortion is like that at the harmonic
-_STANDS_OUT = 50.0
-"""Power over the mean of eight neighbours. Noise alone has that once in 10^7 times: (1 + 50/8)^-8."""
+_CHANCE = 1e-8  # of noise alone to be taken for a tone: (1 + r/n)^-n for a power of r times the mean of n neighbours
 
 _MATTERS = 1e-8
 """Of the strongest line's power: hum below a ten-thousandth of the response, and rounding, do not matter."""
@@ -58,8 +57,10 @@ class Mains:
         usable = (beside > 0) & (beside <= self._highest) & ~np.isin(beside, excited)
         usable &= ~np.isin(beside, np.concatenate(self._tones))
         power = np.where(usable, output[beside.clip(0, self._highest)], 0.0)
-        level = power.sum(axis=1) / np.maximum(usable.sum(axis=1), 1)
-        return np.asarray((usable.sum(axis=1) >= len(_BESIDE) // 2) & (output[tones] > _STANDS_OUT * level))
+        count = usable.sum(axis=1)
+        level = power.sum(axis=1) / np.maximum(count, 1)
+        stands_out = count * (_CHANCE ** (-1 / np.maximum(count, 1)) - 1)
+        return np.asarray((count >= len(_BESIDE) // 2) & (output[tones] > stands_out * level))
 
 
 def _on_bins(mains_hz: float, lines: Lines, harmonics: int) -> NDArray[np.int64]:

@@ -15,9 +15,9 @@ from livebode.estimation.mains import Mains
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import Movement
 from livebode.estimation.settings import Settings
-from livebode.estimation.spectra import after
+from livebode.estimation.spectra import Rows, after
 from livebode.estimation.steps import step_of
-from livebode.nouns import Channel, Event
+from livebode.nouns import Block, Channel, Event
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -101,13 +101,13 @@ class RepeatingErrors:
         events, self._events = self._events, []
         return events
 
-    def found(self) -> dict[str, Any]:
+    def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""
         f = self._settings.lines.frequency_hz
         reasons = {kind: f[self._told[i]].tolist() for i, kind in enumerate(_KINDS) if self._told[i].any()}
         known = None if self._distortion is None else [None if np.isnan(d) else float(d) for d in self._now[0]]
         return {
-            "distortion": {"measurable": self._distortion is not None, "newest": known},
+            "distortion": known,
             "invalid_lines_hz": reasons,
             "mains_lines_hz": f[self._mains.lines.any(axis=0)].tolist(),
         }
@@ -122,25 +122,24 @@ class RepeatingErrors:
     def process(
         self,
         data: Floats,
-        left_out: NDArray[np.intp],
+        rows: Rows,
         schedule: Floats,
-        rows: NDArray[np.intp],
-        moment: tuple[int, float, Sequence[Channel]],
+        block: Block,
     ) -> Repeating:
-        """What goes with windows that end at the positions `rows` of the next samples.
+        """What goes with the windows of these rows.
 
         Parameters
         ----------
         data
             Signals, shape (channels, samples), in the order of the settings' roles.
-        left_out
-            Positions of samples that are left out.
+        rows
+            The windows that end in these samples, and which samples are left out.
         schedule
             Shape (samples,).
-        moment
-            Number and time of the first sample, and the channels, for events.
+        block
+            Where the samples come from: their numbers, times and channels.
         """
-        number, time_s, channels = moment
+        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
         known, edges, done, window = [self._now], [0], 0, self._settings.lines.window
         while done < data.shape[1]:
             n = min(data.shape[1] - done, window - self._at)
@@ -150,22 +149,22 @@ class RepeatingErrors:
             self._whole &= not np.any((left_out >= done) & (left_out < done + n))
             self._at, done = self._at + n, done + n
             if self._at == window:
-                self._end_period(number + done - 1, time_s + (done - 1) / self._settings.lines.rate_hz, channels)
+                self._end_period(block.start + done - 1, block)
                 known.append(self._now)
                 edges.append(done)
-        which = np.searchsorted(edges, rows, side="right") - 1
+        which = np.searchsorted(edges, rows.sample - block.start, side="right") - 1
         distortion, invalid = np.array([d for d, _ in known]), np.array([i.any(axis=0) for _, i in known])
         dof = self._distortion.dof if self._distortion else np.inf
         return Repeating(distortion[which], invalid[which], dof)
 
-    def _end_period(self, sample: int, time_s: float, channels: Sequence[Channel]) -> None:
+    def _end_period(self, sample: int, block: Block) -> None:
         if self._movement.process(0, np.array([np.mean(self._position)])).any():
             self._forget()
             self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
         elif self._whole:
             with np.errstate(all="ignore"):
-                self._take(channels)
-            self._tell(sample, time_s)
+                self._take(block.channels)
+            self._tell(sample, block.origin_s + sample / block.rate_hz)
         self._samples[:, 0] = self._samples[:, -1]
         self._at, self._whole = 0, True
 

@@ -29,6 +29,8 @@ class Tracker(AroundLines[Watch]):
     ----------
     settings
         Lines, signals, estimator and options.
+    repeating
+        Whether to watch for errors that repeat with the excitation (`RepeatingErrors`); not in what a model leaves.
 
     Examples
     --------
@@ -45,7 +47,7 @@ class Tracker(AroundLines[Watch]):
     (80, array([6.021]))
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
         self.settings = settings
         self._roles = settings.roles
         self._lines = LineStage(settings)
@@ -60,23 +62,25 @@ class Tracker(AroundLines[Watch]):
             settings.dtype,
         )
         self._centre = Centre(window)
-        self._repeating = RepeatingErrors(settings)
+        self._repeating = RepeatingErrors(settings) if repeating else None
         self._watch = Watch(window)
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
             "centre": self._centre,
-            "repeating": self._repeating,
+            **({"repeating": self._repeating} if self._repeating else {}),
             "watch": self._watch,
         }
 
     def found(self) -> dict[str, Any]:
         """What the responses stand on, as plain data for a record, and which lines have a reason against them."""
-        return super().found() | self._repeating.found()
+        found = super().found()
+        return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
 
     def drain_events(self) -> list[Event]:
         """Events since the last call: what is missing, what was left out, and how lines were judged."""
-        return sorted(super().drain_events() + self._repeating.drain(), key=lambda event: event.sample)
+        repeating = self._repeating.drain() if self._repeating else []
+        return sorted(super().drain_events() + repeating, key=lambda event: event.sample)
 
     def _named(self, channels: tuple[str, ...]) -> NDArray[np.bool_]:
         return np.array([self.settings.channel(role) in channels for role in self._roles])
@@ -106,14 +110,13 @@ class Tracker(AroundLines[Watch]):
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()
-            self._repeating.restart(block.start)
+            if self._repeating is not None:
+                self._repeating.restart(block.start)
         rows = self._spectra.process(channels)
         self._watch.take(block, rows)
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
-        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
-        moment = (block.start, float(block.time_s[0]), block.channels)
-        repeating = self._repeating.process(channels, left_out, schedule, rows.sample - block.start, moment)
+        repeating = None if self._repeating is None else self._repeating.process(channels, rows, schedule, block)
         place = (rows.sample + 1) % s.lines.window
         responses = self._lines.process(rows, place, centre, block.channels, repeating)
         self._nothing = responses[0:0]
