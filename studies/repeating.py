@@ -22,7 +22,7 @@ from studies.common import RATE_HZ, Complex, Floats
 
 TARGET = (0.60, 0.95)
 POSITION_M, LEAD, PERIODS = 0.8, 4, 16
-LEAD_OF_LOOP = 40  # periods until what the noise's beginning moves has died away
+LEAD_OF_LOOP = 16_000  # samples until what the noise's beginning moves has died away
 ODD = odd_lines(20, 140, RATE_HZ, 1600, seed=1)  # with a detection line near the resonance
 GRID = Lines.parse("20:140:20", RATE_HZ, 400)
 ON_MAINS = Lines.of_bins([3, 5, 7, 11, 13], 400, RATE_HZ)  # 50 Hz is one of the lines
@@ -157,15 +157,15 @@ def recorded(case: Case, seed: int) -> Block:
 
 def _of_loop(case: Case, period: Floats, seed: int) -> Block:
     drive = closed_loop.Drive(closed_loop.Plant(bs=case.damping))
-    samples = (LEAD_OF_LOOP + PERIODS) * period.size
+    samples = LEAD_OF_LOOP + PERIODS * period.size
     assert case.noise is not None
     noise = case.noise(np.random.default_rng(1000 + seed), samples)[:, np.newaxis]
     u, y = drive.under(period, noise)
-    w = np.tile(period, LEAD_OF_LOOP + PERIODS)
-    at = (LEAD_OF_LOOP - case.silent) * period.size
+    w = np.tile(period, samples // period.size)
+    at = LEAD_OF_LOOP - case.silent * period.size
     if case.silent:  # before the excitation there is only the noise
         still = drive.under(np.zeros(period.size), noise)
-        before = slice(0, LEAD_OF_LOOP * period.size)
+        before = slice(0, LEAD_OF_LOOP)
         w[before], u[:, before], y[:, before] = 0.0, still[0][:, before], still[1][:, before]
     return Block(np.array([w, u[0], y[0]])[:, at:], ("w", "u", "y"), RATE_HZ)
 
