@@ -1,4 +1,4 @@
-"""What repeats with the excitation is in the bound, or the line is not valid with its reason; means are ratios of averages.
+"""What repeats is in the bound, or the line is not valid with its reason; means are ratios of averages.
 
 Short forms of `python -m studies.repeating`. Statistical bounds: 6 runs of 18 lines give a coverage of 60 % to ± 5 %
 and one of 95 % to ± 2 % (one standard deviation) if all were independent.
@@ -27,7 +27,8 @@ def test_distortion_is_in_the_bounds_of_windows_averages_and_means(name: str) ->
     found = measure(case(name), runs=6)
     print(name, found.coverage, found.reasons)
     for one, two in found.coverage.values():
-        assert one >= 0.6 and two >= 0.93  # 95 % less one standard deviation
+        assert one >= 0.6
+        assert two >= 0.93
 
 
 @pytest.mark.parametrize("name", ["hum on a line, with harmonics", "hum on a line, seen before the excitation"])
@@ -37,7 +38,8 @@ def test_a_line_with_hum_is_not_valid_and_the_reason_is_recorded(name: str) -> N
 
 def test_noise_alone_is_no_distortion() -> None:
     found = measure(case("white noise, odd lines"), runs=6)
-    assert found.reasons == {} and found.valid == 1.0
+    assert found.reasons == {}
+    assert found.valid == 1.0
     assert found.coverage["average"][0] <= 0.8  # the bound is not wide for safety's sake
 
 
@@ -53,7 +55,8 @@ def test_a_line_below_half_a_step_of_the_sensor_is_not_valid_unless_noise_carrie
     amplitude[2] = 0.3
     w = np.tile(multisine(lines, amplitude, "random", seed=2), 10)
     tracker, responses = tracked(np.round(w), lines, w)
-    assert not responses.valid[-1, 2] and responses.valid[-1, [0, 1, 3, 4]].all()
+    assert not responses.valid[-1, 2]
+    assert responses.valid[-1, [0, 1, 3, 4]].all()
     steps = [event for event in tracker.drain_events() if event.kind == "steps"]
     assert [event.details["line_hz"] for event in steps] == [lines.frequency_hz[2]]
     assert 0.1 < steps[0].details["steps"] < 0.5
