@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring healthy fuzz crash damage soak system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating monitoring healthy fuzz crash damage soak system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -51,6 +51,9 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
+
+repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
+	$(BIN)/python -m studies.repeating
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring

@@ -38,7 +38,7 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
     for field in fields(found):
         a, b = getattr(found, field.name), getattr(expected, field.name)
         assert np.array_equal(a, b, equal_nan=a.dtype.kind in "fc") if isinstance(a, np.ndarray) else a == b, field.name
-    assert [event.kind for event in read.events()] == ["non-finite"]
+    assert [event.kind for event in read.events()] == ["noise-from-detection-lines", "non-finite"]
 
 
 def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_learn_and_tell(tmp_path: Path) -> None:
     assert "the belt's stiffness is 2" in found.out or "the belt's stiffness is 1.9" in found.out
     monitoring = json.loads((tmp_path / "two" / "run.json").read_text("utf-8"))["monitoring"]
     assert [s["what"] for s in monitoring["standing"]] == ["stiffness"]
-    assert [e["kind"] for e in events(tmp_path / "two")] == ["change"]
+    assert [e["kind"] for e in events(tmp_path / "two")] == ["change", "noise-from-detection-lines"]
 
     again = run(
         log, tmp_path / "three", *MOVING, "--baseline", tmp_path / "healthy.json", "--false-alarms", "once a day"

@@ -47,6 +47,8 @@ def show(outcome: Outcome) -> None:
     )
     print(f"{counted(outcome.summary)}\n{outcome.directory}/")
     found = outcome.summary["found"]
+    for line in _judged(found):
+        print(line)
     if (moving := found.get("motion", {}).get("model")) is not None:
         _show_moving(moving)
     if "fit" in outcome.summary:
@@ -57,6 +59,25 @@ def show(outcome: Outcome) -> None:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
         _show_monitoring(outcome.summary["monitoring"])
+
+
+_REASONS = {
+    "distorted": "distortion by friction, backlash or steps of a sensor",
+    "hum": "hum of the mains",
+    "steps": "less than half a step of the sensor",
+}
+
+
+def _judged(found: dict[str, Any]) -> list[str]:
+    """Where the noise came from if not from the scatter between periods, and lines with a reason against them."""
+    lines = []
+    judged = found.get("judged", {})
+    if moved := judged.get("noise_from_detection_lines"):
+        lines.append(f"the schedule moves: noise of {_many(moved, 'response')} from detection lines (non-excited bins)")
+    for kind, frequency_hz in judged.get("invalid_lines_hz", {}).items():
+        where = ", ".join(f"{f:g}" for f in frequency_hz)
+        lines.append(f"not valid at {where} Hz: {_REASONS[kind]} (see events.jsonl)")
+    return lines
 
 
 def counted(summary: dict[str, Any]) -> str:

@@ -8,12 +8,14 @@ from livebode.nouns.lines import Lines
 from livebode.nouns.loop import Loop
 from livebode.nouns.model import Gain, Model, as_model
 from livebode.nouns.parameters import Parameters
-from livebode.nouns.response import Quantity, Response, Responses, widened
+from livebode.nouns.response import PER_LINE, PER_RESPONSE, Quantity, Response, Responses, widened
 from livebode.nouns.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 from livebode.nouns.wording import counted, rounded_down
 
 __all__ = [
     "NOT_WHOLE",
+    "PER_LINE",
+    "PER_RESPONSE",
     "PID",
     "SPIKE",
     "Block",

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
-from livebode.nouns import DamageWarning, Event, InputError, Lines, Responses
+from livebode.nouns import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
 from livebode.records import event_lines
 from livebode.records.piece import Piece
-from livebode.records.response_table import SCHEMA
+from livebode.records.response_table import ADDED, SCHEMA
 from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
@@ -123,7 +123,7 @@ class Run:
         lines = self.lines
         rest: pa.Table | None = None
         for part in tables:
-            if part.schema.names != SCHEMA.names:
+            if part.schema.names not in (SCHEMA.names, [name for name in SCHEMA.names if name not in ADDED]):
                 raise InputError(f"the responses in {str(self.path)!r} have other columns than a run writes")
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
@@ -210,7 +210,10 @@ class Run:
         }
         value = np.empty(shape, dtype=np.complex128)
         value.real, value.imag = column["re"], column["im"]
-        per_line = {name: column[name] for name in ("sigma", "coherence", "valid")}
-        per_row = {name: column[name][:, 0] for name in ("dof", "first", "sample", "time_s", "schedule")}
+        per_line = {name: column[name] for name in PER_LINE if name in column}
+        if ADDED[0] in column:
+            per_line["weight"] = np.empty(shape, dtype=np.complex128)
+            per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
+        per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
         named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
         return Responses(lines=lines, value=value, **per_line, **per_row, **named)

@@ -52,7 +52,7 @@ class TrackingSection(_Section):
     hop: Annotated[int, Field(ge=1)] | None = None
     average: bool = False
     forgetting: Annotated[float, Field(gt=0, le=1)] = 0.8
-    noise: Literal["periods", "quiet"] = "periods"
+    noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []

@@ -233,7 +233,9 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
     # How the record is cut may change on the way; what is recorded may not.
     configuration = dict(summary["configuration"])
     kept = configuration.pop("record", None) or {}
-    found = {key: value for key, value in summary["found"].items() if key != "motion"}  # what the model has learnt
+    found = {
+        key: value for key, value in summary["found"].items() if key not in ("motion", "judged")
+    }  # what was learnt
     return [configuration, found, kept.get("samples")]
 
 
