@@ -165,11 +165,12 @@ def fit(
 def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
     """One row that a Fitter gave, with what it was fitted to."""
     grid = fitter.grid
+    moving = parameters.sigma[0] > 0  # a delay that the phase shows is fitted, whatever holds it at first
     return Fit(
         model=fitter.model,
         parameters=parameters,
         derived=fitter.derived(parameters),
-        held=fitter.held,
+        held={name: value for name, value in fitter.held.items() if not moving[parameters.index(name)]},
         band_hz=(float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])),
         lines=grid.frequency_hz.size,
         rate_hz=grid.rate_hz,

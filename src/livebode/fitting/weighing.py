@@ -58,6 +58,14 @@ def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
     return epsilon_for(*squares(measured, response), dof)
 
 
+def misfit(measured: Measured, response: Complex, dof: Floats) -> Floats:
+    """−2·ln(likelihood) up to a constant, each row with its own ε: Σ 2·|residual|²/v + 2·ln v, v = sigma² + (ε|G|)²."""
+    rest, noise, size = squares(measured, response)
+    variance = noise + epsilon_for(rest, noise, size, dof)[:, np.newaxis] ** 2 * size
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.sum(np.where(measured.use, 2 * rest / variance + 2 * np.log(variance), 0.0), axis=-1))
+
+
 def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:
     """Rows whose own ε is larger than this one."""
     rest, noise, size = squares(measured, response)
