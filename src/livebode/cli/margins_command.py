@@ -53,7 +53,7 @@ def show_loop(found: LoopReport) -> None:
     low, high = found.fit.band_hz
     print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
     if not found.margins.ok[0]:
-        print(f"  no margins: {found.margins.status[0]}; check the loop's description and the fit")
+        print(f"  no margins: {found.message}")
     else:
         _show_margins(found.margins)
     size, bound, at_hz = found.at_lines

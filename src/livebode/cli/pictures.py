@@ -83,7 +83,7 @@ def _show_moving(model: dict[str, Any]) -> None:
 def _show_loop(found: dict[str, Any]) -> None:
     """The margins in a line; `livebode margins` says more."""
     if not (worst := found["worst_over_places"]):
-        print(f"no margins: {found['status']}; check the loop's description and the fit")
+        print(f"no margins: {found['message']}")
         return
     print(f"margins, worst of {_many(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
 

@@ -33,6 +33,8 @@ class Fit:
         Lowest and highest line that was used, and how many.
     rate_hz, hold
         How the input was held.
+    measured
+        What it was fitted to, one row; None for a fit that was restored from a snapshot.
     """
 
     model: PhysicalModel
@@ -43,6 +45,7 @@ class Fit:
     lines: int
     rate_hz: float
     hold: Hold = field(default="zero-order")
+    measured: Responses | None = None
 
     @property
     def status(self) -> str:
@@ -159,10 +162,10 @@ def fit(
     """
     one = mean_response(measured) if isinstance(measured, Responses) else Responses.of(measured)
     fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
-    return fit_of(fitter, fitter.process(one))
+    return fit_of(fitter, fitter.process(one), one)
 
 
-def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
+def fit_of(fitter: Fitter, parameters: Parameters, measured: Responses | None = None) -> Fit:
     """One row that a Fitter gave, with what it was fitted to."""
     grid = fitter.grid
     moving = parameters.sigma[0] > 0  # a delay that the phase shows is fitted, whatever holds it at first
@@ -175,4 +178,5 @@ def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
         lines=grid.frequency_hz.size,
         rate_hz=grid.rate_hz,
         hold=grid.hold,
+        measured=measured,
     )

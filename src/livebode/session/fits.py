@@ -41,6 +41,7 @@ class Fits:
         self._fitter: Fitter | None = None
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
+        self._newest_response: Responses | None = None
         self._epsilons: list[float] = []
 
     @classmethod
@@ -52,7 +53,7 @@ class Fits:
         """Fit a batch, and write its parameters and events."""
         fitter = self._fitter or self._begin(responses.unit)
         found = fitter.process(responses)
-        around = () if self.loop is None else live_margins(found, fitter, self.loop)
+        around = () if self.loop is None else live_margins(found, responses, fitter, self.loop)
         out.write_parameters(found, fitter.derived(found), *around)
         for event in fitter.drain_events():
             out.write_event(event)
@@ -64,7 +65,8 @@ class Fits:
             self._epsilons = [*self._epsilons, *epsilon.tolist()][-_REMEMBERED:]
             usual = good[epsilon <= max(_UNUSUAL * np.median(self._epsilons), _EPSILON_MIN)]
             if usual.size or self._newest is None:
-                self._newest = found[(usual if usual.size else good)[-1:]]
+                at = (usual if usual.size else good)[-1:]
+                self._newest, self._newest_response = found[at], responses[at]
         return found
 
     def snapshot(self) -> bytes:
@@ -97,7 +99,7 @@ class Fits:
         """The newest fit that holds, and whose ε is no more than three times the usual one."""
         if self._fitter is None or self._newest is None:
             return None
-        return fit_of(self._fitter, self._newest)
+        return fit_of(self._fitter, self._newest, self._newest_response)
 
     def summary(self) -> dict[str, Any]:
         """For run.json: the model, how often each status was, and the newest fit that holds."""

@@ -113,6 +113,8 @@ def margins(of: Material) -> Section | str:
     """The loop's margins, with bounds, and where they were read."""
     if of.loop is None:
         return of.loop_words
+    if of.loop.message:
+        return f"No margins: {of.loop.message}."
     found = of.loop.margins
     bound = found.bound()[0]
     rows = []
