@@ -190,6 +190,28 @@ def test_friction_at_standstill_gives_no_numbers_and_none_without(newtons: float
     assert "friction" in words[newtons]
 
 
+@pytest.mark.parametrize("free", [["B"], ["BL"], ["B", "BL"]])
+def test_a_friction_that_is_not_there_leaves_the_other_parameters_valid_and_has_an_upper_limit(free: list[str]) -> None:
+    found = Fitter(BELT, free=free).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 200))
+    assert found.ok.all()
+    cover = np.mean(np.abs(found.value - TRUTH) <= found.bound(), axis=0)
+    assert cover[:4].min() >= 0.95 - 3 * 0.0155
+    assert np.all(found.value[:, 4:6] >= 0)
+    one = fit(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=free)
+    assert {name for name in BELT.names if one.at_most(name) is not None} == set(free)
+
+
+def test_a_friction_that_is_there_is_found_with_its_bound() -> None:
+    truth = TRUTH + np.array([0, 0, 0, 0, 0.01, 20.0, 0])
+    found = Fitter(BELT, free=["B", "BL"]).process(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 200))
+    assert found.ok.all()
+    cover = np.mean(np.abs(found.value - truth) <= found.bound(), axis=0)
+    assert cover.min() >= 0.95 - 3 * 0.0155
+    one = fit(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=["B", "BL"])
+    assert one.at_most("BL") is None
+    assert one.at_most("Js") is None
+
+
 def test_three_masses_fit_the_axis_of_three() -> None:
     axis = BeltAxis(mechanics=Mechanics(masses=3))
     lines = Lines.parse("20:400:5", rate_hz=4000, window=800)

@@ -115,7 +115,6 @@ def test_a_run_with_a_delay_gets_margins_with_it_and_none_where_it_is_held_at_ze
     assert held["tuning"]["verdict"] == "refused"
     assert "free what it lacks" in held["message"]
     assert "no margins: the two-mass model contradicts the lines" in livebode("margins", folder / "held").out
-    assert "contradicts the lines" in livebode("report", folder / "held", "--json").out
 
 
 def delayed(ticks: float) -> np.ndarray:

@@ -118,6 +118,9 @@ def show_fit(found: Fit, of: str) -> None:
         print(f"  no numbers ({found.status}): {found.sentence}")
         return
     for name, value, bound, unit in found.rows():
+        if (limit := found.at_most(name)) is not None:
+            print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
+            continue
         print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
     print(f"  ± holds 95 %; the model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")

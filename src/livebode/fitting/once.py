@@ -77,6 +77,13 @@ class Fit:
         part = self.parameters if name in self.parameters.names else self.derived
         return float(part.bound(probability)[0, part.index(name)])
 
+    def at_most(self, name: str) -> float | None:
+        """Upper limit of a parameter that may be zero (a friction) and whose 95 % bound reaches there; else None."""
+        one_sided = {p.name for p in self.model.parameters if p.one_sided}
+        if name not in one_sided or name in self.held or self[name] > self.bound(name):
+            return None
+        return self[name] + self.bound(name)
+
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """The fitted model's response, behind hold and delay.
 

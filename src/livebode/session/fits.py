@@ -168,7 +168,12 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
 
 def plain_fit(found: Fit) -> dict[str, Any]:
     """One fit as plain data."""
-    quantities = {name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()}
+    quantities: dict[str, dict[str, Any]] = {
+        name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()
+    }
+    for name, quantity in quantities.items():
+        if (limit := found.at_most(name)) is not None:
+            quantity["at_most"] = limit
     return {
         "model": found.model.name,
         "status": found.status,
