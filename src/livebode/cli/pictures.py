@@ -123,7 +123,8 @@ def show_fit(found: Fit, of: str) -> None:
             continue
         print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
-    print(f"  ± holds 95 %; the model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+    print(f"  {found.about_bounds}")
+    print(f"  the fitted model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
 
 
 def _many(number: int, noun: str) -> str:

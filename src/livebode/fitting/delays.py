@@ -38,13 +38,18 @@ class DelayChoice:
 
     def begin(self, problem: Problem, may_free: bool) -> None:
         """The problem as the user specified it, and whether its delay may be freed."""
-        self._held = problem
-        self._freed = freed_of(problem) if may_free else None
+        self.held = problem
+        self._freed = problem.variant(free=(DELAY,)) if may_free and DELAY in problem.held else None
+
+    @property
+    def freed(self) -> Problem:
+        """With a free delay, which may be the user's own."""
+        return self._freed if self._freed is not None else self.held
 
     @property
     def problem(self) -> Problem:
         """What rows are fitted with at present."""
-        return self._freed if self.taken and self._freed is not None else self._held
+        return self.freed if self.taken else self.held
 
     def weigh(self, group: int, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
         """Compare both fits where this group (its number) decides; rows as they are fitted, `found` or with a delay."""
@@ -52,10 +57,10 @@ class DelayChoice:
             return found
         held, freed = found, found
         if self.taken:
-            held = fit_rows(self._held, measured, noise_dof, self._held.with_held(found.ended))
+            held = fit_rows(self.held, measured, noise_dof, self.held.with_held(found.ended))
         else:
-            freed = fitted_freely(self._held, self._freed, measured, noise_dof, found)
-        gain = gains(measured, held, freed)
+            freed = fitted_freely(self.held, self._freed, measured, noise_dof, found)
+        gain = gains(measured, noise_dof, held, freed)
         gain = np.where((freed.status == OK) & self._possible(freed), gain, np.where(held.status == OK, 0.0, np.nan))
         self.gains += gain[np.isfinite(gain)].tolist()
         return found if self.taken is not None else chosen(found, freed, gain > SHOWN)
@@ -75,21 +80,13 @@ class DelayChoice:
         self.taken, self.gains = state["taken"], state["gains"]
 
     def _possible(self, freed: Fitted) -> NDArray[np.bool_]:
-        late_s = freed.ended[:, self._held.model.names.index(DELAY)]
-        return np.asarray(late_s * self._held.grid.rate_hz >= -_EARLIEST_TICKS)
+        late_s = freed.ended[:, self.held.model.names.index(DELAY)]
+        return np.asarray(late_s * self.held.grid.rate_hz >= -_EARLIEST_TICKS)
 
 
 def _decides(group: int, taken: bool | None) -> bool:
     """Undecided, groups 0, 1, 2, 4 …: a model that never fits costs no more and more."""
     return group % _EVERY == 0 or (taken is None and group & (group - 1) == 0)
-
-
-def freed_of(problem: Problem) -> Problem | None:
-    """The same problem with the delay freed; None where it has none, or it is free."""
-    if DELAY not in problem.held:
-        return None
-    held = {name: value for name, value in problem.held.items() if name != DELAY}
-    return Problem(problem.model, problem.grid, held, [*(set(problem.model.names) - set(held))])
 
 
 def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
@@ -109,9 +106,10 @@ def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: 
     return best
 
 
-def gains(measured: Measured, less: Fitted, more: Fitted) -> Floats:
+def gains(measured: Measured, noise_dof: Floats, less: Fitted, more: Fitted) -> Floats:
     """By how much −2·ln(likelihood) falls from one fit to the other, (rows,), each with the ε that it needs."""
-    return np.asarray(misfit(measured, less.response, less.dof) - misfit(measured, more.response, more.dof))
+    before, after = (misfit(measured, x.response, x.dof, noise_dof) for x in (less, more))
+    return np.asarray(before - after)
 
 
 def chosen(first: Fitted, second: Fitted, take: NDArray[np.bool_]) -> Fitted:

@@ -126,6 +126,26 @@ class Fitter:
         """Parameters that are not fitted, and their values."""
         return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
+    def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, Measured, Floats]:
+        """What one row was fitted with: the problem, the lines that count, and the degrees of freedom of its sigmas."""
+        measured, noise_dof = measured_of(responses, self._prepare(responses.lines))
+        late = DELAY in parameters.names and parameters.sigma[0, parameters.index(DELAY)] > 0
+        return self._delay.freed if late else self._delay.held, measured, noise_dof
+
+    @property
+    def problem(self) -> Problem:
+        """As the user specified it."""
+        return self._delay.held
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of what the user holds."""
+        return frozenset(self._fixed)
+
+    def may_take_delay(self) -> bool:
+        """Whether a delay is held that nobody asked to hold."""
+        return DELAY in self.held and DELAY not in self._fixed
+
     @property
     def grid(self) -> Grid:
         """The lines of the band; InputError before the first responses, which bring them."""

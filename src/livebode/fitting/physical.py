@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -69,6 +69,11 @@ class Parameter:
     def one_sided(self) -> bool:
         """Whether it may be zero, but not negative."""
         return self.low == 0
+
+    @property
+    def unsized(self) -> bool:
+        """Whether neither its bounds nor its start say what a step is: `PhysicalModel.shown` does."""
+        return self.one_sided or self.low == -inf
 
     @property
     def scale(self) -> float:

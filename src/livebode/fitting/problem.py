@@ -75,8 +75,19 @@ class Problem:
                 raise InputError(f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}")
         self._log = np.array([p.logarithmic for p in chosen])
         self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
-        self._one_sided = np.array([p.one_sided for p in chosen])
+        self._unsized = np.array([p.unsized for p in chosen])
         self._ends = tuple(np.array([getattr(p, end) for p in chosen]) for end in ("low", "high"))
+
+    def variant(
+        self,
+        model: PhysicalModel | None = None,
+        free: Sequence[str] = (),
+        held: Mapping[str, float] | None = None,
+    ) -> Problem:
+        """The same with another model, some parameters freed, and some held."""
+        model = model or self.model
+        rest = {name: value for name, value in self.held.items() if name not in free} | dict(held or {})
+        return Problem(model, self.grid, rest, [name for name in model.names if name not in rest])
 
     @property
     def size(self) -> int:
@@ -122,7 +133,7 @@ class Problem:
             )
         values = self._outward(found.parameters, start, scale)
         response, slope = found.known
-        if self._one_sided.any():
+        if self._unsized.any():
             slope = slope * (self._scale / scale)[:, np.newaxis]
         return Solution(values, response, slope, found.settled), found.cost
 
@@ -130,7 +141,7 @@ class Problem:
         """Rows of which a free parameter lies at one of its bounds, unless at a zero that it cannot pass."""
         x = self._inward(values, self._scale)
         low, high = self._bounds(self._scale)
-        return np.asarray((((x - low < _AT_BOUND) & ~self._one_sided) | (high - x < _AT_BOUND)).any(axis=1))
+        return np.asarray((((x - low < _AT_BOUND) & ~self._unsized) | (high - x < _AT_BOUND)).any(axis=1))
 
     def outward_slopes(self, values: Floats) -> Floats:
         """Derivatives of the free parameters by their coordinates, (rows, free)."""
@@ -143,10 +154,10 @@ class Problem:
     def _scales(self, start: Floats) -> Floats:
         """What counts as a step of each free parameter, (free,), or (rows, free) where one may be zero: its own size
         says nothing then, and what the lines would show of it does."""
-        if not self._one_sided.any():
+        if not self._unsized.any():
             return self._scale
         shown = self.model.shown(start, self.grid)[:, self.free]
-        return np.where(self._one_sided & (shown > 0) & np.isfinite(shown), shown, self._scale)
+        return np.where(self._unsized & (shown > 0) & np.isfinite(shown), shown, self._scale)
 
     def _bounds(self, scale: Floats) -> tuple[Floats, Floats]:
         with np.errstate(invalid="ignore", divide="ignore"):

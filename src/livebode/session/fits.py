@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
+from livebode.fitting import Fit, Fitter, PhysicalModel, best_of, fit, fit_of, model_named
 from livebode.nouns import Event, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
@@ -96,14 +96,18 @@ class Fits:
         return self._fitter
 
     def newest(self) -> Fit | None:
-        """The newest fit that holds, and whose ε is no more than three times the usual one."""
+        """The newest fit that is valid, and whose ε is no more than three times the usual one.
+
+        Competing models are tried for this one alone, not for each response of a run.
+        """
         if self._fitter is None or self._newest is None:
             return None
-        return fit_of(self._fitter, self._newest, self._newest_response)
+        if self._newest_response is None:
+            return fit_of(self._fitter, self._newest)
+        return best_of(self._fitter, self._newest, self._newest_response)
 
-    def summary(self) -> dict[str, Any]:
-        """For run.json: the model, how often each status was, and the newest fit that holds."""
-        newest = self.newest()
+    def summary(self, newest: Fit | None) -> dict[str, Any]:
+        """For run.json: the model, how often each status was, and the newest fit that is valid."""
         return {
             "model": self._fitter.model.name if self._fitter else None,
             "statuses": self._counts,
@@ -175,9 +179,12 @@ def plain_fit(found: Fit) -> dict[str, Any]:
         if (limit := found.at_most(name)) is not None:
             quantity["at_most"] = limit
     return {
-        "model": found.model.name,
+        "model": found.asked.name if found.asked is not None else found.model.name,
         "status": found.status,
         "message": found.sentence,
+        "taken": list(found.taken),
+        "complete": found.complete,
+        "about_bounds": found.about_bounds,
         "time_s": float(found.parameters.time_s[0]),
         "schedule": float(found.parameters.schedule[0]),
         "band_hz": list(found.band_hz),
