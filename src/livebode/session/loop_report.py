@@ -117,12 +117,10 @@ def loop_of_run(
         own = axis.fit if axis is not None else None
         section = own or FitSection.model_validate(own_words.get("fit", {}))
     found, words = fit_run(directory, section)
-    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), section, peak_sensitivity)
+    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
 
 
-def loop_report(
-    fit: Fit, words: str, responses: Responses, loop: Loop, section: FitSection, peak_sensitivity: float = 2.0
-) -> LoopReport:
+def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
     """The report of a fit, and of the responses that it is of."""
     if fit.status != "ok":
         raise InputError(f"margins need a fit, and there is none: {fit.sentence}")
@@ -131,9 +129,8 @@ def loop_report(
     fitted_to = fit.measured if fit.measured is not None else mean
     measured = fitted_to
     if len(places := _by_place(responses)) > 1:
-        over = Fitter(fit.model, fixed=section.fixed, free=section.free, band_hz=fit.band_hz, hold=fit.hold).process(
-            places
-        )
+        free = [name for name in fit.model.names if name not in fit.held]
+        over = Fitter(fit.model, fixed=fit.held, free=free, band_hz=fit.band_hz, hold=fit.hold).process(places)
         # The fit may be of one moment, and no better than the least of them.
         if over.ok.sum() > len(places) // 2:
             fits, measured = Parameters.join([over, fits]), Responses.join([places, fitted_to])

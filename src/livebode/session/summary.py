@@ -61,5 +61,5 @@ def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[
     summary = {"fit": fits.summary(newest)}
     if newest is not None and fits.loop is not None:
         words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
-        summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
+        summary["loop"] = loop_report(newest, words, responses, fits.loop).plain()
     return summary
