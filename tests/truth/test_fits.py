@@ -219,7 +219,12 @@ def test_three_masses_fit_the_axis_of_three() -> None:
     two, three = (fit(noisy(value, lines, 1e-3, 1)[0], m) for m in (BELT, ThreeMass(radius_m=0.019)))
     assert three.status == "ok", three.sentence
     assert three.epsilon < 0.01
-    assert two.status != "ok" or two.epsilon > 10 * three.epsilon
+    assert three.taken == ()
+    assert two.taken == ("further mode",)
+    assert two["mode"] == pytest.approx(144.3, rel=0.01)
+    assert two["resonance"] == pytest.approx(three["resonance_1"], rel=1e-3)
+    alone = Fitter(BELT).process(Responses.of(noisy(value, lines, 1e-3, 1)[0]))
+    assert alone.epsilon[0] > 0.01
     poles = np.abs(np.linalg.eigvals(axis.linear(0.8).a)) / (2 * np.pi)
     modes = np.unique(poles[poles > 1].round(1))
     assert [three["resonance_1"], three["resonance_2"]] == pytest.approx(list(modes), rel=0.005)
@@ -239,7 +244,11 @@ def test_the_motor_bench_is_what_its_description_says(band_hz: tuple[float, floa
     assert found["resonance"] == pytest.approx(76.22, abs=0.1)
     assert found["resonance_damping"] == pytest.approx(0.019, abs=0.003)
     assert found["inertia_ratio"] == pytest.approx(1.0, abs=0.03)
-    assert found.bound("resonance") < 0.2
+    # What the model lacks is alike at neighbouring lines (correlation 0.5), so that the bound is wider than it was
+    # when each line counted as independent: 0.21 Hz instead of 0.14 over the narrowest band.
+    assert found.bound("resonance") < 0.25
+    assert not found.complete
+    assert found.taken == ()
 
 
 def test_the_motor_benchs_bounds_hold_the_scatter_between_its_periods() -> None:

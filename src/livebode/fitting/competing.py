@@ -20,7 +20,7 @@ Complex = NDArray[np.complex128]
 
 _TAKEN = 3  # at most
 _FRICTION_PRICE = 2.5  # that −2·ln(likelihood) must fall by: 1.6 sigma, for every machine has some
-_PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 8.0}  # a mode is searched for
+_PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0}
 _DAMPING_PRICE = 4.0  # of a mode whose damping is free
 _APART = 0.15  # of a frequency of the model itself: a further mode nearer to it would bend that one's own shape
 _MODES, _MODES_TRIED = 40, 3
@@ -77,7 +77,10 @@ def competitor(
 ) -> Competitor:
     """A fit with its cost."""
     price = sum(_PRICE.get(name, _FRICTION_PRICE) for name in taken)
-    price += _DAMPING_PRICE * (MODE in taken and "mode_damping" not in problem.held)
+    if MODE in taken:
+        # It is looked for over all lines, and the largest of as many chances is found.
+        price += 2 * float(np.log(np.count_nonzero(measured.use)))
+        price += _DAMPING_PRICE * ("mode_damping" not in problem.held)
     return Competitor(
         problem, fitted, float(misfit(measured, fitted.response, fitted.dof, noise_dof)[0]) + price, taken
     )
