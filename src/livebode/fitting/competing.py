@@ -59,7 +59,7 @@ def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: A
     """The model that explains one row best, then all others that were fitted.
 
     From the model that was asked for on, the best of all that differ from it by one step is taken as long as the cost
-    falls, at most three times.
+    falls, at most three times; what was taken before is left again where the cost is then less.
     """
     every, best = [start], start
     for _ in range(_TAKEN):
@@ -69,6 +69,9 @@ def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: A
         if better is best:
             break
         best = better
+        less = list(_less(best, measured, noise_dof))
+        every += less
+        best = min([best, *less], key=lambda c: c.cost)
     return [best, *(c for c in every if c is not best)]
 
 
@@ -125,6 +128,16 @@ def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allo
         fitted = fit_rows(problem, measured, noise_dof, begun)
         if fitted.status[0] == OK and _possible(problem, fitted, allowed):
             yield competitor(problem, measured, noise_dof, fitted, (*of.taken, name))
+
+
+def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
+    """The same without one of the parameters that it took before: a delay, say, that stood in for a mode."""
+    for i, name in enumerate(of.taken[:-1]):
+        if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
+            problem = of.problem.variant(held={name: 0.0})
+            fitted = fit_rows(problem, measured, noise_dof, problem.with_held(of.fitted.ended))
+            if fitted.status[0] == OK:
+                yield competitor(problem, measured, noise_dof, fitted, of.taken[:i] + of.taken[i + 1 :])
 
 
 def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tuple[str, Problem, Floats]]:
