@@ -160,6 +160,18 @@ def verdicts(found: list[Found]) -> list[Verdict]:
     return result
 
 
+def least_width(runs: int) -> dict[str, float]:
+    """How much wider the bound of bs is with frictions free than held: the least where they are not known."""
+    measured = responses_of(cases()[0], runs)
+    held = Fitter(BELT).process(measured).bound()[:, BELT.names.index("bs")]
+    return {
+        " and ".join(free): float(
+            np.median(Fitter(BELT, free=free).process(measured).bound()[:, BELT.names.index("bs")] / held)
+        )
+        for free in (("B",), ("BL",), ("B", "BL"))
+    }
+
+
 def main(runs: int) -> None:
     print(f"{runs} runs each; Js, mL, Keff, bs: covered by 95 % bounds before and now, in %; width now over before")
     found = []
@@ -171,6 +183,8 @@ def main(runs: int) -> None:
         print(f"{case.name:58} {before} | {now} | {wide} | incomplete {100 * one.incomplete:.0f} %", flush=True)
     for verdict in verdicts(found):
         print(verdict)
+    for free, times in least_width(runs).items():
+        print(f"bound of bs with {free} free over that without: {times:.2f}")
 
 
 if __name__ == "__main__":
