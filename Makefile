@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies repeating monitoring healthy fuzz crash damage soak system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy fuzz crash damage soak system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -54,6 +54,9 @@ studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/s
 
 repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
 	$(BIN)/python -m studies.repeating
+
+fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/fits.md)
+	$(BIN)/python -m studies.fit_bounds
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring

@@ -106,7 +106,7 @@ def _show_moving(model: dict[str, Any]) -> None:
 def _show_loop(found: dict[str, Any]) -> None:
     """The margins in a line; `livebode margins` says more."""
     if not (worst := found["worst_over_places"]):
-        print(f"no margins: {found['status']}; check the loop's description and the fit")
+        print(f"no margins: {found['message']}")
         return
     print(f"margins, worst of {_many(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
 
@@ -141,9 +141,13 @@ def show_fit(found: Fit, of: str) -> None:
         print(f"  no numbers ({found.status}): {found.sentence}")
         return
     for name, value, bound, unit in found.rows():
+        if (limit := found.at_most(name)) is not None:
+            print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
+            continue
         print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
-    print(f"  ± holds 95 %; the model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+    print(f"  {found.about_bounds}")
+    print(f"  the fitted model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
 
 
 def _many(number: int, noun: str) -> str:
