@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring fuzz crash system-packages lock clean
+.PHONY: help demo test lint bench peers studies monitoring fuzz crash attacks system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -63,6 +63,9 @@ fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sour
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
+
+attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
+	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/fault/test_dashboard_attacks.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

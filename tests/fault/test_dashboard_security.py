@@ -6,8 +6,10 @@ import asyncio
 import contextlib
 import json
 import re
+import resource
 import socket
 import ssl
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -19,10 +21,12 @@ import pytest
 import websockets
 from websockets.sync.client import ClientConnection, connect
 
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, Serving, patience
 from livebode.dashboard.access import Access, TooManyTriesError
 from livebode.dashboard.app import SOCKETS_MAX
 from livebode.dashboard.guard import Guard
+from livebode.dashboard.listener import connections_max
+from livebode.dashboard.server import Faults
 from livebode.nouns import Event, InputError
 from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium, until
@@ -379,6 +383,57 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
             assert "Secure" in answer.headers["set-cookie"]
         with pytest.raises((OSError, urllib.error.URLError)):
             urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
+
+
+def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As by a reload of the page: its connection is over before a request would have been due."""
+    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    authority, told = Authority(tmp_path, "authority"), list[str]()
+    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
+    with Dashboard(Serving("127.0.0.1", 0, tls=tls), told.append) as dashboard:
+        dashboard.hub("axis")
+        url = dashboard.url.replace("https", "wss") + "live"
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            live.recv()
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            time.sleep(1.5)  # the listener has looked at both
+            live.send('{"kind": "pause"}')
+            assert "facts" in json.loads(live.recv())
+    assert told == []
+    assert capfd.readouterr().err == ""
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    host = f"127.0.0.1:{port_of(watched)}"
+    head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
+    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
+        slow.sendall(head.encode())
+        assert slow.recv(100) == b""
+    assert "internal error" not in " ".join(watched.told)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("soft", "most"), [(1024, 128), (256, 64), (16, 8), (resource.RLIM_INFINITY, 128)])
+def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.MonkeyPatch, soft: int, most: int) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
+    assert connections_max() == most
+
+
+def test_faults_of_the_server_are_told_once_a_minute() -> None:
+    told = list[str]()
+    faults = Faults(told.append)
+    for _ in range(1000):
+        try:
+            raise ValueError("odd")
+        except ValueError as error:
+            faults.take(error)
+    assert len(told) == 1
+    assert "internal error in the dashboard: ValueError('odd') at" in told[0]
 
 
 def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:

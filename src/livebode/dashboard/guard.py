@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -108,10 +109,13 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: 
 
 
 async def body(request: Any) -> bytes | None:
-    """The body of a request; None where it is longer than any that the page sends."""
+    """The body of a request; None where it is longer than any that the page sends, or did not come whole."""
     data = b""
-    async for part in request.stream():
-        data += part
-        if len(data) > BODY_BYTES_MAX:
-            return None
+    try:
+        async for part in request.stream():
+            data += part
+            if len(data) > BODY_BYTES_MAX:
+                return None
+    except ClientDisconnect:
+        return None
     return data
