@@ -9,6 +9,8 @@ import re
 import resource
 import socket
 import ssl
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -171,6 +173,7 @@ def test_every_answer_says_what_browsers_must_not_do(watched: Watched) -> None:
         assert "unsafe" not in policy
         assert "frame-ancestors 'none'" in policy
         assert headers["x-content-type-options"] == "nosniff"
+        assert "strict-transport-security" not in headers, "it is for TLS alone"
         assert "server" not in headers
     for path in ("/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fapp.py", "/static/uplot/../../app.py"):
         assert ask(watched, path)[0] == 404, path
@@ -283,8 +286,11 @@ def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
         answer(live, "facts")
         live.send("no json")
         assert answer(live, "error") == "the message is not JSON"
+        live.send(b"\x00\xff")
+        assert answer(live, "error") == "a message is text, not bytes"
         live.send('{"kind": "watch"}')
         answer(live, "facts")
+    assert not [line for line in watched.told if "internal error" in line]
 
 
 def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
@@ -357,6 +363,30 @@ def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, 
     assert not any(secret in str(refused.value) for secret in SERVE.values() if len(secret) > 5)
 
 
+@pytest.mark.parametrize("key", ["token_file", "viewer_token_file"])
+def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "the token"
+    path.write_text(TOKEN)
+    section = ServeSection.model_validate({key: path})
+    for mode in (0o644, 0o604, 0o620, 0o602):
+        path.chmod(mode)
+        with pytest.raises(InputError, match=re.escape(f"(mode {mode:04o}); run `chmod 600 '{path}'`")) as refused:
+            Serving.of(section)
+        assert TOKEN not in str(refused.value)
+    for mode in (0o600, 0o640, 0o400):
+        path.chmod(mode)
+        assert TOKEN in (Serving.of(section).token, Serving.of(section).viewer_token)
+
+
+def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "dashboard.md").read_text()
+    command = re.search(r"^    (.*token_urlsafe.*)$", text, re.MULTILINE).group(1)
+    path = tmp_path / "token"
+    command = command.replace("/etc/livebode/token", str(path)).replace("python ", f"{sys.executable} ")
+    subprocess.run(["sh", "-c", f"umask 022; {command}"], check=True)
+    assert Serving.of(ServeSection(token_file=path)).token == path.read_text().strip()
+
+
 def test_a_port_that_is_taken_is_said() -> None:
     with Dashboard(Serving("127.0.0.1", 0)) as first:
         port = int(first.url.rsplit(":", 1)[1].strip("/"))
@@ -381,6 +411,7 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
         )
         with urllib.request.urlopen(request, context=trust) as answer:
             assert "Secure" in answer.headers["set-cookie"]
+            assert answer.headers["strict-transport-security"] == "max-age=31536000"
         with pytest.raises((OSError, urllib.error.URLError)):
             urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
 
