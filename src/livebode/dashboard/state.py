@@ -228,8 +228,11 @@ class State:
 
     @property
     def clock_s(self) -> float | None:
-        """Seconds since 1970 at the run's time 0; None where the run has no clock but its own."""
-        if self.last_s > _SINCE_1970_S:
+        """Seconds since 1970 at the run's time 0; None where the run has no clock but its own.
+
+        What happens before a run begins is dated.
+        """
+        if self.quantities is None or self.last_s > _SINCE_1970_S:
             return 0.0
         return None if self.hub is None else self.hub.clock_s
 

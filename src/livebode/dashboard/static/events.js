@@ -13,6 +13,7 @@ const ALARMS = new Set([
   "overflow",
   "disconnected",
   "refused",
+  "waiting",
   "restart",
   "record-paused",
   "backlog",
