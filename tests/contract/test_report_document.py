@@ -52,7 +52,7 @@ def hostile(text: str) -> Document:
         Picture("bode", bode, text),
         Picture("parameters", {"time_s": np.arange(3.0), "curves": [(text, text, np.ones(3), np.ones(3))]}, text),
     )  # fmt: skip
-    return Document(text, text, ((text, text),), (Finding("bad", text),), (Section(text, parts),), text)
+    return Document(text, text, ((text, text),), (Finding("alarm", text),), (Section(text, parts),), text)
 
 
 @cache

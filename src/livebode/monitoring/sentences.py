@@ -9,6 +9,7 @@ from livebode.monitoring import evidence as word
 from livebode.monitoring.offset import FAR
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.nouns import Event
+from livebode.nouns.clock import moment
 
 if TYPE_CHECKING:
     from livebode.monitoring.alarms import Alarm
@@ -25,7 +26,7 @@ WHAT = {
 
 def changed(alarm: Alarm, sample: int, time_s: float) -> Event:
     """Something changed, as is known at this sample and time."""
-    message = f"Since {alarm.since_s:.1f} s {_amount(alarm.change, alarm.now, alarm.bound)} than in the baseline"
+    message = f"Since {moment(alarm.since_s)} {_amount(alarm.change, alarm.now, alarm.bound)} than in the baseline"
     if (rival := alarm.rival) is not None:
         message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
     if alarm.change.place is None and abs(alarm.now) > FAR:
@@ -37,7 +38,7 @@ def changed(alarm: Alarm, sample: int, time_s: float) -> Event:
 def far_away(alarm: Alarm, sample: int, time_s: float) -> Event:
     """So much changed that no single change explains it."""
     message = (
-        f"Since {alarm.since_s:.1f} s the machine is so far from the baseline that no single change explains it: it "
+        f"Since {moment(alarm.since_s)} the machine is so far from the baseline that no single change explains it: it "
         "may be another machine. Amounts follow where the model can come along."
     )
     return Event("change", sample, time_s, message, about_far(alarm))
@@ -70,7 +71,7 @@ def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
     where = _where(alarm.change)
     name = WHAT[DIRECTIONS[alarm.change.direction]]
     message = (
-        f"At {time_s:.1f} s {name}{where} is as in the baseline again; it had changed since {alarm.since_s:.1f} s."
+        f"At {moment(time_s)} {name}{where} is as in the baseline again; it had changed since {moment(alarm.since_s)}."
     )
     return Event("change-cleared", sample, time_s, message, about(alarm))
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.table import Table
 from livebode.nouns import Event
+from livebode.nouns.clock import moment as clock_moment
 
 Floats = NDArray[np.float64]
 
@@ -31,13 +32,13 @@ def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats
         "since_sample": int(moment[0, 1]),
         "seen_at": where,
     }
-    message = f"Since {moment[0, 2]:.1f} s the machine differs from the baseline{place}: {named}{more}."
+    message = f"Since {clock_moment(moment[0, 2])} the machine differs from the baseline{place}: {named}{more}."
     return Event("change", int(moment[-1, 1]), float(moment[-1, 2]), message, details)
 
 
 def cleared(table: Table, sample: int, time_s: float) -> Event:
     """All that had changed is as it was."""
-    message = f"At {time_s:.1f} s the {_KIND[table.what]} are as in the baseline again."
+    message = f"At {clock_moment(time_s)} the {_KIND[table.what]} are as in the baseline again."
     return Event("change-cleared", sample, time_s, message, {"what": table.what})
 
 

@@ -6,15 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Tone = Literal["good", "look", "bad", "open"]
-"""It holds; look at it; it does not hold; nobody can tell."""
+Tone = Literal["ok", "check", "alarm", "differs", "open"]
+"""Nothing to do; a person should look; an alarm is active; two runs differ; not assessed."""
 
-TONES: Mapping[str, str] = {"good": "holds", "look": "look at it", "bad": "does not hold", "open": "not known"}
+TONES: Mapping[str, str] = {
+    "ok": "OK",
+    "check": "check",
+    "alarm": "ALARM",
+    "differs": "differs",
+    "open": "not assessed",
+}
+"""The verdict that is printed for each tone."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence of the verdict, and whether it is good news."""
+    """One sentence of the verdict, and how urgent it is."""
 
     tone: Tone
     text: str
@@ -85,7 +92,7 @@ class Document:
     asked
         Heading of the verdict.
     tones
-        What a finding's tone is called there, so that it is known without colours.
+        The verdict that is printed for each tone, so that it is known without colours.
     """
 
     kind: str
@@ -94,5 +101,5 @@ class Document:
     verdict: tuple[Finding, ...]
     sections: tuple[Section, ...]
     foot: str = ""
-    asked: str = "What holds, and what does not"
+    asked: str = "Verdict"
     tones: Mapping[str, str] = field(default_factory=lambda: TONES)

@@ -6,9 +6,9 @@ from livebode.report.style import DARK, LIGHT
 from livebode.report.svg import variables
 
 STYLE_SHEET = (
-    f":root {{ color-scheme: light dark; --good: #00734d; --look: #8a5a00; --bad: #b3261e; --open: #5b6775; "
+    f":root {{ color-scheme: light dark; --ok: #00734d; --check: #8a5a00; --alarm: #b3261e; --open: #5b6775; "
     f"--shade: #f4f6f8; {variables(LIGHT)} }}\n"
-    f"@media screen and (prefers-color-scheme: dark) {{ :root {{ --good: #4cc79b; --look: #f0b44b; --bad: #ff8a80; "
+    f"@media screen and (prefers-color-scheme: dark) {{ :root {{ --ok: #4cc79b; --check: #f0b44b; --alarm: #ff8a80; "
     f"--open: #a3afbc; --shade: #1a222b; {variables(DARK)} }} }}\n"
     + """
 * { box-sizing: border-box; }
@@ -25,7 +25,8 @@ ul.verdict { margin: .4rem 0 0; padding: 0; list-style: none; }
 ul.verdict li { display: grid; grid-template-columns: 7.2rem 1fr; gap: .8rem; padding: .45rem 0;
   border-bottom: 1px solid var(--ce3e7ec); overflow-wrap: anywhere; }
 .tone { font-weight: 700; }
-.good { color: var(--good); } .look { color: var(--look); } .bad { color: var(--bad); } .open { color: var(--open); }
+.ok { color: var(--ok); } .check { color: var(--check); } .open { color: var(--open); }
+.alarm, .differs { color: var(--alarm); }
 nav { margin: 1.2rem 0 0; font-size: .92rem; color: var(--c5b6775); }
 nav a { color: var(--c0072b2); margin-right: 1rem; white-space: nowrap; }
 p { margin: .6rem 0; overflow-wrap: anywhere; }

@@ -35,7 +35,7 @@ from livebode.report.style import LIGHT
 _MARGIN = 16 * mm
 _WIDTH = A4[0] - 2 * _MARGIN
 _HEIGHT_MAX = A4[1] - 90 * mm  # of a picture with its caption below a heading
-_TONE = {"good": "#00734d", "look": "#8a5a00", "bad": "#b3261e", "open": "#5b6775"}
+_TONE = {"ok": "#00734d", "check": "#8a5a00", "alarm": "#b3261e", "differs": "#b3261e", "open": "#5b6775"}
 _LETTERS = 105  # of a listing's line
 _CELL_LINES = 40  # of a table: a cell does not go on over pages
 

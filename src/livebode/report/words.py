@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.nouns import Responses, counted
+from livebode.nouns.clock import moment
 from livebode.report.style import shortened
 from livebode.report.ticks import frequency_label
 
@@ -44,4 +45,4 @@ def clock(time_s: np.ndarray) -> tuple[float, str]:
     if abs(first) < _CLOCK_FROM_S or last - first > abs(first) / 10:
         return 0.0, "time in s"
     origin = float(np.floor(first))
-    return origin, f"time in s after {origin:.0f} s"
+    return origin, f"time in s after {moment(origin, 0)}"

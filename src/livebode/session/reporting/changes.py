@@ -25,6 +25,8 @@ class Change:
     bound
         Of the change; holds with 95 % for all changes of the table together (Bonferroni). What the model lacks is the
         same in both runs and counts in both bounds, so this one is wide.
+    seen
+        The change that this comparison finds with a probability of 95 %.
     """
 
     name: str
@@ -32,6 +34,12 @@ class Change:
     before: tuple[float, float]
     after: tuple[float, float]
     bound: float
+    seen: float
+
+    @property
+    def words(self) -> str:
+        """The name for people."""
+        return self.name.replace("_", " ")
 
     @property
     def amount(self) -> float:
@@ -40,7 +48,7 @@ class Change:
 
     @property
     def significant(self) -> bool:
-        """Whether the bound does not hold zero."""
+        """Whether the bound excludes zero."""
         return abs(self.amount) > self.bound
 
 
@@ -105,7 +113,9 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...
     before, after = rows
     names = [name for name in before if name in after]
     # The bounds of each are 1.96 sigma.
-    wider = float(ndtri(1 - ALPHA / (2 * max(len(names), 1))) / ndtri(1 - ALPHA / 2))
+    usual = float(ndtri(1 - ALPHA / 2))
+    wider = float(ndtri(1 - ALPHA / (2 * max(len(names), 1)))) / usual
+    surer = wider + float(ndtri(0.95)) / usual
     return tuple(
         Change(
             name,
@@ -113,11 +123,12 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...
             before[name][:2],
             after[name][:2],
             wider * hypot(before[name][1], after[name][1]),
+            surer * hypot(before[name][1], after[name][1]),
         )
         for name in names
     )
 
 
-def percent(change: Change) -> float:
-    """The change as a share of what was before; NaN of zero."""
-    return 100 * change.amount / abs(change.before[0]) if change.before[0] else float(np.nan)
+def percent(change: Change, amount: float) -> float:
+    """An amount as a share of the value before; NaN of zero."""
+    return 100 * amount / abs(change.before[0]) if change.before[0] else float(np.nan)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from livebode.nouns.document import Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.nouns.clock import moment
+from livebode.nouns.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.records import Run
 from livebode.session.reporting.changes import Change, Changes, changes, percent
+from livebode.session.reporting.comparison_verdict import verdict
 from livebode.session.reporting.difference import ALPHA, Compared, Difference, compare
 from livebode.session.reporting.material import written
-from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, to_toml, with_bound
+from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, signed, to_toml, with_bound
 from livebode.session.said import said
 
 _TEST = (
@@ -25,13 +27,13 @@ _TEST = (
     "more often than that. The variance is of the scatter between windows, its degrees of freedom are Welch's and "
     "Satterthwaite's."
 )
-_TONES = {"good": "same", "look": "look at it", "bad": "differs", "open": "not known"}
+_TONES = {**TONES, "ok": "no difference shown"}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two runs held against each other, and how to say it."""
+    """Two runs compared, and the sentences, tables and document that report it."""
 
     found: Compared
     changes: Changes
@@ -44,45 +46,15 @@ class Comparison:
 
     @property
     def sentences(self) -> tuple[Finding, ...]:
-        """The verdict."""
-        overall, places = self.found.overall, self.found.places
-        f = overall.before.lines.frequency_hz
-        findings = [Finding("look", text) for text in self.found.warnings]
-        if overall.differs.any():
-            worst = int(np.nanargmin(overall.p))
-            verb = "differs" if overall.differs.sum() == 1 else "differ"
-            db, around, deg, turned = polar(complex(overall.ratio[worst]), float(overall.bound[worst]))
-            words = f"{many(int(overall.differs.sum()), 'line')} of {overall.m} {verb}: {_hz(f[overall.differs])}. "
-            words += f"Surest at {f[worst]:g} Hz: {_signed(db)} ± {around} dB, {_signed(deg)} ± {turned}°."
-            findings.append(Finding("bad", words))
-        elif not np.isfinite(overall.p).any():
-            findings.append(Finding("open", "At no line both runs have a valid mean with a known sigma."))
-        else:
-            findings.append(
-                Finding("good", f"No line differs more than chance makes it ({overall.m} tested together).")
-            )
-        if places:
-            there = [p for p in places if p.difference.differs.any()]
-            count = sum(int(p.difference.differs.sum()) for p in there)
-            words = (
-                f"Place by place {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
-            )
-            words += f"of {many(len(places), 'place')} (each way counts for itself)."
-            findings.append(Finding("bad" if there else "good", words))
-        for what, table in (("parameter", self.changes.parameters), ("margin", self.changes.margins)):
-            moved = [c for c in table if c.significant]
-            listed = "; ".join(f"{_name(c)} {percent(c):+.2g} % ± {_share(c)} %" for c in moved[:6])
-            words = f"{many(len(moved), what)} of {len(table)} changed: {listed}." if moved else f"No {what} changed."
-            if table:
-                findings.append(Finding("bad" if moved else "good", words))
-        return tuple(sorted(findings, key=lambda finding: ("bad", "look", "open", "good").index(finding.tone)))
+        """The verdict, the most urgent finding first."""
+        return verdict(self.found, self.changes)
 
     @property
     def tables(self) -> tuple[str, ...]:
         """Ratio at each line, and changes of parameters and margins, for a terminal."""
         d = self.found.overall
         rows = [
-            f"{f:>10g} Hz {_signed(db):>9} ± {around:<8} dB {_signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
+            f"{f:>10g} Hz {signed(db):>9} ± {around:<8} dB {signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
             for f, (db, around, deg, turned), on in zip(
                 d.before.lines.frequency_hz, map(polar, d.ratio.tolist(), d.bound.tolist()), d.differs
             )
@@ -90,7 +62,7 @@ class Comparison:
         more = len(rows) - _LINES_SHOWN
         lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} lines more; --json has all"] * (more > 0))
         changed = [
-            f"  {_name(c):22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
+            f"  {c.words:22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
             + "  changed" * c.significant
             for c in (*self.changes.parameters, *self.changes.margins)
         ]
@@ -122,13 +94,13 @@ class Comparison:
             ("before", str(one.path)), ("after", str(other.path)),
             ("before written", written(one.path / "run.json")), ("after written", written(other.path / "run.json")),
             ("responses", " and ".join(f"{a.count:,}" for a in self.found.averages)),
-            ("compared at", _span(self.found)), ("report made", f"{made.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
+            ("compared at", _span(self.found)), ("report made", moment(made.timestamp())),
         )  # fmt: skip
         sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
         there = tuple(section for section in sections if section is not None)
         return Document(
             "Before and after", title, rows, self.sentences, there, f"{title} · livebode",
-            "What changed, and what did not", _TONES,
+            "What changed", _TONES,
         )  # fmt: skip
 
     def _response(self) -> Section:
@@ -202,7 +174,7 @@ class Comparison:
         rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
         parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []
         for run, when in zip(self.found.runs, ("Before", "After")):
-            message = run.summary.get("monitoring", {}).get("message", "nothing is said of changes.")
+            message = run.summary.get("monitoring", {}).get("message", "changes are not assessed.")
             parts.append(Paragraph(f"{when}: {message}"))
         return Section("Events", tuple(parts))
 
@@ -236,17 +208,9 @@ def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
 def _row(c: Change) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
-        _name(c), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed, f"{percent(c):+.2g}",
+        c.words, *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed, f"{percent(c, c.amount):+.2g}",
         "yes" if c.significant else "no",
     )  # fmt: skip
-
-
-def _name(c: Change) -> str:
-    return c.name.replace("_", " ")
-
-
-def _share(c: Change) -> str:
-    return f"{100 * c.bound / abs(c.before[0]):.2g}" if c.before[0] else "—"
 
 
 def _plain_change(c: Change) -> dict[str, Any]:
@@ -271,15 +235,6 @@ def _lines(d: Difference) -> dict[str, Any]:
 
 def _p(p: float) -> str:
     return f"{p:.2g}" if isfinite(p) else "—"
-
-
-def _signed(number: str) -> str:
-    return number if number.startswith(("-", "—")) else f"+{number}"
-
-
-def _hz(frequency_hz: np.ndarray) -> str:
-    shown = ", ".join(f"{f:g}" for f in frequency_hz[:12])
-    return f"{shown}{' …' if len(frequency_hz) > 12 else ''} Hz"
 
 
 def _span(of: Compared) -> str:

@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 ALPHA = 0.05
 """How often two runs of the same machine may be told apart at any line at all."""
 _PLACES = 12
+_ALONG = 1.645 / 2**0.5  # sigma of a complex value covers both parts; one of them stays within this with 95 %
 _WINDOWS_MIN = 3.0  # side by side in a place, for a scatter that means something
 _SAME_HZ = 1e-6
 _SPEEDS_APART = 0.2
@@ -31,7 +32,7 @@ class Difference:
 
     |G₂ − G₁|²/σ², with σ² = σ₂² + max(1, |G₂/G₁|²)·σ₁², follows F(2, 2d) where nothing changed (d by Welch and
     Satterthwaite), so that p = (1 + |G₂ − G₁|²/(σ²·d))^−d. A line differs where p < α/m for m lines (Bonferroni), which
-    is where the ratio's bound does not hold 1: over all lines together a false claim comes at most with α = 5 %.
+    is where the ratio's bound does not cover 1: over all lines together a false claim comes at most with α = 5 %.
 
     Attributes
     ----------
@@ -41,6 +42,8 @@ class Difference:
         G₂/G₁ and the radius around it that holds with 95 % at all lines together, (lines,).
     p
         (lines,).
+    seen
+        The relative change at each line that this comparison finds with a probability of 95 %, (lines,).
     m
         How many were tested together.
     """
@@ -50,6 +53,7 @@ class Difference:
     ratio: NDArray[np.complex128]
     bound: Floats
     p: Floats
+    seen: Floats
     m: int
 
     @property
@@ -69,8 +73,9 @@ class Difference:
             dof = variance**2 / (first**2 / before.dof + second**2 / after.dof)
             away = np.abs(after.value - before.value) ** 2 / variance
             p = np.where(known, np.where(np.isinf(dof), np.exp(-away), (1 + away / dof) ** -dof), np.nan)
-            bound = widened(np.sqrt(variance) / np.abs(before.value), dof, float(np.sqrt(log(m / ALPHA))))
-        return cls(before, after, ratio, np.where(known, bound, np.nan), np.asarray(p), m)
+            sigma = np.sqrt(variance) / np.abs(before.value)
+            bound = np.where(known, widened(sigma, dof, float(np.sqrt(log(m / ALPHA)))), np.nan)
+        return cls(before, after, ratio, bound, np.asarray(p), bound + _ALONG * sigma, m)
 
 
 @dataclass(frozen=True, eq=False)

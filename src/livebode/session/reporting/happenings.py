@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from livebode.nouns import Event
+from livebode.nouns.clock import moment
 from livebode.nouns.document import Paragraph, Part, Table
-from livebode.session.reporting.wording import many, seconds
+from livebode.session.reporting.wording import many
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
 """Kinds that are told in full; so are those of the record itself."""
@@ -26,7 +27,7 @@ class Kind:
 
 
 @dataclass
-class Happenings:
+class EventSummary:
     """Events by kind, and those to tell in full: the first and the newest of them."""
 
     kinds: dict[str, Kind] = field(default_factory=dict)
@@ -35,7 +36,7 @@ class Happenings:
     told: int = 0
 
     @classmethod
-    def of(cls, events: Iterable[Event]) -> Happenings:
+    def of(cls, events: Iterable[Event]) -> EventSummary:
         found = cls()
         for event in events:
             found._add(event)
@@ -54,6 +55,11 @@ class Happenings:
         return self.kinds[kind].count if kind in self.kinds else 0
 
     @property
+    def in_full(self) -> list[Event]:
+        """The alarms and events of the record, in their order: the first and the newest of them."""
+        return [*self.early, *self.late]
+
+    @property
     def left_out(self) -> int:
         """How many between the first and the newest are not kept."""
         return self.told - len(self.early) - len(self.late)
@@ -63,13 +69,12 @@ class Happenings:
         if not self.kinds:
             return (Paragraph("Nothing happened: the run has no event."),)
         rows = tuple(
-            (name, f"{k.count:,}", seconds(k.first.time_s), seconds(k.newest.time_s), k.newest.message[:_LETTERS])
+            (name, f"{k.count:,}", moment(k.first.time_s, 2), moment(k.newest.time_s, 2), k.newest.message[:_LETTERS])
             for name, k in self.kinds.items()
         )
         grouped = Table(("kind", "count", "first", "newest", "what the newest says"), rows, (1,))
-        told = [*self.early, *self.late]
-        if not told:
+        if not self.told:
             return (grouped,)
         note = f"{many(self.left_out, 'event')} between them left out; events.jsonl has all." if self.left_out else ""
-        in_full = tuple((seconds(e.time_s), e.kind, e.message[:_LETTERS]) for e in told)
+        in_full = tuple((moment(e.time_s, 2), e.kind, e.message[:_LETTERS]) for e in self.in_full)
         return grouped, Table(("when", "kind", "message"), in_full, note=note)

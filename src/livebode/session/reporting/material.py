@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +10,13 @@ import numpy as np
 
 from livebode.fitting import Fit
 from livebode.nouns import InputError, Responses
+from livebode.nouns.clock import moment
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import FitSection, LoopSection
 from livebode.session.fits import fit_averaged
 from livebode.session.loop_report import LoopReport, loop_report
-from livebode.session.reporting.happenings import Happenings
+from livebode.session.reporting.happenings import EventSummary
 from livebode.session.reporting.parameter_track import Track, tracks
 from livebode.session.said import said
 
@@ -63,7 +63,7 @@ class Material:
     loop: LoopReport | None
     loop_words: str
     tracks: dict[str, Track]
-    happenings: Happenings
+    happenings: EventSummary
     judged: Judged | None = None
 
     @property
@@ -104,7 +104,7 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
-    happenings = Happenings.of(run.each_event())
+    happenings = EventSummary.of(run.each_event())
     return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
 
 
@@ -133,9 +133,9 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
 
 
 def written(path: Path) -> str:
-    """The date of a file, in UTC; nothing where it is not there."""
+    """When a file was written; nothing where it is not there."""
     try:
-        return f"{datetime.fromtimestamp(path.stat().st_mtime, UTC):%Y-%m-%d %H:%M} UTC"
+        return moment(path.stat().st_mtime)
     except OSError:
         return ""
 

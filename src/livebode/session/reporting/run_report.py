@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
+from livebode.nouns.clock import moment
 from livebode.nouns.document import Document, Paragraph, Section
 from livebode.session.reporting import sections
 from livebode.session.reporting.material import Judged, Material, read, written
 from livebode.session.reporting.measured import how
 from livebode.session.reporting.verdict import verdict
-from livebode.session.reporting.wording import duration, seconds
+from livebode.session.reporting.wording import duration
 
 _SECTIONS = (
     how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
@@ -61,12 +62,12 @@ def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
         ("machine", of.title),
         ("sent by", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
         ("run", of.run.path.resolve().name),
-        ("run's clock", f"{seconds(first_s)} … {seconds(last_s)}"),
-        ("begun", seconds(float(begun)) if begun is not None else ""),
+        ("run's clock", f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
+        ("begun", moment(float(begun)) if begun is not None else ""),
         ("duration", duration(of.samples / of.run.lines.rate_hz)),
         ("recording's file", written(Path(log)) if log else ""),
         ("run written", written(of.run.path / "run.json")),
-        ("report made", f"{made.astimezone(UTC):%Y-%m-%d %H:%M} UTC"),
+        ("report made", moment(made.timestamp())),
         ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
     )
     return tuple((name, value) for name, value in rows if value)

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from livebode.margins.words import WORDS
+from livebode.nouns.clock import moment
 from livebode.nouns.document import Listing, Paragraph, Part, Picture, Section, Table
+from livebode.session.reporting.alarms import alarms
 from livebode.session.reporting.material import Material, by_schedule
 from livebode.session.reporting.parameter_track import MARGINS, Track
-from livebode.session.reporting.verdict import alarms_so_far
 from livebode.session.reporting.wording import (
     BOUND_95,
     many,
     pairs,
     polar_rows,
-    seconds,
     share,
     to_toml,
     with_bound,
@@ -79,7 +79,7 @@ def parameters(of: Material) -> Section | str:
         rows.append((name.replace("_", " "), *mean, *late, units.get(name) or (now.unit if now else "")))
     note = "± holds 95 % of noise and of what ε allows the model to lack."
     at = next((n.time_s for n in newest.values()), float("nan"))
-    headings = ("", "of the mean", "±", f"newest, at {seconds(at)}" if newest else "newest", "±", "unit")
+    headings = ("", "of the mean", "±", f"newest, at {moment(at, 2)}" if newest else "newest", "±", "unit")
     if of.fit is not None:
         low, high = of.fit.band_hz
         words = (
@@ -139,7 +139,7 @@ def margins(of: Material) -> Section | str:
 def events(of: Material) -> Section:
     """Alarms and all else that happened."""
     monitoring = of.run.summary.get("monitoring", {})
-    words = monitoring.get("message", alarms_so_far(of))
+    words = alarms(of.run, of.happenings)[0].text
     if monitoring.get("baseline"):
         words += f" Baseline {monitoring['baseline']}, judged by {monitoring.get('judged_by', '—')}; false alarms: "
         words += f"{monitoring.get('false_alarms', '—')}."

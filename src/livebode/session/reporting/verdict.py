@@ -1,74 +1,55 @@
-"""The first page in sentences: what holds, what does not, and what nobody can tell."""
+"""The first page in sentences: alarms, what to check, what is not assessed, and what is OK."""
 
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
 
 from livebode.margins import worst
-from livebode.nouns.document import Finding
+from livebode.nouns.document import Finding, Tone
+from livebode.session.reporting.alarms import alarms
 from livebode.session.reporting.material import Material
 from livebode.session.reporting.parameter_track import MARGINS, failed
 from livebode.session.reporting.wording import many, share
 
-_URGENT = {"bad": 0, "look": 1, "open": 2, "good": 3}
+_URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
 _INVALID_MANY = 0.05
-_STANDING = 5
 _EPSILON_LARGE = 0.1
 # Usual in motion control: below them a loop rings.
 _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
-_TRUSTED = {"passes": "good", "small error": "good", "fails": "bad", "cannot be judged": "open"}
+_TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "check", "cannot be judged": "open"}
 
 
 def verdict(of: Material) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
-    found = [*_alarms(of), *_record(of), *_signals(of), *_valid(of), *_fits(of), *_margins(of), *_validated(of)]
+    found = [
+        *alarms(of.run, of.happenings),
+        *_record(of),
+        *_signals(of),
+        *_valid(of),
+        *_fits(of),
+        *_margins(of),
+        *_validated(of),
+    ]
     return tuple(sorted(found, key=lambda f: _URGENT[f.tone]))
-
-
-def _alarms(of: Material) -> list[Finding]:
-    monitoring: dict[str, Any] = of.run.summary.get("monitoring", {})
-    if not monitoring:
-        return [Finding("open", alarms_so_far(of))]
-    message = monitoring["message"]
-    if monitoring.get("baseline") is None:
-        return [Finding("open", message)]
-    standing = monitoring.get("standing", [])
-    if not monitoring.get("judged_s"):
-        return [Finding("open", message)]
-    if not monitoring.get("changes"):
-        return [Finding("good", message)]
-    sentences = [
-        event.message for event in [*of.happenings.early, *of.happenings.late] if event.kind == "change"
-    ]  # those that stand are among them
-    latest = sentences[-_STANDING:] if standing else []
-    return [Finding("bad" if standing else "look", message), *(Finding("bad", text) for text in latest)]
-
-
-def alarms_so_far(of: Material) -> str:
-    """What is known of changes where run.json does not say it."""
-    if of.run.finished:
-        return "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
-    came, went = of.happenings.count("change"), of.happenings.count("change-cleared")
-    if not came:
-        return "No change was told so far; what a baseline says of the whole run comes with its end."
-    return f"So far {many(came, 'change')} came and {went} cleared."
 
 
 def _record(of: Material) -> list[Finding]:
     found = []
     if not of.run.finished:
         found.append(
-            Finding("look", "The run is not finished: it is still being recorded, or was stopped; this is what it has.")
+            Finding(
+                "check",
+                "The run is not finished: it is still recorded, or it was stopped. The report covers what is there.",
+            )
         )
     found += [
-        Finding("bad", f"The signals do not hold what they should: {event.message}.")
-        for event in (*of.happenings.early, *of.happenings.late)
+        Finding("check", f"The signals are doubtful: {event.message}.")
+        for event in of.happenings.in_full
         if event.kind == "doubtful"
     ]
     lost = of.happenings.count("record-paused")
     if lost:
-        found.append(Finding("look", f"The record paused {lost} times because the disk took nothing."))
+        found.append(Finding("check", f"The record paused {lost} times because the disk was full or failed."))
     return found
 
 
@@ -77,12 +58,12 @@ def _signals(of: Material) -> list[Finding]:
     found = []
     if counts.get("gaps"):
         missing = f", with {many(counts['missing'], 'sample')} missing" if counts.get("missing") else ""
-        found.append(Finding("look", f"The signals have {many(counts['gaps'], 'gap')}{missing}."))
+        found.append(Finding("check", f"The signals have {many(counts['gaps'], 'gap')}{missing}."))
     for key, words in (("non-finite", "Not finite"), ("implausible", "Implausibly large"), ("spike", "Spikes")):
         if counts.get(key):
-            found.append(Finding("look", f"{words}: {many(counts[key], 'sample')} of {of.samples:,}."))
+            found.append(Finding("check", f"{words}: {many(counts[key], 'sample')} of {of.samples:,}."))
     if counts and not found:
-        found.append(Finding("good", "The signals have no gap, no sample that is not finite, and no spike."))
+        found.append(Finding("ok", "The signals have no gap, no sample that is not finite, and no spike."))
     return found
 
 
@@ -90,25 +71,25 @@ def _valid(of: Material) -> list[Finding]:
     bad, every = of.of.incomplete, of.of.count
     text = f"{many(every, 'response')} at {many(len(of.run.lines), 'line')}; {bad:,} of them ({share(bad, every)}) "
     text += "have a line that is not valid (the first window after a start or a gap never is)."
-    found = [Finding("look" if bad > _INVALID_MANY * every else "good", text)]
+    found = [Finding("check" if bad > _INVALID_MANY * every else "ok", text)]
     if never := [f"{f:g} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
-        found.append(Finding("bad", f"Never valid: {', '.join(never[:8])}{' …' * (len(never) > 8)}."))
+        found.append(Finding("check", f"Never valid: {', '.join(never[:8])}{' …' * (len(never) > 8)}."))
     return found
 
 
 def _fits(of: Material) -> list[Finding]:
     if of.fit is None:
-        return [Finding("bad", of.fit_words)] if "fit" in of.configuration else []
+        return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
     lacks = f"it lacks ε = {100 * of.fit.epsilon:.2g} % of |G|"
     rough = of.fit.epsilon > _EPSILON_LARGE
     if rough and of.of.moved:
         lacks += "; the axis moved, and one model of its mean cannot hold: read the fits along the run"
-    found = [Finding("look" if rough else "good", f"The {of.fit.model.name} model fits the run's average: {lacks}.")]
+    found = [Finding("check" if rough else "ok", f"The {of.fit.model.name} model fits the run's average: {lacks}.")]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
             reasons = ", ".join(f"{count:,} {word}" for word, count in why.items())
-            tone = "look" if not_ok > _INVALID_MANY * every else "good"
+            tone = "check" if not_ok > _INVALID_MANY * every else "ok"
             found.append(Finding(tone, f"Of {many(every, 'fit')} along the run {not_ok:,} have no number: {reasons}."))  # type: ignore[arg-type]
     return found
 
@@ -118,7 +99,7 @@ def _margins(of: Material) -> list[Finding]:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
     if not least:
-        return [Finding("bad", f"No margins: {of.loop.margins.status[0]}; check the loop's description and the fit.")]
+        return [Finding("check", f"No margins: {of.loop.margins.status[0]}; check the loop's description and the fit.")]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
     where = f"over {many(len(of.loop.places), 'fit')} along the way" if len(of.loop.places) > 1 else "of the fit"
     sizes = [
@@ -130,11 +111,11 @@ def _margins(of: Material) -> list[Finding]:
             ("Ms", "peak_sensitivity", ""),
         )
     ]
-    return [Finding("look" if small else "good", f"Worst margins {where}: {', '.join(sizes)}.")]
+    return [Finding("check" if small else "ok", f"Worst margins {where}: {', '.join(sizes)}.")]
 
 
 def _validated(of: Material) -> list[Finding]:
     if of.judged is None:
         text = "The model was not judged on fresh data; `livebode report RUN --on FRESH` does it."
         return [Finding("open", text)] if of.fit is not None else []
-    return [Finding(_TRUSTED[v.verdict], f"On {of.judged.on}: {v.sentence}.") for v in of.judged.found]  # type: ignore[arg-type]
+    return [Finding(_TRUSTED[v.verdict], f"On {of.judged.on}: {v.sentence}.") for v in of.judged.found]

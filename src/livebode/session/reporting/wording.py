@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import UTC, datetime
 from math import floor, isfinite, log10
 from typing import Any
 
@@ -13,7 +12,6 @@ import numpy as np
 from livebode.nouns import Response
 from livebode.nouns.document import Table
 
-_CLOCK_FROM_S = 1e8  # seconds since 1970, rather than since the start
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 BOUND_95 = float(np.sqrt(np.log(20.0)))
 """`Response.bound` of this holds with 95 %."""
@@ -34,19 +32,6 @@ def share(part: float, whole: float) -> str:
     """
     percent = 100 * part / whole if whole else 0.0
     return f"{percent:.2g} %" if percent < 10 else f"{percent:.0f} %"
-
-
-def seconds(time_s: float) -> str:
-    """A moment of a run: seconds of its clock, or the date where its clock counts from 1970.
-
-    >>> seconds(12.345678), seconds(1.7e9), seconds(float("nan"))
-    ('12.35 s', '2023-11-14 22:13:20 UTC', '—')
-    """
-    if not isfinite(time_s):
-        return "—"
-    if _CLOCK_FROM_S < time_s < 1e11:
-        return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
-    return f"{time_s:.2f} s"
 
 
 def duration(of_s: float) -> str:
@@ -96,6 +81,14 @@ def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
     if radius >= size:
         return db, "any", deg, "any"
     return db, f"{-decibels(1 - radius / size):.2g}", deg, f"{np.degrees(np.arcsin(radius / size)):.2g}"
+
+
+def signed(number: str) -> str:
+    """
+    >>> signed("0.5"), signed("-0.5"), signed("—")
+    ('+0.5', '-0.5', '—')
+    """
+    return number if number.startswith(("-", "—")) else f"+{number}"
 
 
 def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:

@@ -1,0 +1,38 @@
+"""What the monitoring of a run found, as findings of a verdict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from livebode.nouns.document import Finding, Tone
+from livebode.records import Run
+from livebode.session.reporting.happenings import EventSummary
+from livebode.session.reporting.wording import many
+
+_ACTIVE_MAX = 5
+
+
+def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
+    """The active alarms of a run, or why there are none; the summary first."""
+    monitoring: dict[str, Any] = run.summary.get("monitoring", {})
+    if not monitoring:
+        return (_so_far(run, happenings),)
+    tone: Tone = "open"
+    active = bool(monitoring.get("standing"))
+    if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
+        tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
+    latest = [event for event in happenings.in_full if event.kind == "change"][-_ACTIVE_MAX:] if active else []
+    return (Finding(tone, monitoring["message"]), *(Finding("alarm", event.message) for event in latest))
+
+
+def _so_far(run: Run, happenings: EventSummary) -> Finding:
+    """What is known of changes where run.json does not contain it."""
+    if run.finished:
+        return Finding(
+            "open", "Changes are not assessed without a baseline; `livebode learn` makes one from healthy runs."
+        )
+    came, cleared = happenings.count("change"), happenings.count("change-cleared")
+    if not came:
+        return Finding("open", "No change was reported so far; the verdict on the whole run comes with its end.")
+    message = f"So far {many(came, 'change')} came and {cleared} cleared."
+    return Finding("alarm" if came > cleared else "check", message)
