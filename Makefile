@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy fuzz crash damage soak system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy fuzz crash damage soak attacks system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -82,6 +82,9 @@ crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as o
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak
+
+attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
+	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/fault/test_dashboard_attacks.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from livebode.nouns import Event, InputError
@@ -26,10 +28,12 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
     change by `orders` finishes the run, and another one beside it, NAME-2 and so on, goes on with the very next sample
     of the same source; the outcome is that of the last.
 
+    It waits for a machine that is not switched on yet, and reports that after `timeout_s`.
+
     Raises
     ------
     InputError
-        Where the configuration cannot be, or no samples come.
+        Where the configuration cannot be, the machine refuses, or the run was ended before samples came.
     """
     orders = orders or Orders()
     source = make_source(axis.source)
@@ -37,9 +41,16 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
     position = StreamPosition() if to.force else stream_position(successors.newest(to.directory))
     if position.left_at is not None:
         source.resume(position.left_at)
-    with source.open(), contextlib.ExitStack() as finishing:
+    with source.open(partial(_late, to)), contextlib.ExitStack() as finishing:
         pipeline = Pipeline.live(axis, source)
         return _Succession(source, position, to, orders, finishing).run(pipeline)
+
+
+def _late(to: Destination, why: str) -> None:
+    """Report that a machine has not sent yet; there is no run yet, so the time is that of this computer."""
+    event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
+    to.tell(event)
+    to.audience.write_event(event)
 
 
 class _Succession:

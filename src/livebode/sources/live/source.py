@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -158,11 +159,18 @@ class LiveSource(ABC):
         if remark := pause(position.arrived, ClockReading.at(time.monotonic())).remark:
             self._said.say("computer-clock", remark)
 
-    def open(self) -> Self:
-        """Begin to receive, and wait for the first batch; InputError where none comes within `timeout_s`."""
+    def open(self, late: Callable[[str], None] | None = None) -> Self:
+        """Begin to receive, and wait for the first batch.
+
+        Where none comes within `timeout_s`, InputError; with `late` a sentence is handed to it once, and the wait
+        continues until the machine sends, refuses or the source is stopped.
+        """
         self._thread.start()
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
+            if late is not None and time.monotonic() > until:
+                late(f"{self.address}: no samples came within {self.settings.timeout_s:g} s ({self._trouble})")
+                until = math.inf
             if self._inbox.ended or time.monotonic() > until:
                 asked = self._stop.is_set()
                 self.close()
