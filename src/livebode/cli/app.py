@@ -8,7 +8,6 @@ above stopped from outside.
 from __future__ import annotations
 
 import errno
-import io
 import os
 import signal
 import sys
@@ -30,6 +29,7 @@ from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
 from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
+from livebode.cli.terminal import protect
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
 from livebode.nouns import DamageWarning, InputError
@@ -102,12 +102,9 @@ def _explained(error: Exception) -> tuple[str, int]:
 def _prepare_process() -> None:
     for number in _ENDING:
         signal.signal(number, _end)
+    protect()
     warnings.showwarning = _warn
     warnings.simplefilter("default", DamageWarning)
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal that lacks a letter shows another one, rather than nothing and an error.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
 
 
 def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
