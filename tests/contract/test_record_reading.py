@@ -256,6 +256,10 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     found = ask("SELECT sum(re), count(*) FROM responses WHERE valid")["rows"][0]
     assert found[1] == np.count_nonzero(wanted.valid)
     assert found[0] == pytest.approx(wanted.value[wanted.valid].real.sum())
+    documented = "SELECT frequency_hz, avg(coherence) FROM responses WHERE valid GROUP BY ALL ORDER BY 1"
+    known = wanted.valid & np.isfinite(wanted.coherence)  # the first period has no coherence yet
+    usual = np.mean(wanted.coherence, axis=0, where=known)
+    np.testing.assert_allclose(np.array(ask(documented)["rows"])[:, 1], usual)
     first = ask("FROM responses ORDER BY sample, frequency_hz", "--rows", 2)
     assert (first["more"], len(first["rows"]), first["columns"][0]) == (True, 2, "first")
     assert ask("SELECT count(*) FROM events WHERE kind = 'non-finite'")["rows"] == [[int(held > SAMPLES // 3)]]

@@ -114,10 +114,17 @@ def _show(run: Run, database: Any, asked: set[str]) -> None:
         parts = ([_dataset(files)] if files.paths else []) + [pa.Table.from_batches([rows]) for rows in files.rows]
         for number, part in enumerate(parts):
             database.register(f"_{table}_{number}", part)
-        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts)))
+        columns = "*" if table == "samples" else _nan_as_null(parts[0].schema)
+        united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
     events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
     database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
+
+
+def _nan_as_null(schema: pa.Schema) -> str:
+    """All columns, with null where there is no value, which SQL's averages leave out."""
+    numbers = [field.name for field in schema if pa.types.is_float64(field.type)]
+    return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"
 
 
 def _dataset(files: Files) -> ds.Dataset:
