@@ -122,7 +122,8 @@ def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
         for start in range(0, data.shape[1], 1000)
     ]
     axis = toml.with_name("live.toml")
-    axis.write_text(toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"'))
+    text = toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"')
+    axis.write_text(text.replace("[tracking]\n", "[tracking]\nhop = 20\n"))  # that of a recording by default
     command = [Path(sys.executable).with_name("livebode"), "run", axis, "--baseline", base, "--out", out]
     done = subprocess.run([*map(str, command)], input=b"".join(lines), capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -189,7 +190,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("{", "is not a baseline"),
         ("[]", "is not a baseline"),
         ('{"format": "livebode baseline", "version": 99}', "version 99"),
-        ('{"format": "livebode baseline", "version": 2}', "damaged"),
+        ('{"format": "livebode baseline", "version": 3}', "damaged"),
     ):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=word):

@@ -166,7 +166,8 @@ class LineStage:
         moments = self._moments.update(series, spectra, powers, moment, usable)
         estimate = self._estimate(pair, powers, moments, moving, repeating)
         if s.average:
-            first, moment = moments.first, moments.moment
+            begun = moments.weight > 0  # until then there is no mean, only the window's own moment
+            first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
         # An average goes on through windows that it leaves out.
         seen = rows.whole if s.average else rows.clean
         valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)

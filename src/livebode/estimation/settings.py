@@ -163,7 +163,16 @@ def default_hop(window: int) -> int:
     >>> default_hop(400), default_hop(2500), default_hop(2047)
     (20, 125, 89)
     """
-    wanted = max(1.0, window / 20)
+    return nearest_hop(window, window / 20)
+
+
+def nearest_hop(window: int, wanted: float) -> int:
+    """The divisor of the window nearest to a hop of `wanted` samples (by ratio), so that all hops are equal.
+
+    >>> nearest_hop(400, 200.0), nearest_hop(250, 100.0), nearest_hop(100, 200.0)
+    (200, 125, 100)
+    """
+    wanted = min(max(1.0, wanted), float(window))
     small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
     divisors = small + [window // d for d in small]
     nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))

@@ -123,7 +123,9 @@ class Response:
             import control
         except ImportError:
             raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
-        return control.frd(self.value[self.valid], 2 * np.pi * self.lines.frequency_hz[self.valid])
+        omega = 2 * np.pi * self.lines.frequency_hz[self.valid]
+        # `control.bode_plot` draws no system without a name.
+        return control.frd(self.value[self.valid], omega, name=self.quantity)
 
 
 PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
