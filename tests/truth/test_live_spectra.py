@@ -58,7 +58,7 @@ radius_m = 0.019
 
 
 def layout(hop: int = HOP, **options: Any) -> SpectraLayout:
-    given: dict[str, Any] = {"quiet": LINES.quiet} | options
+    given: dict[str, Any] = {"quiet": (1, *LINES.quiet, 15, 16, 17, 18)} | options
     return SpectraLayout(SIGNALS, (Channel("x", "m"),), LINES.window, hop, LINES.bins, **given)
 
 
