@@ -35,7 +35,7 @@ def _alarms(found: Compared) -> Iterator[Finding]:
     """What the monitoring of either run reported; nothing of a run without a baseline."""
     for run, when in zip(found.runs, ("Before", "After")):
         if run.summary.get("monitoring", {}).get("baseline") is not None:
-            for finding in alarms(run, EventSummary.of(run.each_event())):
+            for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
                 if finding.tone != "ok":
                     yield Finding(finding.tone, f"{when}: {finding.text}")
 
