@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.nouns import InputError, counted
 from livebode.records import to_json
@@ -60,9 +61,8 @@ def design_command(
 
 def _working() -> AbstractContextManager[object]:
     """On a terminal a sign of life: thousands of lines take their time."""
-    from rich.console import Console
 
-    return Console(stderr=True).status("choosing")
+    return terminal.console(stderr=True).status("choosing")
 
 
 def _band(text: str) -> list[float]:
@@ -80,9 +80,8 @@ def _draw(design: Design, path: Path) -> None:
 
 
 def _show(design: Design) -> None:
-    from rich.console import Console
 
-    console = Console(highlight=False, markup=False)
+    console = terminal.console(markup=False)
     table = _table()
     table.add_column("chosen")
     table.add_column("value")

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.nouns import InputError
 from livebode.records import to_json
@@ -17,11 +18,6 @@ if TYPE_CHECKING:
     from livebode.session.inspection import Inspection
 
 _LINES_SHOWN = 24
-
-
-class _Console(Console):
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError  # the entry point knows what to do; Rich would end with 1
 
 
 def inspect_command(
@@ -41,7 +37,7 @@ def inspect_command(
     if as_json:
         print(to_json(found.plain()))
         return
-    console = _Console(highlight=False, markup=False)  # names and units may hold brackets
+    console = terminal.console(markup=False)  # names and units may hold brackets
     _show_recording(found, console)
     if found.excitation is not None:
         _show_excitation(found, console)

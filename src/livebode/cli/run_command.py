@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import AudienceOf, served
@@ -150,10 +151,9 @@ def _window(text: str | None) -> int | str | None:
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
     """One recording, with a bar."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
