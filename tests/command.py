@@ -45,7 +45,7 @@ def livebode(*arguments: object) -> Result:
 
 
 def signals(samples: int = 2000, noise: float = 0.01, seed: int = 0) -> dict[str, np.ndarray]:
-    """A plant of gain 2 behind a sample of delay, driven by lines at 50, 100 and 200 Hz, in the periodic state."""
+    """A plant of gain 2 behind one sample of delay, driven by a multisine at 50, 100 and 200 Hz, in periodic state."""
     rng = np.random.default_rng(seed)
     period = multisine(LINES)
     w = np.resize(period, samples)
