@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies fit-bounds monitoring fuzz crash system-packages lock clean
+.PHONY: help demo test lint bench peers studies fit-bounds monitoring healthy fuzz crash damage system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -57,6 +57,10 @@ fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lac
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
+HEALTHY_RUNS ?= 1000
+healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricity, delay and others (2 h; HEALTHY_RUNS=20: 10 min)
+	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
+
 fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
 	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
 	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
@@ -64,8 +68,13 @@ fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sour
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments
+damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_bit_flips.py
+	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_hostile.py
+
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -s tests/fault/test_live_killed.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

@@ -29,6 +29,18 @@ static lb_play play(double gap, double elongation, double rate) {
     return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
 }
 
+/* Belt that the motor's pulley has moved, its arm, and the belt's speed there. */
+typedef struct {
+    double travel, arm, speed;
+} lb_pulley;
+
+static lb_pulley pulley(const lb_axis_config *c, double phi, double omega) {
+    const double r = c->radius_m, e = c->eccentricity;
+    if (e == 0.0) return (lb_pulley){r * phi, r, r * omega};
+    const double arm = r * (1.0 + e * sin(phi));
+    return (lb_pulley){r * (phi + e * (1.0 - cos(phi))), arm, arm * omega};
+}
+
 static double spots(const lb_axis_config *c, double at) {
     double factor = 1.0;
     for (int i = 0; i < c->spots; ++i) {
@@ -40,35 +52,37 @@ static double spots(const lb_axis_config *c, double at) {
 }
 
 static void two_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
-    const double r = c->radius_m, at = c->frozen ? c->frozen_position_m : s[2];
+    const double at = c->frozen ? c->frozen_position_m : s[2];
+    const lb_pulley m = pulley(c, s[0], s[1]);
     const double shape = 1.0 / at + 1.0 / (2.0 * c->pulley_distance_m - at);
     const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at) * shape;
     const double b = c->damping_shape * now[LB_AXIS_DAMPING] * sqrt(shape);
-    const lb_play p = play(now[LB_AXIS_GAP], r * s[0] - s[2], r * s[1] - s[3]);
+    const lb_play p = play(now[LB_AXIS_GAP], m.travel - s[2], m.speed - s[3]);
     const double force = k * p.slack + b * p.rate;
     d[0] = s[1];
-    d[1] = (torque - r * force) / c->motor_inertia_kg_m2;
+    d[1] = (torque - m.arm * force) / c->motor_inertia_kg_m2;
     d[2] = s[3];
     d[3] = force;
 }
 
 static void three_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
     const double r = c->radius_m, at = c->frozen ? c->frozen_position_m : s[4], l3 = c->pulley_distance_m;
+    const lb_pulley m = pulley(c, s[0], s[1]);
     const double s1 = 1.0 / at, s2 = 1.0 / (l3 - at), s3 = 1.0 / l3;
     const double shape = s1 + 1.0 / (2.0 * l3 - at);
     const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at);
     const double b = c->damping_shape * now[LB_AXIS_DAMPING] / sqrt(shape);
     /* The belt where it holds the cart: the cart itself, or within the play where the spans alone would have it. */
-    const double free = (s1 * (r * s[0]) + s2 * (r * s[2])) / (s1 + s2);
-    const double free_rate = (s1 * (r * s[1]) + s2 * (r * s[3])) / (s1 + s2);
+    const double free = (s1 * m.travel + s2 * (r * s[2])) / (s1 + s2);
+    const double free_rate = (s1 * m.speed + s2 * (r * s[3])) / (s1 + s2);
     const lb_play p = play(now[LB_AXIS_GAP], free - s[4], free_rate - s[5]);
     const double x = now[LB_AXIS_GAP] == 0.0 ? s[4] : free - p.slack;
     const double v = now[LB_AXIS_GAP] == 0.0 ? s[5] : free_rate - p.rate;
-    const double f1 = s1 * (k * (r * s[0] - x) + b * (r * s[1] - v));
+    const double f1 = s1 * (k * (m.travel - x) + b * (m.speed - v));
     const double f2 = s2 * (k * (x - r * s[2]) + b * (v - r * s[3]));
-    const double f3 = s3 * (k * (r * (s[2] - s[0])) + b * (r * (s[3] - s[1])));
+    const double f3 = s3 * (k * (r * s[2] - m.travel) + b * (r * s[3] - m.speed));
     d[0] = s[1];
-    d[1] = (torque - r * f1 + r * f3) / c->motor_inertia_kg_m2;
+    d[1] = (torque - m.arm * f1 + m.arm * f3) / c->motor_inertia_kg_m2;
     d[2] = s[3];
     d[3] = r * (f2 - f3) / c->pulley_inertia_kg_m2;
     d[4] = s[5];
@@ -77,15 +91,17 @@ static void three_masses(const lb_axis_config *c, const double *now, double torq
 
 void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
     const double omega = s[1], v = s[c->states - 1], vs = c->stribeck_speed_m_per_s, w = c->smoothing_m_per_s;
-    double drive = torque - c->motor_viscous_n_m_s * omega -
-                   friction(c->motor_coulomb_n_m, c->motor_stribeck_n_m, vs, w, c->radius_m * omega);
+    const double share = now[LB_AXIS_FRICTION];
+    double drive = torque + now[LB_AXIS_DISTURBANCE] -
+                   share * (c->motor_viscous_n_m_s * omega +
+                            friction(c->motor_coulomb_n_m, c->motor_stribeck_n_m, vs, w, c->radius_m * omega));
     if (c->torque_ripple_n_m != 0.0) drive += c->torque_ripple_n_m * sin(c->torque_ripple_per_turn * s[0]);
     if (c->states == 4)
         two_masses(c, now, drive, s, d);
     else
         three_masses(c, now, drive, s, d);
     const double resisting =
-        c->load_viscous_n_s_per_m * v + friction(c->load_coulomb_n, c->load_stribeck_n, vs, w, v);
+        share * (c->load_viscous_n_s_per_m * v + friction(c->load_coulomb_n, c->load_stribeck_n, vs, w, v));
     d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
 }
 
@@ -150,7 +166,7 @@ void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *sta
     memset(state, 0, sizeof *state);
     state->plant[0] = position_m / c->radius_m;
     if (c->states == 6) state->plant[2] = position_m / c->radius_m;
-    state->plant[c->states - 2] = position_m;
+    state->plant[c->states - 2] = pulley(c, state->plant[0], 0.0).travel;
     state->angle = state->plant[0];
     state->reading =
         c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad : state->angle;

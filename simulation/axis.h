@@ -1,5 +1,5 @@
 /* The belt drive under its cascade, tick by tick. C99; memory belongs to the caller; nothing but libm's sqrt, floor, fabs
- * and (for torque ripple alone) sin. The readable definition is src/livebode/simulation/twin.py; same order of operations,
+ * and (for torque ripple and an eccentric pulley alone) sin and cos. The readable definition is src/livebode/simulation/twin.py; same order of operations,
  * same bits. */
 #ifndef LB_AXIS_H
 #define LB_AXIS_H
@@ -10,7 +10,7 @@
 #define LB_AXIS_STATES 6      /* of three masses; two have 4 */
 #define LB_AXIS_DELAY_MAX 64  /* ticks */
 #define LB_AXIS_SPOTS_MAX 16
-#define LB_AXIS_INPUTS 8
+#define LB_AXIS_INPUTS 10
 #define LB_AXIS_SIGNALS 3
 
 typedef struct {
@@ -21,6 +21,7 @@ typedef struct {
 typedef struct {
     int states; /* 4: two masses (phi, omega, x, v); 6: three masses (phi1, omega1, phi2, omega2, x, v) */
     double motor_inertia_kg_m2, pulley_inertia_kg_m2, radius_m;
+    double eccentricity; /* the motor's pulley has the radius radius_m * (1 + eccentricity * sin(phi)) */
     double specific_stiffness_n, pulley_distance_m;
     double damping_shape; /* bs = damping_shape * sqrt(1/l1 + 1/(l2 + l3)) */
     int frozen;           /* the spans are those of frozen_position_m wherever the cart is */
@@ -58,7 +59,9 @@ enum {
     LB_AXIS_STIFFNESS,          /* factor on every span */
     LB_AXIS_DAMPING,            /* factor on every span */
     LB_AXIS_LOAD,               /* kg */
-    LB_AXIS_GAP                 /* m */
+    LB_AXIS_GAP,                /* m */
+    LB_AXIS_FRICTION,           /* factor on all friction */
+    LB_AXIS_DISTURBANCE         /* N m on the motor's shaft, not in the logged torque */
 };
 
 /* At rest with the cart at position_m. */

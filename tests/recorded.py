@@ -34,12 +34,13 @@ def data(samples: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Machine:
-    """The same samples each time; `samples` says what the source knows of its end."""
+    """The same samples each time, numbered from `first` on; `samples` says what the source knows of its end."""
 
     data: np.ndarray
     samples: int | None = None
     block_samples: int = 170
     each: Callable[[int], None] = lambda _: None
+    first: int = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -49,7 +50,8 @@ class Machine:
         rows = [NAMES.index(name) for name in channels]
         for start in range(0, self.data.shape[1], self.block_samples):
             self.each(start)
-            yield Block(self.data[rows, start : start + self.block_samples], tuple(channels), RATE_HZ, start=start)
+            piece = self.data[rows, start : start + self.block_samples]
+            yield Block(piece, tuple(channels), RATE_HZ, start=self.first + start)
 
 
 def machine(samples: int, each: Callable[[int], None] = lambda _: None) -> Machine:

@@ -17,6 +17,7 @@ from livebode.simulation import (
     Drive,
     Fault,
     Friction,
+    FrictionChange,
     Limits,
     LoadChange,
     Mechanics,
@@ -151,6 +152,28 @@ def test_torque_ripple_turns_with_the_motor() -> None:
     difference = np.abs(np.fft.rfft((rippled - smooth) * np.hanning(rippled.size)))
     strongest_hz = np.argmax(difference) * RATE_HZ / rippled.size
     assert strongest_hz == pytest.approx(24 * 0.38 / 0.019 / (2 * np.pi), abs=2 * RATE_HZ / rippled.size)
+
+
+def test_an_eccentric_pulley_moves_the_cart_off_by_its_share_of_the_radius() -> None:
+    """x − r·φ goes through one turn of ±1 % of the radius; the belt gives by less than a tenth of that."""
+    block = cruise(mechanics=Mechanics(eccentricity=0.01))
+    off = block["x"] - 0.019 * block["position"]
+    assert np.ptp(off) == pytest.approx(2 * 0.01 * 0.019, rel=0.1)
+    assert off == pytest.approx(0.01 * 0.019 * (1 - np.cos(block["position"])), abs=4e-5)
+
+
+def test_friction_and_torque_noise_act_behind_the_logged_torque() -> None:
+    """Viscous friction that falls to half takes half of the torque; noise of 0.1 N m moves a free motor."""
+    drag, half = (
+        np.mean(cruise(friction=Friction(motor_viscous_n_m_s=0.05), faults=faults)["u"][-2000:])
+        for faults in ((), (FrictionChange(factor=0.5),))
+    )
+    assert half / drag == pytest.approx(0.5, rel=0.02)
+    open_loop = Drive(velocity_gain_n_m_s=0.0, position_gain_per_s=0.0, torque_noise_n_m=0.1)
+    block, _ = SimulatedAxis(BeltAxis(drive=open_loop, seconds=1.0)).run()
+    assert not np.any(block["u"])
+    steps = np.diff(block["velocity"]) * 4000 * 0.0028
+    assert np.std(steps) == pytest.approx(0.1, rel=0.1)
 
 
 def test_the_encoder_counts_and_its_velocity_carries_the_steps() -> None:

@@ -20,8 +20,9 @@ int main(void) {
         lb_axis_config c = {
             .states = states, .motor_inertia_kg_m2 = 0.0028, .pulley_inertia_kg_m2 = 1.8e-4, .radius_m = 0.019,
             .specific_stiffness_n = 3.25e5, .pulley_distance_m = 2.14, .damping_shape = 105, .spots = 1,
-            .motor_coulomb_n_m = 0.1, .load_coulomb_n = 15, .load_stribeck_n = 5, .stribeck_speed_m_per_s = 0.05,
-            .smoothing_m_per_s = 0.01, .torque_ripple_n_m = 0.1, .torque_ripple_per_turn = 24, .rate_hz = 4000,
+            .motor_coulomb_n_m = 0.1, .eccentricity = 0.01, .load_coulomb_n = 15, .load_stribeck_n = 5,
+            .stribeck_speed_m_per_s = 0.05, .smoothing_m_per_s = 0.01,
+            .torque_ripple_n_m = 0.1, .torque_ripple_per_turn = 24, .rate_hz = 4000,
             .substeps = 4, .velocity_ticks = 1, .position_ticks = 2, .delay_ticks = LB_AXIS_DELAY_MAX,
             .velocity_gain_n_m_s = 0.01, .integral_step = 1e-3, .position_gain_per_s = 0.1, .torque_n_m_max = 5,
             .encoder_step_rad = 1e-4, .position_m_min = 0.15, .position_m_max = 1.85};
@@ -32,6 +33,7 @@ int main(void) {
             input[LB_AXIS_EXCITATION * TICKS + n] = sin(0.1 * n);
             input[LB_AXIS_POSITION_REFERENCE * TICKS + n] = 0.8 / 0.019;
             input[LB_AXIS_STIFFNESS * TICKS + n] = input[LB_AXIS_DAMPING * TICKS + n] = 1;
+            input[LB_AXIS_FRICTION * TICKS + n] = 1;
             input[LB_AXIS_LOAD * TICKS + n] = n < 1500 ? 6.7 : NAN;
             input[LB_AXIS_GAP * TICKS + n] = 1e-4;
         }

@@ -122,7 +122,7 @@ def test_the_linearisation_is_the_derivative_of_the_simulated_motion(masses: int
         mechanics=Mechanics(masses=masses), friction=Friction(motor_viscous_n_m_s=0.01, load_viscous_n_s_per_m=20)
     )
     engine, plant = Engine(engine_settings(axis), x), axis.linear(x)
-    now, rest, step = [0, 0, 0, 0, 1, 1, 6.7, 0], np.array(engine.plant), 1e-6
+    now, rest, step = [0, 0, 0, 0, 1, 1, 6.7, 0, 1, 0], np.array(engine.plant), 1e-6
     for i, unit in enumerate(np.eye(len(rest))):
         ahead, behind = (engine.derivative(now, 0.0, list(rest + sign * step * unit)) for sign in (1, -1))
         slope = (np.array(ahead) - np.array(behind)) / (2 * step)

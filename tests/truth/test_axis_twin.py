@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from livebode.simulation import (
     DampingGrowth,
     Drive,
     Friction,
+    FrictionChange,
     LoadChange,
     Mechanics,
     Sensor,
@@ -31,11 +33,12 @@ ROOT = Path(__file__).parents[2]
 EVERYTHING = {
     "friction": Friction(motor_coulomb_n_m=0.1, motor_viscous_n_m_s=1e-3, motor_stribeck_n_m=0.05, load_coulomb_n=15,
                          load_viscous_n_s_per_m=4, load_stribeck_n=5),
-    "drive": Drive(delay_ticks=2, torque_n_m_max=4.0, torque_ripple_n_m=0.2),
+    "drive": Drive(delay_ticks=2, torque_n_m_max=4.0, torque_ripple_n_m=0.2, torque_noise_n_m=0.1),
     "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 16),
     "faults": (TensionLoss(start_s=0.02, loss=0.1), LoadChange(start_s=0.01, ramp_s=0.05, load_kg=1.0),
                DampingGrowth(start_s=0.03, factor=1.5), Backlash(start_s=0.04, ramp_s=0.02, gap_m=1e-4),
-               SoftSpot(position_m=0.5, width_m=0.1, loss=0.2)),
+               SoftSpot(position_m=0.5, width_m=0.1, loss=0.2), FrictionChange(start_s=0.02, factor=0.6)),
+    "mechanics": Mechanics(eccentricity=0.01),
 }  # fmt: skip
 
 
@@ -48,8 +51,8 @@ EVERYTHING = {
 )  # fmt: skip
 def test_c_and_python_give_the_same_bits(masses: int, options: dict) -> None:
     axis = BeltAxis(
-        mechanics=Mechanics(masses=masses), motion=fast_stroke(dwell_s=0.01), excitation_n_m=MULTISINE, seconds=0.1,
-        seed=3, **options,
+        motion=fast_stroke(dwell_s=0.01), excitation_n_m=MULTISINE, seconds=0.1, seed=3,
+        **(options | {"mechanics": replace(options.get("mechanics", Mechanics()), masses=masses)}),
     )  # fmt: skip
     block, truth = SimulatedAxis(axis).run()
     settings = engine_settings(axis)
@@ -57,10 +60,11 @@ def test_c_and_python_give_the_same_bits(masses: int, options: dict) -> None:
     controller = Controller(settings, plant.read()[0])
     noise = axis.sensor.noise_rad_per_s * np.random.default_rng(axis.seed).standard_normal(len(block))
     given = [block[name] for name in ("position_reference", "velocity_reference", "w")] + [noise]
-    conditions = [getattr(truth.condition, name) for name in ("stiffness", "damping", "load_kg", "gap_m")]
+    conditions = [getattr(truth.condition, name) for name in ("stiffness", "damping", "load_kg", "gap_m", "friction")]
+    noise_n_m = axis.drive.torque_noise_n_m * np.random.default_rng([axis.seed, 2]).standard_normal(len(block))
     for n in range(len(block)):
         assert plant.state == truth.states[:, n].tolist(), n
-        now = Now(*(float(row[n]) for row in (*given, *conditions)))
+        now = Now(*(float(row[n]) for row in (*given, *conditions, noise_n_m)))
         torque, velocity, reading = controller.tick(*plant.read()[:2], now)
         assert (torque, velocity, reading) == (block["u"][n], block["velocity"][n], block["position"][n]), n
         plant.step(torque, now)

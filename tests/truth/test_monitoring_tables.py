@@ -66,6 +66,38 @@ def test_the_line_that_changed_is_named(what: str) -> None:
     assert not watcher.standing
 
 
+def stepped(seed: int) -> Rows:
+    """A change of −26 % at row 100, which the rows behind it take for noise: their variance says 400 times as much."""
+    factor = np.ones((200, 3))
+    factor[100:, 1] = 0.74
+    rows = made(200, seed, factor=factor)
+    variance = rows.variance.copy()
+    variance[100:130] *= 400.0
+    return Rows(**(vars(rows) | {"variance": variance}))
+
+
+def test_an_amount_is_right_while_the_step_is_in_the_rows_own_scatter() -> None:
+    """Thirty steps: 95 % of the bounds cover the truth (24 of 30 is 4 sigma below), dates are right to two windows."""
+    table, covered = learn_table("lines", NAMES, [made(6000, 1)]), 0
+    for seed in range(30):
+        watcher = TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1)
+        event = next(e for e in watcher.process(stepped(100 + seed)) if e.kind == "change")
+        change = next(c for c in event.details["changes"] if c["name"] == "60 Hz" and c["of"] == "magnitude")
+        covered += abs(change["amount"] + 26.0) <= change["bound"]
+        assert abs(event.details["since_s"] - 10.0) <= 0.2
+        assert event.time_s < 13.0
+    assert covered >= 24
+
+
+def test_a_large_change_of_magnitude_and_phase_is_told_as_such() -> None:
+    factor = np.ones((300, 3), dtype=complex)
+    factor[100:, 0] = 1.5 * np.exp(0.7j)
+    events = monitor().process(made(300, 40, factor=factor))
+    amounts = {c["of"]: c for c in events[0].details["changes"] if c["name"] == "20 Hz"}
+    assert amounts["magnitude"]["amount"] == pytest.approx(50.0, abs=2 * amounts["magnitude"]["bound"])
+    assert amounts["phase"]["amount"] == pytest.approx(np.degrees(0.7), abs=2 * amounts["phase"]["bound"])
+
+
 def test_louder_noise_is_no_change() -> None:
     assert monitor().process(made(5000, 5, louder=4.0)) == []
 

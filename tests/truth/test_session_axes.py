@@ -146,7 +146,10 @@ def test_numbers_of_the_source_go_on_with_its_events(tmp_path: Path) -> None:
     number = numbers(running.out / "x")
     connected = [event for event in events(running.out / "x") if event.kind == "connected"]
     assert connected[0].sample == 0
-    assert connected[1].sample == number[held] > held
-    assert connected[1].time_s == pytest.approx(number[held] / 1000)
+    assert connected[1].sample == held
+    assert connected[1].time_s == pytest.approx(held / 1000)
+    # What was sent while nobody was connected is missing, by the sender's own numbers.
+    (loss,) = [event for event in events(running.out / "x") if event.kind == "loss"]
+    assert (loss.sample, loss.details["missing_samples"]) == (number[held], number[held] - held)
     assert np.array_equal(np.diff(number[held:]), np.ones(number.size - held - 1))
     assert said(running.out / "x")["counts"]["gaps"] == 1

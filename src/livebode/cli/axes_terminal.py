@@ -8,11 +8,11 @@ import traceback
 from collections.abc import Mapping
 from typing import Any
 
-from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from livebode.cli.terminal import console
 from livebode.nouns import Event, InputError
 from livebode.session import Session, StoppedError
 from livebode.session.axis_thread import AxisThread
@@ -27,7 +27,7 @@ class AxesTerminal:
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
-        self._console = Console(stderr=True, highlight=False)
+        self._console = console(stderr=True)
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
         self._shown: dict[AxisThread, str] = {}
         self._looks = 0

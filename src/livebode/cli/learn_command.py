@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.nouns import InputError
 from livebode.records import to_json
@@ -14,6 +15,7 @@ from livebode.records import to_json
 if TYPE_CHECKING:
     from livebode.monitoring import Baseline
 
+_LATE_SAMPLES = 0.05  # less is not worth a sentence
 _MACHINE = ("stiffness", "load", "damping", "inertia")
 
 
@@ -24,13 +26,12 @@ def learn_command(
     as_json: Json = False,
 ) -> None:
     """Learn what the healthy machine is like, for `livebode run --baseline`."""
-    from rich.console import Console
 
     from livebode.session.learning import learn  # with the simulation
 
     if out.exists() and not force:
         raise InputError(f"{str(out)!r} exists already; take another --out, or --force to replace it")
-    console = Console(stderr=True, highlight=False)
+    console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
         baseline = learn(runs, say=status.update)
     baseline.save(out)
@@ -63,6 +64,9 @@ def _found(baseline: Baseline) -> dict[str, Any]:
             "to": machine.model.high_m,
             "slowest": machine.slowest_m_per_s,
             "fastest": machine.fastest_m_per_s,
+            "ripple_cycles_per_m": machine.ripple.cycles_per_m.round(2).tolist(),
+            "ripple_n_m": (2**0.5 * machine.ripple.amplitude_n_m).round(6).tolist(),
+            "delay_samples": round(machine.delay_s * baseline.lines.rate_hz, 3),
             "changes_from_percent": dict(zip(_MACHINE, (100 * machine.held.smallest).round(2).tolist())),
         }
     return found
@@ -83,8 +87,20 @@ def _sentences(found: dict[str, Any]) -> str:
     way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
         f"{text}\nThe model of the machine knows the way {way} at speeds {speeds} a second, and is good for changes "
-        f"from: {changes}."
+        f"from: {changes}.{_ripple(model)}"
     )
+
+
+def _ripple(model: dict[str, Any]) -> str:
+    """What the model has beyond two masses, where there is any."""
+    text, late = "", model["delay_samples"]
+    if model["ripple_n_m"]:
+        pairs = zip(model["ripple_cycles_per_m"], model["ripple_n_m"])
+        orders = ", ".join(f"{torque:.2g} N m at {order:.4g} cycles" for order, torque in pairs)
+        text += f"\nTorque ripple over the position: {orders} a metre. It is allowed for."
+    if abs(late) >= _LATE_SAMPLES:
+        text += f"\nThe output is {late:.2f} samples late behind the torque. The model has this delay."
+    return text
 
 
 def _coarse(found: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import Any
 
+from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.fitting import Fit
 from livebode.nouns import Model, Responses
 from livebode.session import Draw, Outcome
@@ -35,12 +36,12 @@ def show(outcome: Outcome) -> None:
     from livebode.report import terminal_bode
 
     size = get_terminal_size((100, 30))
-    print(
+    print_drawn(
         terminal_bode(
             outcome.responses,
             width=min(size.columns, 140),
             height=max(16, min(size.lines - 4, 36)),
-            colour=sys.stdout.isatty() and "NO_COLOR" not in os.environ,
+            colour=is_terminal() and "NO_COLOR" not in os.environ,
             unicode="utf" in (sys.stdout.encoding or "").lower(),
         )
     )

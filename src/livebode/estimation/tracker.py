@@ -72,6 +72,10 @@ class Tracker(AroundLines[Watch]):
     def _identity(self) -> str:
         return self.settings.identity
 
+    def know_spikes(self, samples: NDArray[np.int64]) -> None:
+        """Numbers of samples to leave out as spikes besides those that are found; nothing where none are watched."""
+        self._spectra.known_spikes = samples
+
     def process(self, block: Block) -> Responses:
         """Responses at the hops of this Block, which follows the one before.
 

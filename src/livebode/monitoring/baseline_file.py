@@ -16,12 +16,13 @@ from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.baseline import ROLES, Baseline
 from livebode.monitoring.baseline_part import Part
 from livebode.monitoring.machine import Machine
+from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.table import Table
 from livebode.motion import Curve, MovingModel
 from livebode.nouns import InputError, Lines
 
 _FORMAT = "livebode baseline"
-_VERSION = 2
+_VERSION = 3
 
 
 def save(baseline: Baseline, path: Path) -> None:
@@ -131,6 +132,8 @@ def _machine_plain(machine: Machine) -> dict[str, Any]:
         "slowest_m_per_s": machine.slowest_m_per_s,
         "fastest_m_per_s": machine.fastest_m_per_s,
         "windows": machine.windows.tolist(),
+        "delay_s": machine.delay_s,
+        "ripple": {name: _list(getattr(machine.ripple, name)) for name in Ripple.__dataclass_fields__},
     }
 
 
@@ -153,7 +156,16 @@ def _machine(data: Part, lines: Lines) -> Machine:
         data.number("slowest_m_per_s"),
         data.number("fastest_m_per_s"),
         data.array("windows", 1, least=0).astype(np.int64),
+        _ripple(data.part("ripple")),
+        data.number("delay_s"),
     )
+
+
+def _ripple(data: Part) -> Ripple:
+    ripple = Ripple(*(data.array(name, 1, least=0) for name in Ripple.__dataclass_fields__))
+    if ripple.cycles_per_m.size != ripple.amplitude_n_m.size:
+        raise data.wrong("amplitude_n_m", f"not {ripple.cycles_per_m.size} numbers")
+    return ripple
 
 
 def _table_plain(table: Table) -> dict[str, Any]:

@@ -32,6 +32,14 @@ class Evidence:
         Newest sample of the window.
     status
         "judged", or why not.
+    late_score, late_information
+        Of the velocity's delay, s, which is learned and then held: (rows,), and with each direction and itself,
+        (rows, directions + 1).
+    ripple_score, ripple_information
+        ⟨ψ, e⟩ and ⟨ψ, ψ⟩ of cosine and sine of each order of the ripple at 1 N m, (rows, 2·orders),
+        (rows, 2·orders, 2·orders). Score and information above are with the ripple allowed for.
+    ripple_gain
+        Power of an order of 1 N m at the lines, (rows, orders, lines).
     """
 
     score: Floats
@@ -43,6 +51,11 @@ class Evidence:
     time_s: Floats
     sample: NDArray[np.int64]
     status: NDArray[np.str_]
+    late_score: Floats
+    late_information: Floats
+    ripple_score: Floats
+    ripple_information: Floats
+    ripple_gain: Floats
 
     def __len__(self) -> int:
         return len(self.sample)

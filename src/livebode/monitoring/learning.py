@@ -14,6 +14,8 @@ from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine, cells
 from livebode.monitoring.model_evidence import ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
+from livebode.monitoring.order_search import find_orders
+from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
 from livebode.motion import Curve, MovingModel
@@ -26,6 +28,8 @@ Run = Callable[[], Iterable[Block]]
 """Every call gives the samples of a run again, from the first."""
 
 _PASSES = 5
+_MATTERS = 0.1  # of the noise: a smaller ripple changes no window
+_SEARCHES = 2  # for orders of a ripple: the second after a fit that allows for the first ones
 _CONVERGED = 1e-5
 _SPLINES = 12, 6  # of ln Keff(x), ln bs(x)
 _FLAT_M = 1e-2  # a way shorter than that has no curves
@@ -70,13 +74,42 @@ def learn_machine(
         fastest_m_per_s=fastest,
         windows=cells(rows.position_m, low, high),
     )
-    for _ in range(_PASSES):
-        seen = Evidence.join([_seen(run, machine, lines, names) for run in runs])
-        step = _step(seen, machine.model)
-        machine = replace(machine, model=_moved(machine.model, step), noise_power=seen.power.mean(axis=0))
+    machine = _fitted(runs, machine, lines, names, passes=2)
+    for _ in range(_SEARCHES):
+        orders = find_orders((run() for run in runs), machine, lines, names)
+        if set(orders) == set(machine.ripple.cycles_per_m):
+            break
+        machine = replace(machine, ripple=Ripple.of(orders))
+        machine = _with_noise(machine, _all_seen(runs, machine, lines, names))
+        machine = _fitted(runs, machine, lines, names, passes=2)
+    machine = _fitted(runs, machine, lines, names)
+    return _judged(_all_seen(runs, machine, lines, names), machine)
+
+
+def _fitted(
+    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, str, str], passes: int = _PASSES
+) -> Machine:
+    """The model, noise and ripple that all runs share (Gauss–Newton on the output's error)."""
+    for _ in range(passes):
+        seen = _all_seen(runs, machine, lines, names)
+        machine = _with_noise(machine, seen)
+        step = _step(seen, machine.model, lines.rate_hz)
+        model, late_s = _moved(machine.model, step[:-1]), float(step[-1]) / lines.rate_hz
+        machine = replace(machine, model=model, delay_s=machine.delay_s + late_s)
         if np.max(np.abs(step)) < _CONVERGED:
             break
-    return _judged(Evidence.join([_seen(run, machine, lines, names) for run in runs]), machine)
+    return machine
+
+
+def _with_noise(machine: Machine, seen: Evidence) -> Machine:
+    """With the noise that these windows show, and the size of the ripple."""
+    if not len(machine.ripple):
+        return replace(machine, noise_power=seen.power.mean(axis=0))
+    ripple = Ripple(machine.ripple.cycles_per_m, amplitudes(seen.ripple_score, seen.ripple_information))
+    noise = noise_power(seen.power, seen.ripple_gain, ripple)
+    seen_most = np.einsum("woo->wo", seen.ripple_information).max(axis=0)
+    matters = (ripple.spread**2 * seen_most).reshape(-1, 2).max(axis=1) > _MATTERS
+    return replace(machine, ripple=ripple.only(matters), noise_power=noise)
 
 
 def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> tuple[Rows, Floats]:
@@ -108,6 +141,10 @@ def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> 
             yield u[cut[use]] @ transform, y[cut[use]] @ transform, centre[use], speed[use]
 
 
+def _all_seen(runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, str, str]) -> Evidence:
+    return Evidence.join([_seen(run, machine, lines, names) for run in runs])
+
+
 def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, str, str]) -> Evidence:
     """What the model leaves of a run, judged windows alone."""
     source, stretches, offset = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz), Offset()
@@ -129,17 +166,25 @@ def _design(model: MovingModel, position_m: Floats) -> Floats:
     return design
 
 
-def _step(seen: Evidence, model: MovingModel) -> Floats:
+def _step(seen: Evidence, model: MovingModel, rate_hz: float) -> Floats:
+    """Of the model's unknowns, and of the delay in samples."""
     design = _design(model, seen.position_m)
-    gradient = np.einsum("rju,rj->u", design, seen.score)
-    matrix = np.einsum("rju,rjk,rkv->uv", design, seen.information, design, optimize=True)
+    gradient = np.append(np.einsum("rju,rj->u", design, seen.score), seen.late_score.sum() / rate_hz)
+    matrix = np.zeros((gradient.size, gradient.size))
+    matrix[:-1, :-1] = np.einsum("rju,rjk,rkv->uv", design, seen.information, design, optimize=True)
+    matrix[-1, :-1] = np.einsum("rju,rj->u", design, seen.late_information[:, :-1]) / rate_hz
+    matrix[:-1, -1] = matrix[-1, :-1]
+    matrix[-1, -1] = seen.late_information[:, -1].sum() / rate_hz**2
     k = len(model.log_stiffness.weights)
-    unknowns = np.concatenate([np.zeros(2), model.log_stiffness.weights, model.log_damping.weights])
+    unknowns = np.concatenate([np.zeros(2), model.log_stiffness.weights, model.log_damping.weights, np.zeros(1)])
     pull = np.zeros_like(matrix)
-    for part in (slice(2, 2 + k), slice(2 + k, None)):
+    for part in (slice(2, 2 + k), slice(2 + k, -1)):
         differences = np.diff(np.eye(unknowns[part].size), n=3, axis=0)
         pull[part, part] = _SMOOTH * np.trace(matrix[part, part]) / unknowns[part].size * differences.T @ differences
-    return np.linalg.solve(matrix + pull, gradient - pull @ unknowns).clip(-0.2, 0.2)
+    step = np.linalg.solve(matrix + pull, gradient - pull @ unknowns)
+    step[:-1] = step[:-1].clip(-0.2, 0.2)
+    step[-1] = step[-1].clip(-1.0, 1.0)
+    return np.asarray(step)
 
 
 def _moved(model: MovingModel, step: Floats) -> MovingModel:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.ripple import Ripple
 from livebode.motion import MovingModel
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,10 @@ class Machine:
         Speeds that were learned.
     windows
         How many windows were learned in each of 28 cells of the way.
+    ripple
+        Torque that repeats with the motor's angle, as it was found.
+    delay_s
+        Of the measured velocity behind the torque, beyond what two masses behind a zero-order hold have.
     """
 
     model: MovingModel
@@ -43,6 +48,8 @@ class Machine:
     slowest_m_per_s: float
     fastest_m_per_s: float
     windows: NDArray[np.int64]
+    ripple: Ripple = field(default_factory=Ripple)
+    delay_s: float = 0.0
 
     @property
     def way_m(self) -> float:

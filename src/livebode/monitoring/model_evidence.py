@@ -9,8 +9,10 @@ from livebode.monitoring import evidence as word
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.offset import Offset
-from livebode.monitoring.sensitivity import Replay
+from livebode.monitoring.ripple import allowed_for
+from livebode.monitoring.sensitivity import DIRECTIONS, Replay
 from livebode.monitoring.stretches import LEAD_S, Stretch
+from livebode.motion.orders import shaft_position
 from livebode.motion.replay import without_drift
 from livebode.nouns import Lines
 
@@ -18,6 +20,7 @@ Floats = NDArray[np.float64]
 
 _UNEVEN = 0.1  # of a window's travel, against the window before it
 _SPEED_MARGIN = 0.1
+_OWN = len(DIRECTIONS)
 _LEVEL_MEMORY = 0.9  # per window, of the noise's level
 _LEVEL_RISE_MAX = 4.0
 _DISTURBED = 20.0  # the mean of six quiet bins is that much above its own level once in 1e40 windows
@@ -35,12 +38,13 @@ class ModelEvidence:
     Without a change E is the sensor's noise alone, so windows that do not overlap are independent. P is the
     baseline's, or higher by as much as the quiet bins have become louder.
 
-    With an Offset, E is what is left once the model is changed by it.
+    With an Offset, E is what is left once the model is changed by it. A ripple of the Machine is allowed for,
+    whatever its phase (see `ripple.allowed_for`).
     """
 
     def __init__(self, machine: Machine, lines: Lines) -> None:
         self._machine, self._lines = machine, lines
-        self._replay = Replay(machine.model, lines.rate_hz)
+        self._replay = Replay(machine.model, lines.rate_hz, machine.delay_s)
         self.level = 1.0
         """How much louder than when it was learned the noise is, at least 1."""
 
@@ -61,9 +65,20 @@ class ModelEvidence:
         level = self._levels(quiet, status)
         weight = 2 / (machine.noise_power * level[:, np.newaxis])
         e = unexplained[:, : len(lines)]
+        known = np.einsum("jwl,kwl,wl->wjk", slope.conj(), slope, weight).real
+        ripple = self._ripple(x, y)[:, cut] @ wave(lines.bins, lines.window)
+        ripple_score = np.einsum("owl,wl,wl->wo", ripple.conj(), e, weight).real
+        gram = np.einsum("owl,pwl,wl->wop", ripple.conj(), ripple, weight).real
+        cross = np.einsum("jwl,owl,wl->wjo", slope.conj(), ripple, weight).real
+        score, information = allowed_for(
+            np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real,
+            known, ripple_score, cross, gram, machine.ripple.spread,
+        )  # fmt: skip
         return Evidence(
-            score=np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real,
-            information=np.einsum("jwl,kwl,wl->wjk", slope.conj(), slope, weight).real,
+            score=score[:, :_OWN],
+            information=information[:, :_OWN, :_OWN],
+            late_score=score[:, _OWN],
+            late_information=information[:, _OWN],
             power=power[:, : len(lines)],
             quiet_power=quiet,
             position_m=centre,
@@ -71,7 +86,31 @@ class ModelEvidence:
             time_s=np.asarray(stretch.origin_s + (stretch.start + begin + (lines.window - 1) / 2) / lines.rate_hz),
             sample=stretch.start + begin + lines.window - 1,
             status=status,
+            ripple_score=ripple_score,
+            ripple_information=gram,
+            ripple_gain=(np.abs(ripple[0::2]) ** 2 + np.abs(ripple[1::2]) ** 2).swapaxes(0, 1),
         )
+
+    def way(self, stretch: Stretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
+        """Position, speed and status of every window, but for disturbances that the noise shows."""
+        bad = missing(stretch.data)
+        begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
+        return self._way(held(stretch.data, bad)[2], begin, stretch, bad)
+
+    def residual(self, stretch: Stretch, offset: Offset) -> tuple[Floats, Floats]:
+        """The measured velocity less the model's, without slow drift, and the shaft's position, (samples,) each."""
+        u, y, x = held(stretch.data, missing(stretch.data))
+        rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
+        return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
+
+    def _ripple(self, x: Floats, y: Floats) -> Floats:
+        """Velocity that each order of 1 N m leaves, without slow drift, (2·orders, samples)."""
+        if not len(self._machine.ripple):
+            return np.zeros((0, x.size))
+        shaft_m = shaft_position(x, y, self._lines.window, self._lines.rate_hz)
+        velocity = self._replay.ripple(self._machine.ripple.cycles_per_m, x, shaft_m)
+        still = np.zeros(x.size)
+        return np.array([without_drift(row, still, self._lines.window) for row in velocity])
 
     def _way(
         self, x: Floats, begin: NDArray[np.int64], stretch: Stretch, bad: NDArray[np.bool_]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import shift
 
 from livebode.monitoring.offset import Offset
+from livebode.monitoring.ripple import torques
 from livebode.motion import MovingModel
-from livebode.motion.replay import PLACE_M, advance, engine, torque_only
+from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, torque_only
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +27,8 @@ class Replay:
     they moved the machine, at any speed and in any direction.
     """
 
-    def __init__(self, model: MovingModel, rate_hz: float) -> None:
+    def __init__(self, model: MovingModel, rate_hz: float, delay_s: float = 0.0) -> None:
+        self._rate_hz, self._delay_samples = rate_hz, delay_s * rate_hz
         self._at = np.linspace(model.low_m, model.high_m, _GRID)
         stiffness, damping = model.stiffness_at(self._at), model.damping_at(self._at)
         most = float(stiffness.max()), float(damping.max())
@@ -35,28 +38,58 @@ class Replay:
         self._inertia_kg_m2 = model.inertia_kg_m2
 
     def __call__(self, u: Floats, position_m: Floats, offset: Offset) -> tuple[Floats, Floats]:
-        """Velocity of the motor from rest, rad/s (samples,), and its slope by each direction's logarithm (4, samples).
+        """Velocity of the motor from rest, rad/s (samples,), and its slopes (5, samples).
+
+        By the logarithm of each direction, and by the velocity's delay, s.
 
         The model is off its own parameters by `offset`. What is not in u or not in the model, such as friction, makes
         the velocity drift away slowly.
         """
-        factors = np.exp(offset.logarithms)
-        inputs = np.zeros((8, u.size))
-        inputs[0], inputs[2] = PLACE_M / self._radius_m, u
-        inputs[4] = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
-        inputs[5] = np.interp(position_m, self._at, self._damping) * factors[2]
-        inputs[6] = self._load_kg * factors[1]
-        inertia_kg_m2 = float(self._inertia_kg_m2 * factors[3])
+        inputs, inertia_kg_m2 = self._inputs(u, position_m, offset)
         plain = self._run(inertia_kg_m2, inputs)
-        slopes = np.empty((len(DIRECTIONS), u.size))
+        slopes = np.empty((len(DIRECTIONS) + 1, u.size))
         for i, row in enumerate((4, 6, 5)):
             moved = inputs.copy()
             moved[row] *= 1.0 + _STEP
             slopes[i] = self._run(inertia_kg_m2, moved)
         slopes[3] = self._run(inertia_kg_m2 * (1.0 + _STEP), inputs)
-        return plain, (slopes - plain) / _STEP
+        slopes[:4] = (slopes[:4] - plain) / _STEP
+        slopes[4] = -np.gradient(plain) * self._rate_hz
+        return plain, slopes
+
+    def plain(self, u: Floats, position_m: Floats, offset: Offset) -> Floats:
+        """The velocity alone."""
+        inputs, inertia_kg_m2 = self._inputs(u, position_m, offset)
+        return self._run(inertia_kg_m2, inputs)
+
+    def ripple(self, cycles_per_m: Floats, position_m: Floats, shaft_m: Floats) -> Floats:
+        """Velocity under cosine and sine of each order alone, of 1 N m, rad/s (2·orders, samples)."""
+        inputs, inertia_kg_m2 = self._inputs(np.zeros(position_m.size), position_m, Offset())
+        velocity = np.empty((2 * cycles_per_m.size, position_m.size))
+        for row, torque in zip(velocity, torques(cycles_per_m, shaft_m)):
+            inputs[2] = torque
+            row[:] = self._run(inertia_kg_m2, inputs)
+        return velocity
+
+    def _inputs(self, u: Floats, position_m: Floats, offset: Offset) -> tuple[Floats, float]:
+        """Of the engine, and the motor's inertia."""
+        factors = np.exp(offset.logarithms)
+        inputs = np.zeros((INPUTS, u.size))
+        inputs[0], inputs[2] = PLACE_M / self._radius_m, u
+        inputs[4] = np.interp(position_m, self._at, self._stiffness * np.exp(offset.stiffness(self._at)))
+        inputs[5] = np.interp(position_m, self._at, self._damping) * factors[2]
+        inputs[6] = self._load_kg * factors[1]
+        return inputs, float(self._inertia_kg_m2 * factors[3])
 
     def _run(self, inertia_kg_m2: float, inputs: Floats) -> Floats:
         settings = self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}
         wrong = "the baseline's model does not stay finite under this torque; check its signals and units"
-        return np.asarray(advance(settings, inputs, wrong)[1])
+        velocity = np.asarray(advance(settings, inputs, wrong)[1])
+        return _late(velocity, self._delay_samples)
+
+
+def _late(velocity: Floats, samples: float) -> Floats:
+    """The same by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate."""
+    if samples == 0:
+        return velocity
+    return np.asarray(shift(velocity, samples, order=3, mode="nearest"))

@@ -69,7 +69,15 @@ class Table:
     def deviation(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Relative deviation of every component, and its variance, (rows, components) each.
 
-        Where a row says that it is noisier than those that were learned, so is its deviation. A mean of n windows is
+        Where a row says that it is noisier than those that were learned, so is its deviation.
+        """
+        deviation, own, more = self.deviation_parts(rows, cell)
+        return deviation, own + more
+
+    def deviation_parts(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+        """Relative deviation, its learned variance, and what a row says beyond that, (rows, components) each.
+
+        A mean of n windows is
         itself off by a variance/n; a component of a cell whose mean is known less well than the change that is looked
         for has an infinite variance, and counts nothing.
         """
@@ -81,12 +89,12 @@ class Table:
         own = np.einsum("...ii->...i", self.covariance).reshape(cells, -1)[cell]
         if self.what == "lines":
             deviation = np.stack([relative.real, relative.imag], axis=2).reshape(len(rows), 2 * mean.shape[1])
-            variance = own + np.repeat(more / 2, 2, axis=1)
+            more = np.repeat(more / 2, 2, axis=1)
         else:
-            deviation, variance = relative.real, own + more
+            deviation = relative.real
         count = self.count.ravel()[cell][:, np.newaxis]
         unknown = KNOWN**2 * own / np.maximum(count, 1) > self.accuracy.smallest**2
-        return deviation, np.where(unknown | ~np.isfinite(deviation), np.inf, variance)
+        return deviation, np.where(unknown | ~np.isfinite(deviation + more), np.inf, own), np.nan_to_num(more)
 
 
 def cells(rows: Rows, low: float, step: float, still: float, bins: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:

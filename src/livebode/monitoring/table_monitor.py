@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
+from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import Table
 from livebode.monitoring.table_sentences import cleared, differs, unknown
@@ -42,6 +43,7 @@ class TableMonitor:
         self._table = table
         size = table.accuracy.smallest.size
         self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, threshold(mean_s, step_s, 2 * size))
+        self._noise = NoiseLevel(size, 2 if table.what == "lines" else 1)
         self.judged = 0
         """Rows judged so far."""
         self._told_unknown = False
@@ -63,9 +65,11 @@ class TableMonitor:
     def process(self, rows: Rows) -> list[Event]:
         """Events of these rows."""
         cell, known = self._table.place(rows)
-        deviation, variance = self._table.deviation(rows, cell)
-        with np.errstate(invalid="ignore"):
-            information = np.where(np.isfinite(variance), 1 / variance, 0.0) / self._table.accuracy.inflation
+        deviation, own, more = self._table.deviation_parts(rows, cell)
+        judged = np.flatnonzero(rows.ok & known)
+        variance = np.full(own.shape, np.inf)
+        variance[judged] = self._noise.process(deviation[judged], own[judged], more[judged])
+        information = 1 / variance / self._table.accuracy.inflation
         score = np.where(information > 0, deviation, 0.0) * information
         events: list[Event] = []
         for i in np.flatnonzero(rows.ok):
@@ -106,9 +110,10 @@ class TableMonitor:
 
     def _tell(self) -> list[Event]:
         raised = self._charts.sums >= self._charts.threshold
-        since = int(self._charts.since[raised].min()) if raised.any() else self._found
-        first = max(since - 1 - self.judged, -len(self._moment))
-        score, information = self._score[first:].sum(axis=0), self._information[first:].sum(axis=0)
+        first = _began(self._score, self._information, np.asarray(raised.any(axis=0)))
+        # A window that holds the change itself has part of it; the amount is of those behind it.
+        whole = min(first + 1, len(self._moment) - 1)
+        score, information = self._score[whole:].sum(axis=0), self._information[whole:].sum(axis=0)
         accuracy = self._table.accuracy
         seen = information > 0
         amount = np.where(seen, score / np.where(seen, information, 1.0), 0.0)
@@ -129,19 +134,35 @@ class TableMonitor:
         return [event]
 
     def state(self) -> dict[str, NDArray[Any]]:
-        return self._charts.state() | {
-            "score": self._score,
-            "information": self._information,
-            "moment": self._moment,
-            "standing": self._standing.copy(),
-            "seen_in": self._seen_in.copy(),
-            "numbers": np.array([self.judged, self._found, self._told_unknown]),
-        }
+        return (
+            self._charts.state()
+            | self._noise.state()
+            | {
+                "score": self._score,
+                "information": self._information,
+                "moment": self._moment,
+                "standing": self._standing.copy(),
+                "seen_in": self._seen_in.copy(),
+                "numbers": np.array([self.judged, self._found, self._told_unknown]),
+            }
+        )
 
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         self._charts.load(state)
+        self._noise.load(state)
         self._score, self._information = np.array(state["score"]), np.array(state["information"])
         self._moment, self._standing = np.array(state["moment"]), np.array(state["standing"])
         self._seen_in = np.array(state["seen_in"])
         self.judged, self._found, told = (int(n) for n in state["numbers"])
         self._told_unknown = bool(told)
+
+
+def _began(score: Floats, information: Floats, raised: NDArray[np.bool_]) -> int:
+    """Row with which the change most likely began: since then the raised components' evidence is the largest.
+
+    Over the rows since a moment a component's evidence is S²/(2I), with its amount at its likeliest, S/I.
+    """
+    raised = raised if raised.any() else np.ones_like(raised)
+    total, known = (np.cumsum(x[::-1, raised], axis=0)[::-1] for x in (score, information))
+    evidence = np.where(known > 0, total**2 / (2 * np.where(known > 0, known, 1.0)), 0.0)
+    return int(np.argmax(evidence.sum(axis=1)))

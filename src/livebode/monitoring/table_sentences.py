@@ -18,6 +18,8 @@ _NAMED = 4
 
 def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
     """What changed; `moment` is schedule, sample and time of every row since it began."""
+    if table.what == "lines":
+        amount, bound = _polar(amount, bound)
     items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(told)]
     items.sort(key=lambda item: -abs(item["amount"]) / item["bound"])
     named = "; ".join(_phrase(item) for item in items[:_NAMED])
@@ -34,6 +36,18 @@ def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats
     }
     message = f"Since {clock_moment(moment[0, 2])} the machine differs from the baseline{place}: {named}{more}."
     return Event("change", int(moment[-1, 1]), float(moment[-1, 2]), message, details)
+
+
+def _polar(amount: Floats, bound: Floats) -> tuple[Floats, Floats]:
+    """From real and imaginary part of relative deviations, line by line, to those of magnitude and phase, rad."""
+    quotient = 1 + amount[0::2] + 1j * amount[1::2]
+    size = np.abs(quotient)
+    along, across = np.abs(quotient.real / size), np.abs(quotient.imag / size)
+    real, imaginary = (np.where(np.isfinite(b), b, 0.0) for b in (bound[0::2], bound[1::2]))
+    magnitude = np.hypot(along * real, across * imaginary)
+    phase = np.hypot(across * real, along * imaginary) / size
+    amounts = np.stack([size - 1, np.angle(quotient)], axis=1).ravel()
+    return amounts, np.stack([magnitude, phase], axis=1).ravel()
 
 
 def cleared(table: Table, sample: int, time_s: float) -> Event:

@@ -18,6 +18,7 @@ from livebode.simulation.settings import Drive
 Floats = NDArray[np.float64]
 
 PLACE_M = 1.0  # where the small motion is simulated; the spans are set tick by tick
+INPUTS = 10
 _STATES = 4
 _ANYWHERE_M = 1e12
 
@@ -82,7 +83,7 @@ def engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[
 
 
 def advance(settings: dict[str, Any], inputs: Floats, otherwise: str) -> Floats:
-    """What the Engine gives for inputs of shape (8, samples), from rest; InputError(otherwise) where it diverges."""
+    """What the Engine gives for inputs of shape (10, samples), from rest; InputError(otherwise) where it diverges."""
     output = np.empty((3 + _STATES, inputs.shape[1]))
     if Engine(settings, PLACE_M).advance(inputs, output) < inputs.shape[1]:
         raise InputError(otherwise)
@@ -93,7 +94,7 @@ def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tup
     """u, velocity of the motor, velocity of the cart."""
     stiffness, damping = model.stiffness_at(position_m), model.damping_at(position_m)
     most = float(stiffness.max()), float(damping.max())
-    inputs = np.zeros((8, w.size))
+    inputs = np.zeros((INPUTS, w.size))
     inputs[0], inputs[2] = PLACE_M / model.radius_m, w
     inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
     wrong = "the fitted model does not stay in its loop; check the loop's description and the radius"

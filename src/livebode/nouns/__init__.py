@@ -2,7 +2,7 @@
 
 from livebode.nouns.block import Block, Channel, missing_channel
 from livebode.nouns.controllers import PID, Cascade, PositionPD
-from livebode.nouns.errors import GridError, InputError
+from livebode.nouns.errors import DamageWarning, GridError, InputError
 from livebode.nouns.event import Event
 from livebode.nouns.lines import Lines
 from livebode.nouns.loop import Loop
@@ -19,6 +19,7 @@ __all__ = [
     "Block",
     "Cascade",
     "Channel",
+    "DamageWarning",
     "Event",
     "Gain",
     "GridError",

@@ -109,7 +109,9 @@ class Response:
             import control
         except ImportError:
             raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
-        return control.frd(self.value[self.valid], 2 * np.pi * self.lines.frequency_hz[self.valid])
+        omega = 2 * np.pi * self.lines.frequency_hz[self.valid]
+        # `control.bode_plot` draws no system without a name.
+        return control.frd(self.value[self.valid], omega, name=self.quantity)
 
 
 _PER_ROW = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")

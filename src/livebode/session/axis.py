@@ -45,7 +45,7 @@ class LinesSection(_Section):
 
 
 class TrackingSection(_Section):
-    """[tracking]: the options of `livebode.estimation.Settings`."""
+    """[tracking]: the options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
     quantity: Quantity = "plant"
@@ -57,6 +57,8 @@ class TrackingSection(_Section):
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
+    accept_roles: bool = False
+    all_periods: bool = False
 
 
 class MotionSection(_Section):

@@ -16,10 +16,11 @@ from livebode.fitting import Fit
 from livebode.nouns import Block, Channel, Event, InputError, Responses
 from livebode.records import RunDirectory
 from livebode.session import summary
+from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
-from livebode.session.continuing import Before, Numbering
+from livebode.session.continuing import Before, StreamPosition
 from livebode.session.destination import Destination
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.overview import Overview
@@ -71,13 +72,13 @@ class Tracking:
     kept
         How it is kept in segments; None for a run in one piece.
     again
-        Whether the source begins with the same samples each time.
+        Whether the source begins with the same samples each time; else it numbers them on.
     started
         `time.perf_counter()` when opening the source began, where that is to count in the speed.
     orders
         What it is told meanwhile.
-    numbering
-        Of a source that cannot go back.
+    position
+        Where a live source continues.
     before
         The run that it goes on from.
     delivery
@@ -95,18 +96,19 @@ class Tracking:
         again: bool = True,
         started: float | None = None,
         orders: Orders | None = None,
-        numbering: Numbering | None = None,
+        position: StreamPosition | None = None,
         before: Before | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
         self.source, self.pipeline, self.to, self._kept = source, pipeline, to, kept
-        self._orders, self._numbering = orders or Orders(), numbering or Numbering()
+        self._orders, self._position = orders or Orders(), position
         self._follower, settings = pipeline.follower, pipeline.follower.settings
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
+        self._announcing = Announcing()
         self._label = _schedule_label(source, settings.schedule)
         about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._about = about
@@ -135,7 +137,7 @@ class Tracking:
             again=again,
             ends=self.source.samples is not None,
             tell=self._said,
-            numbering=self._numbering,
+            position=self._position,
             before=before,
         )
 
@@ -214,8 +216,10 @@ class Tracking:
         """What a live source has to say; a recording says it all at once."""
         if not isinstance(self.source, LiveSource):
             return []
-        rate_hz = self._follower.settings.lines.rate_hz
-        return [self._numbering.said(event, rate_hz) for event in self.source.drain_events()]
+        events = self.source.drain_events()
+        for event in self._announcing.of(events):
+            self.to.tell(event)
+        return events
 
     def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
         """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.

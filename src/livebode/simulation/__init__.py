@@ -2,7 +2,7 @@
 
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.configuration import BeltAxis
-from livebode.simulation.faults import Backlash, DampingGrowth, Fault, LoadChange, SoftSpot, TensionLoss
+from livebode.simulation.faults import Backlash, DampingGrowth, Fault, FrictionChange, LoadChange, SoftSpot, TensionLoss
 from livebode.simulation.fmu import FmuAxis
 from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
@@ -22,6 +22,7 @@ __all__ = [
     "Fault",
     "FmuAxis",
     "Friction",
+    "FrictionChange",
     "Limits",
     "LoadChange",
     "Mechanics",

@@ -26,6 +26,7 @@ _OF_MECHANICS = (
     "motor_inertia_kg_m2",
     "pulley_inertia_kg_m2",
     "radius_m",
+    "eccentricity",
     "specific_stiffness_n",
     "pulley_distance_m",
     "damping_shape",

@@ -16,16 +16,18 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class Condition:
-    """The machine's parameters at some moments, each an array: factors on stiffness and damping, load, play."""
+    """The machine's parameters at some moments, each an array: factors on stiffness, damping
+    and friction, load, play."""
 
     stiffness: Floats
     damping: Floats
     load_kg: Floats
     gap_m: Floats
+    friction: Floats
 
     @classmethod
     def healthy(cls, samples: int, load_kg: float) -> Condition:
-        return cls(np.ones(samples), np.ones(samples), np.full(samples, load_kg), np.zeros(samples))
+        return cls(np.ones(samples), np.ones(samples), np.full(samples, load_kg), np.zeros(samples), np.ones(samples))
 
 
 class Fault(Protocol):
@@ -102,6 +104,20 @@ class DampingGrowth(OverTime):
 
     def act(self, time_s: Floats, condition: Condition) -> None:
         condition.damping *= 1 + (self.factor - 1) * self.share(time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionChange(OverTime):
+    """All friction, of motor and cart, grows or falls to `factor` times what it was."""
+
+    factor: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        nonnegative(self, "factor")
+
+    def act(self, time_s: Floats, condition: Condition) -> None:
+        condition.friction *= 1 + (self.factor - 1) * self.share(time_s)
 
 
 @dataclass(frozen=True, kw_only=True)

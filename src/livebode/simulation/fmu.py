@@ -24,7 +24,7 @@ from livebode.simulation.twin import Controller, Now
 from livebode.simulation.values import positive
 
 Floats = NDArray[np.float64]
-_NO_FAULT = (1.0, 1.0, 1.0, 0.0)  # the FMU has its own
+_NO_FAULT = (1.0, 1.0, 1.0, 0.0, 1.0, 0.0)  # the FMU has its own
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,10 +75,9 @@ class FmuAxis:
             raise InputError(f"seconds={self.seconds} is not above 0; leave it out for a run without end")
         if self.excitation_n_m.ndim != 1 or not np.all(np.isfinite(self.excitation_n_m)):
             raise InputError("excitation_n_m is not one period of finite numbers, N m")
-        if self.drive.torque_ripple_n_m:
-            raise InputError(
-                f"torque_ripple_n_m={self.drive.torque_ripple_n_m}: an FMU brings its own ripple; set it to 0"
-            )
+        for name in ("torque_ripple_n_m", "torque_noise_n_m"):
+            if value := getattr(self.drive, name):
+                raise InputError(f"{name}={value}: an FMU brings its own disturbances; set it to 0")
         self.motion.check(self.limits)
         self._references()
 

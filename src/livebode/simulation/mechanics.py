@@ -43,6 +43,9 @@ class Mechanics:
         Keff and bs with the cart at `nominal_position_m`.
     frozen_position_m
         The spans stay those of the cart at this position, wherever it is: a linear machine. None: they follow the cart.
+    eccentricity
+        The motor's pulley has the radius r·(1 + eccentricity·sin φ), so that the cart leaves r·φ by that much.
+        Linearisations leave it out.
 
     Raises
     ------
@@ -68,13 +71,16 @@ class Mechanics:
     damping_n_s_per_m: float = 130.0
     nominal_position_m: float = 0.8
     frozen_position_m: float | None = None
+    eccentricity: float = 0.0
 
     def __post_init__(self) -> None:
         if self.masses not in (2, 3):
             raise InputError(f"masses={self.masses} is not known; choose 2 or 3")
         positive(self, "inertia_kg_m2", "pulley_inertia_kg_m2", "load_kg", "radius_m", "pulley_distance_m")
         positive(self, "stiffness_n_per_m")
-        nonnegative(self, "damping_n_s_per_m")
+        nonnegative(self, "damping_n_s_per_m", "eccentricity")
+        if self.eccentricity >= 1:
+            raise InputError(f"eccentricity={self.eccentricity} is not below 1; 0.01 is a pulley out of centre by 1 %")
         for name in ("nominal_position_m", "frozen_position_m"):
             at = getattr(self, name)
             if at is not None and not 0 < at < self.pulley_distance_m:

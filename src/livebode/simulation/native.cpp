@@ -31,6 +31,7 @@ lb_axis_config config_of(const nb::dict &s) {
     c.motor_inertia_kg_m2 = number(s, "motor_inertia_kg_m2");
     c.pulley_inertia_kg_m2 = number(s, "pulley_inertia_kg_m2");
     c.radius_m = number(s, "radius_m");
+    c.eccentricity = number(s, "eccentricity");
     c.specific_stiffness_n = number(s, "specific_stiffness_n");
     c.pulley_distance_m = number(s, "pulley_distance_m");
     c.damping_shape = number(s, "damping_shape");

@@ -62,6 +62,8 @@ class Drive:
         The torque u is limited to ±this, and while it is the integrator stands still; infinite by default.
     torque_ripple_n_m, torque_ripple_per_turn
         Amplitude·sin(periods·φ) added to the torque behind the logged u.
+    torque_noise_n_m
+        Standard deviation of a white Gaussian torque behind the logged u, constant over a tick.
     """
 
     rate_hz: float = 4000.0
@@ -75,10 +77,12 @@ class Drive:
     torque_n_m_max: float = inf
     torque_ripple_n_m: float = 0.0
     torque_ripple_per_turn: float = 24.0
+    torque_noise_n_m: float = 0.0
 
     def __post_init__(self) -> None:
         positive(self, "rate_hz", "velocity_rate_hz", "position_rate_hz", "integral_time_s", "torque_ripple_per_turn")
         nonnegative(self, "velocity_gain_n_m_s", "position_gain_per_s", "velocity_feedforward", "torque_ripple_n_m")
+        nonnegative(self, "torque_noise_n_m")
         count(self, "delay_ticks", DELAY_TICKS_MAX)
         if isnan(self.torque_n_m_max) or self.torque_n_m_max <= 0:
             raise InputError(f"torque_n_m_max={self.torque_n_m_max} is not above 0; leave it out for no limit")

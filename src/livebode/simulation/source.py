@@ -96,7 +96,7 @@ class SimulatedAxis:
         axis = self.axis
         position, speed = (row / axis.mechanics.radius_m for row in axis.motion.cycle(self.rate_hz))
         engine = Engine(engine_settings(axis), float(position[0]) * axis.mechanics.radius_m)
-        noise = np.random.default_rng(axis.seed)
+        noise, disturbance = np.random.default_rng(axis.seed), np.random.default_rng([axis.seed, 2])
         self._run_in(engine, float(position[0]))
         start = 0
         while self.samples is None or start < self.samples:
@@ -105,7 +105,8 @@ class SimulatedAxis:
             condition = axis.condition(number / self.rate_hz)
             w = excitation_at(axis.excitation_n_m, number)
             references = [row[number % row.size] for row in (position, speed)]
-            inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition)])
+            torque = self._torque_noise(disturbance, ticks)
+            inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition), torque])
             output = self._advanced(engine, inputs, start)
             data = np.vstack([w, output[:3], output[-2], inputs[:2]])
             yield Block(data, CHANNELS, self.rate_hz, start=start), Truth(axis, start, output[3:], condition)
@@ -122,10 +123,16 @@ class SimulatedAxis:
         w = excitation_at(axis.excitation_n_m, number)
         references = [np.full(ticks, position_reference), np.zeros(ticks)]
         noise = self._noise(np.random.default_rng([axis.seed, 1]), ticks)
-        self._advanced(engine, np.array([*references, w, noise, *_rows(axis.condition(np.zeros(ticks)))]), -ticks)
+        torque = self._torque_noise(np.random.default_rng([axis.seed, 3]), ticks)
+        condition = axis.condition(np.zeros(ticks))
+        self._advanced(engine, np.array([*references, w, noise, *_rows(condition), torque]), -ticks)
 
     def _noise(self, generator: np.random.Generator, ticks: int) -> Floats:
         sigma = self.axis.sensor.noise_rad_per_s
+        return sigma * generator.standard_normal(ticks) if sigma else np.zeros(ticks)
+
+    def _torque_noise(self, generator: np.random.Generator, ticks: int) -> Floats:
+        sigma = self.axis.drive.torque_noise_n_m
         return sigma * generator.standard_normal(ticks) if sigma else np.zeros(ticks)
 
     def _advanced(self, engine: Engine, inputs: Floats, start: int) -> Floats:
@@ -143,4 +150,4 @@ class SimulatedAxis:
 
 
 def _rows(condition: Condition) -> list[Floats]:
-    return [condition.stiffness, condition.damping, condition.load_kg, condition.gap_m]
+    return [condition.stiffness, condition.damping, condition.load_kg, condition.gap_m, condition.friction]

@@ -6,7 +6,7 @@ Plant and Controller take and give numbers; the plant may be another one with th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import copysign, floor, isfinite, sin, sqrt
+from math import copysign, cos, floor, isfinite, sin, sqrt
 from typing import Any, NamedTuple
 
 from scipy.integrate import DOP853
@@ -28,6 +28,8 @@ class Now(NamedTuple):
     damping: float
     load_kg: float
     gap_m: float
+    friction: float
+    disturbance_n_m: float
 
 
 def friction(coulomb: float, stribeck: float, s: Settings, speed: float) -> float:
@@ -71,7 +73,7 @@ class Plant:
         self.state = [0.0] * settings["states"]
         for i in range(0, settings["states"] - 2, 2):
             self.state[i] = position_m / settings["radius_m"]
-        self.state[-2] = position_m
+        self.state[-2] = self._pulley(self.state[0], 0.0)[0]
 
     def read(self) -> tuple[float, float, float]:
         """Angle and velocity of the motor, and the cart's position."""
@@ -93,38 +95,49 @@ class Plant:
     def derivative(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
         """Time derivative of the state: (11), (12) or (8)–(10), with friction and torque ripple."""
         s, omega, v = self.settings, state[1], state[-1]
-        torque = torque - s["motor_viscous_n_m_s"] * omega
-        torque -= friction(s["motor_coulomb_n_m"], s["motor_stribeck_n_m"], s, s["radius_m"] * omega)
+        dry = friction(s["motor_coulomb_n_m"], s["motor_stribeck_n_m"], s, s["radius_m"] * omega)
+        torque = torque + now.disturbance_n_m - now.friction * (s["motor_viscous_n_m_s"] * omega + dry)
         if s["torque_ripple_n_m"] != 0:
             torque += s["torque_ripple_n_m"] * sin(s["torque_ripple_per_turn"] * state[0])
         d = (self._two_masses if len(state) == 4 else self._three_masses)(now, torque, state)
-        resisting = s["load_viscous_n_s_per_m"] * v + friction(s["load_coulomb_n"], s["load_stribeck_n"], s, v)
+        dry = friction(s["load_coulomb_n"], s["load_stribeck_n"], s, v)
+        resisting = now.friction * (s["load_viscous_n_s_per_m"] * v + dry)
         d[-1] = (d[-1] - resisting) / now.load_kg
         return d
 
     def _at(self, x: float) -> float:
         return float(self.settings["frozen_position_m"] if self.settings["frozen"] else x)
 
+    def _pulley(self, phi: float, omega: float) -> tuple[float, float, float]:
+        """Belt that the motor's pulley has moved, its arm, and the belt's speed there."""
+        r, e = self.settings["radius_m"], self.settings["eccentricity"]
+        if e == 0:
+            return r * phi, r, r * omega
+        arm = r * (1 + e * sin(phi))
+        return r * (phi + e * (1 - cos(phi))), arm, arm * omega
+
     def _two_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
-        s, r, at = self.settings, self.settings["radius_m"], self._at(state[2])
+        s, at = self.settings, self._at(state[2])
+        travel, arm, speed = self._pulley(state[0], state[1])
         shape = 1 / at + 1 / (2 * s["pulley_distance_m"] - at)
         k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at) * shape
         b = s["damping_shape"] * now.damping * sqrt(shape)
-        slack, rate = play(now.gap_m, r * state[0] - state[2], r * state[1] - state[3])
+        slack, rate = play(now.gap_m, travel - state[2], speed - state[3])
         force = k * slack + b * rate
-        return [state[1], (torque - r * force) / s["motor_inertia_kg_m2"], state[3], force]
+        return [state[1], (torque - arm * force) / s["motor_inertia_kg_m2"], state[3], force]
 
     def _three_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
         s, r, at, l3 = self.settings, self.settings["radius_m"], self._at(state[4]), self.settings["pulley_distance_m"]
+        travel, arm, speed = self._pulley(state[0], state[1])
         s1, s2, s3 = 1 / at, 1 / (l3 - at), 1 / l3
         shape = s1 + 1 / (2 * l3 - at)
         k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at)
         b = s["damping_shape"] * now.damping / sqrt(shape)
         x, v = self._held(now, s1, s2, state)
-        f1 = s1 * (k * (r * state[0] - x) + b * (r * state[1] - v))
+        f1 = s1 * (k * (travel - x) + b * (speed - v))
         f2 = s2 * (k * (x - r * state[2]) + b * (v - r * state[3]))
-        f3 = s3 * (k * (r * (state[2] - state[0])) + b * (r * (state[3] - state[1])))
-        first = (torque - r * f1 + r * f3) / s["motor_inertia_kg_m2"]
+        f3 = s3 * (k * (r * state[2] - travel) + b * (r * state[3] - speed))
+        first = (torque - arm * f1 + arm * f3) / s["motor_inertia_kg_m2"]
         second = r * (f2 - f3) / s["pulley_inertia_kg_m2"]
         return [state[1], first, state[3], second, state[5], f1 - f2]
 
@@ -133,8 +146,9 @@ class Plant:
         if now.gap_m == 0:
             return state[4], state[5]
         r = self.settings["radius_m"]
-        free = (s1 * (r * state[0]) + s2 * (r * state[2])) / (s1 + s2)
-        free_rate = (s1 * (r * state[1]) + s2 * (r * state[3])) / (s1 + s2)
+        travel, _, speed = self._pulley(state[0], state[1])
+        free = (s1 * travel + s2 * (r * state[2])) / (s1 + s2)
+        free_rate = (s1 * speed + s2 * (r * state[3])) / (s1 + s2)
         slack, rate = play(now.gap_m, free - state[4], free_rate - state[5])
         return free - slack, free_rate - rate
 

@@ -169,7 +169,7 @@ class Comparison:
         return Section("Parameters and margins", tuple(parts))
 
     def _events(self) -> Section:
-        counts = [Counter(event.kind for event in run.each_event()) for run in self.found.runs]
+        counts = [Counter(event.kind for event in run.each_event_and_damage()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
         rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
         parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []

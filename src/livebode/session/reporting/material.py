@@ -104,7 +104,7 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
-    happenings = EventSummary.of(run.each_event())
+    happenings = EventSummary.of(run.each_event_and_damage())
     return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
 
 

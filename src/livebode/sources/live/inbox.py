@@ -11,14 +11,20 @@ INBOX_S_MAX = 60.0
 """The machine's time that may wait: longer than any pause of a tracker that works."""
 INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
 """What may wait however long it is, and what may not however short: many axes share one computer."""
+WAITING_S_MAX = 0.1
+"""The same where the sender can wait: what it still has is not lost when this process is killed."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
-    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB."""
+    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB.
 
-    def __init__(self, bytes_max: int = INBOX_BYTES_MAX) -> None:
+    Where the sender waits, at most 0.1 s, or one batch.
+    """
+
+    def __init__(self, bytes_max: int = INBOX_BYTES_MAX, *, waits: bool = False) -> None:
         self._bytes_max = bytes_max
+        self._bytes_min, self._seconds_max = (0, WAITING_S_MAX) if waits else (INBOX_BYTES_MIN, INBOX_S_MAX)
         self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
         self._seconds = 0.0
@@ -48,7 +54,8 @@ class Inbox:
 
     def _has_room(self, batch: AnyBatch) -> bool:
         size = self._bytes + _size_bytes(batch)
-        return size <= self._bytes_max and (size <= INBOX_BYTES_MIN or self._seconds + _seconds(batch) <= INBOX_S_MAX)
+        short = size <= self._bytes_min or self._seconds + _seconds(batch) <= self._seconds_max
+        return size <= self._bytes_max and (short or not self._batches)
 
     def _count(self, batch: AnyBatch, sign: int) -> None:
         self._bytes += sign * _size_bytes(batch)

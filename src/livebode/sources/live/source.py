@@ -15,11 +15,14 @@ import numpy as np
 from livebode.nouns import Channel, Event, InputError, SpectraLayout, missing_channel
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.computer_clock import ClockReading, pause
+from livebode.sources.live.doubts import CONFIRMED
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
+from livebode.sources.live.position import Position
 from livebode.sources.live.said import Said
-from livebode.sources.live.sequencer import CONFIRMED, Sequencer
+from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -45,11 +48,13 @@ class LiveSource(ABC):
     """Whether batches can arrive in another order than they were sent."""
     waits: ClassVar[bool] = False
     """Whether the sender can wait until there is room."""
+    paced: ClassVar[bool] = True
+    """Whether samples come when they are taken, so that this computer's clock tells how long it was paused."""
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._said = Said()
-        self._inbox = Inbox()
+        self._inbox = Inbox(waits=self.waits)
         self._sequencer = Sequencer(
             self._said,
             reorder=settings.reorder_batches if self.reorders else 0,
@@ -68,6 +73,7 @@ class LiveSource(ABC):
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
+        self._resumed: Position | None = None
 
     @abstractmethod
     def _receive(self) -> bool:
@@ -122,6 +128,27 @@ class LiveSource(ABC):
             latency_s=None if newest is None else newest[1],
             waiting_bytes=self._inbox.bytes,
         )
+
+    def resume(self, position: Position) -> None:
+        """Continue a record at this position: to be called before `open`.
+
+        Blocks are numbered on from there, and the sender's numbers and epoch tell exactly what is missing.
+        """
+        self._resumed = position
+        self._sequencer.resume(position, paced=self.paced)
+        exact = (
+            "its numbers tell what is missing"
+            if position.epoch
+            else "it sends no epoch, so that what is missing is an estimate if it was restarted meanwhile"
+        )
+        self._said.say(
+            "resumed",
+            f"continues behind sample {position.number - 1} of the sender; {exact}",
+            sender_sample=position.number,
+            epoch=f"{position.epoch:#x}",
+        )
+        if remark := pause(position.arrived, ClockReading.at(time.monotonic())).remark:
+            self._said.say("computer-clock", remark)
 
     def open(self) -> Self:
         """Begin to receive, and wait for the first batch; InputError where none comes within `timeout_s`."""
@@ -228,6 +255,11 @@ class LiveSource(ABC):
         """A connection stands."""
         self._connected, self._outage = True, False
         self._said.say("connected", f"connected to {self.address}")
+
+    def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
+        """Of a record that continues the channels are known before new samples come."""
+        if self._resumed is not None:
+            self._sequencer.face.announce(channels, rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:

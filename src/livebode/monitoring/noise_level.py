@@ -1,0 +1,61 @@
+"""How much louder the noise has become, from rows alone: a change of the machine is not noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_ROWS = 5
+_MEDIAN = 0.4549364  # of chi square with one degree of freedom
+_BELIEVED = 2.0  # times what the differences show beyond the learned noise
+
+
+class NoiseLevel:
+    """Bounds what rows say of their own noise by how much neighbouring rows differ.
+
+    A response's sigma comes from how periods scatter. For some periods after a step of the machine the step is in it,
+    so that rows behind the step would weigh a hundredth of those before it. A step moves one difference of neighbouring
+    rows; noise moves all of them. The median over the newest five rows and all components of a line shows the second
+    alone. A row's noise beyond the learned one counts up to twice what that median shows.
+
+    Parameters
+    ----------
+    components
+        Columns of a deviation.
+    together
+        Components of one line: 2, or 1 for a parameter.
+    """
+
+    def __init__(self, components: int, together: int) -> None:
+        self._together = together
+        self._before = np.full((2, 1, components), np.nan)
+        self._squares = np.full((_ROWS - 1, components), np.nan)
+
+    def process(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
+        """Variance of rows from their deviation, the learned variance and what they say beyond, (rows, components)."""
+        known = np.where(np.isfinite(own), own, np.nan)
+        both = np.concatenate([self._before, np.stack([np.where(np.isfinite(own), deviation, np.nan), known])], axis=1)
+        square = np.diff(both[0], axis=0) ** 2 / (both[1, 1:] + both[1, :-1])
+        squares = np.concatenate([self._squares, square])
+        self._before, self._squares = both[:, -1:], squares[len(square) :]
+        newest = np.lib.stride_tricks.sliding_window_view(squares, _ROWS, axis=0)
+        level = _median(newest.reshape(len(own), -1, self._together * _ROWS)) / _MEDIAN
+        shown = np.repeat(np.maximum(level - 1.0, 0.0), self._together, axis=1)
+        return np.asarray(own + np.minimum(more, np.nan_to_num(_BELIEVED * shown * known)))
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"level before": self._before.copy(), "level squares": self._squares.copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._before = np.array(state["level before"], dtype=np.float64)
+        self._squares = np.array(state["level squares"], dtype=np.float64)
+
+
+def _median(values: Floats) -> Floats:
+    """Over the last axis, of those that are known; 0 where none is."""
+    count = np.isfinite(values).sum(axis=-1, keepdims=True)
+    order = np.sort(values, axis=-1)  # what is not known comes last
+    middle = [np.take_along_axis(order, np.maximum(count - 1 + i, 0) // 2, axis=-1) for i in (0, 1)]
+    return np.where(count > 0, (middle[0] + middle[1]) / 2, 0.0)[..., 0]

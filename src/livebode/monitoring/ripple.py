@@ -1,0 +1,127 @@
+"""Ripple: torque that repeats with the motor's angle, and what a window says once it is allowed for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+Floats = NDArray[np.float64]
+
+_COHERENT = 100.0  # windows in which a ripple may add up as if they were one
+
+
+@dataclass(frozen=True, eq=False)
+class Ripple:
+    """Orders of a torque that is not in the logged one, and their size.
+
+    Attributes
+    ----------
+    cycles_per_m
+        Of each order over the schedule, (orders,): 24 a turn of a pulley of 19 mm are 201 a metre.
+    amplitude_n_m
+        Root mean square of the amplitudes of sine and cosine, N m (orders,); 0 where it is not known yet.
+    """
+
+    cycles_per_m: Floats = field(default_factory=lambda: np.zeros(0))
+    amplitude_n_m: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return self.cycles_per_m.size
+
+    @property
+    def spread(self) -> Floats:
+        """Prior standard deviation of sine and cosine of each order, N m, (2·orders,).
+
+        A hundred windows' worth of power: while an order stays on a line its error is the same in each window, and a
+        sum over windows must not take it for ever better knowledge.
+        """
+        return np.asarray(np.sqrt(_COHERENT) * np.repeat(self.amplitude_n_m, 2))
+
+    def only(self, chosen: NDArray[np.bool_]) -> Ripple:
+        """Some of the orders."""
+        return Ripple(self.cycles_per_m[chosen], self.amplitude_n_m[chosen])
+
+    @classmethod
+    def of(cls, cycles_per_m: Floats) -> Ripple:
+        """Orders of unknown size."""
+        return cls(cycles_per_m, np.zeros(cycles_per_m.size))
+
+
+def torques(cycles_per_m: Floats, position_m: Floats) -> Floats:
+    """Cosine and sine of each order along a way, (2·orders, samples).
+
+    >>> torques(np.array([1.0]), np.array([0.0, 0.25])).round(9) + 0.0
+    array([[1., 0.],
+           [0., 1.]])
+    """
+    angle = 2 * np.pi * np.outer(cycles_per_m, position_m)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1).reshape(2 * cycles_per_m.size, position_m.size)
+
+
+def allowed_for(
+    score: Floats, information: Floats, e: Floats, cross: Floats, gram: Floats, spread: Floats
+) -> tuple[Floats, Floats]:
+    """Score and information with a ripple of this spread in each window, by generalised least squares.
+
+    With noise of covariance Σ and a ripple ψ·a, a ~ N(0, R²), the windows' covariance is Σ + ψR²ψᵀ, and by Woodbury
+    sᵀ(Σ + ψR²ψᵀ)⁻¹e = ⟨s, e⟩ − ⟨s, ψ⟩R(I + R⟨ψ, ψ⟩R)⁻¹R⟨ψ, e⟩. Where an order meets a line, that line counts no more;
+    where it is small or far from the lines, nothing changes. Its phase need not be known.
+
+    Parameters
+    ----------
+    score, information
+        ⟨s, e⟩ and ⟨s, s⟩, (windows, directions), (windows, directions, directions).
+    e, cross, gram
+        ⟨ψ, e⟩, ⟨s, ψ⟩, ⟨ψ, ψ⟩: (windows, 2·orders), (windows, directions, 2·orders), (windows, 2·orders, 2·orders).
+    spread
+        R, (2·orders,).
+    """
+    if not spread.size:
+        return score, information
+    inner = np.eye(spread.size) + spread[:, np.newaxis] * gram * spread
+    left = cross * spread
+    gain = np.swapaxes(np.linalg.solve(inner, np.swapaxes(left, 1, 2)), 1, 2)
+    return (
+        np.asarray(score - np.einsum("wjo,wo->wj", gain, spread * e)),
+        np.asarray(information - gain @ np.swapaxes(left, 1, 2)),
+    )
+
+
+def amplitudes(e: Floats, gram: Floats) -> Floats:
+    """Root mean square of sine and cosine of each order from ⟨ψ, e⟩ and ⟨ψ, ψ⟩ of healthy windows, (orders,).
+
+    With independent orders E⟨ψi, e⟩² = tr⟨ψi, ψi⟩ + Σj Aj²·‖⟨ψi, ψj⟩‖² (a window does not tell orders that are near
+    to each other apart), summed over the windows and solved for all Aj² ≥ 0.
+    """
+    windows, orders = len(e), e.shape[1] // 2
+    power = (e.reshape(windows, orders, 2) ** 2).sum(axis=(0, 2))
+    own = gram.reshape(windows, orders, 2, orders, 2)
+    noise = np.einsum("woioi->o", own)
+    shared = np.einsum("woipj,woipj->op", own, own)
+    scale = np.sqrt(np.diagonal(shared))
+    squared, _ = nnls(shared / np.outer(scale, scale), (power - noise) / scale)
+    return np.asarray(np.sqrt(squared / scale))
+
+
+def noise_power(power: Floats, gain: Floats, ripple: Ripple) -> Floats:
+    """Mean |E|² at each line without the ripple, (lines,).
+
+    Windows count the less the more of their power the ripple is expected to have.
+
+    Parameters
+    ----------
+    power
+        |E|², (windows, lines).
+    gain
+        Power that an order of unit amplitude (sine and cosine) brings, (windows, orders, lines).
+    """
+    if not len(ripple):
+        return np.asarray(power.mean(axis=0))
+    expected = np.einsum("wol,o->wl", gain, ripple.amplitude_n_m**2)
+    typical = np.median(power, axis=0) / np.log(2)
+    weight = (typical / (typical + expected)) ** 2
+    mean = (weight * (power - expected)).sum(axis=0) / weight.sum(axis=0)
+    return np.asarray(np.maximum(mean, typical / 4))

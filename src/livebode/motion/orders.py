@@ -1,0 +1,126 @@
+"""Orders: what repeats with the motor's angle, such as cogging, found in what a model leaves of ordinary strokes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal.windows import blackmanharris
+from scipy.stats import gamma
+
+from livebode.motion.replay import without_drift
+from livebode.nouns import Lines
+
+Floats = NDArray[np.float64]
+
+_PADDED = 2  # ways: length of the transform over the position
+_FINE = 2.5  # samples of the position in the shortest cycle that is looked for
+_FROM = 0.25  # of a bin, Hz: slower than that, the drift is taken off
+_BEYOND = 2  # bins above the highest line, whose orders still leak into it
+_FLOOR = 32  # widths of a peak, over which the noise is taken as constant
+_MASKED = 4.5  # widths of a peak, beside a line: what the model lacks may be there
+_CAP = 12.0  # of a stroke's power over its noise: a single stroke makes no order
+_STROKES_MIN = 5
+_FALSE = 1e-4  # chance of an order that is not there
+_APART = 8.0  # ways: peaks closer than that are one order
+_MOST = 8
+
+
+def shaft_position(position_m: Floats, velocity: Floats, window: int, rate_hz: float) -> Floats:
+    """Where the motor's shaft is, as metres of belt: the slow part from the position, the fast one from the velocity.
+
+    The excitation swings the shaft by a hundredth of a radian, which an order of 24 a turn sees as a quarter of one; a
+    measured position may be the cart's, or too coarse to hold it.
+
+    Parameters
+    ----------
+    position_m, velocity
+        Of the schedule, and of the motor, rad/s, shape (samples,) each; at least a window.
+    """
+    angle = (np.cumsum(velocity) - velocity / 2) / rate_hz
+    ends = np.arange(0, position_m.size, window)
+    travel, turned = np.diff(position_m[ends]), np.diff(angle[ends])
+    total = float(turned @ turned)
+    radius_m = float(travel @ turned) / total if total > 0 else 0.0
+    return without_drift(radius_m * angle, position_m, window)
+
+
+class OrderSpectrum:
+    """Power spectrum of a residual over the position, in cycles a metre, mean over steady strokes.
+
+    Over time a ripple's frequency follows the speed; over the position it stays. Each stroke is averaged onto an even
+    grid of positions (boxcar) and weighted with a Blackman–Harris window. Its power is divided by the noise around
+    (median over 32 widths of a peak), so that without a ripple it is exponentially distributed with mean 1. Around
+    the excitation's lines a stroke does not count: there the model may lack something, at a place that moves with the
+    speed. The sum over strokes is Gamma distributed. An order is a peak whose chance, times the places looked at, is
+    below 1e-4.
+
+    Bias: a ripple whose order meets a line in every stroke is not found, because the machine's response and the ripple
+    are then the same to every method. Strokes at two speeds tell them apart.
+
+    Parameters
+    ----------
+    lines
+        Of the excitation; orders that stay two bins above the highest one are not looked for.
+    way_m
+        From the lowest to the highest position.
+    slowest_m_per_s
+        Speed of the slowest stroke.
+    """
+
+    def __init__(self, lines: Lines, way_m: float, slowest_m_per_s: float) -> None:
+        self._lines_hz = lines.frequency_hz
+        bin_hz = lines.rate_hz / lines.window
+        self._least_hz, self._most_hz = _FROM * bin_hz, float(self._lines_hz[-1]) + _BEYOND * bin_hz
+        self._rate_hz = lines.rate_hz
+        wanted_m = slowest_m_per_s / (_FINE * self._most_hz)
+        self._points = 1 << max(int(np.ceil(np.log2(_PADDED * way_m / wanted_m))), 1)
+        self._step_m = _PADDED * way_m / self._points
+        self.cycles_per_m = np.arange(self._points // 2 + 1) / (_PADDED * way_m)
+        self._sum, self._whole = np.zeros((2, self.cycles_per_m.size))
+        self._count = np.zeros(self.cycles_per_m.size, dtype=np.int64)
+
+    def add(self, residual: Floats, position_m: Floats) -> None:
+        """A steady stroke: what the model leaves, and where, shape (samples,) each."""
+        even = _over_position(residual, position_m, self._step_m)
+        width = self._points / max(even.size, 1)
+        if even.size < _FLOOR or width > self.cycles_per_m.size / _FLOOR:
+            return
+        power = np.abs(np.fft.rfft((even - even.mean()) * blackmanharris(even.size), self._points)) ** 2
+        block = round(_FLOOR * width)
+        blocks = power[: power.size // block * block].reshape(-1, block)
+        noise = np.interp(
+            np.arange(power.size), (np.arange(len(blocks)) + 0.5) * block, np.median(blocks, axis=1) / np.log(2)
+        )
+        speed = abs(position_m[-1] - position_m[0]) * self._rate_hz / (position_m.size - 1)
+        frequency_hz = self.cycles_per_m * speed
+        use = (frequency_hz > self._least_hz) & (frequency_hz < self._most_hz) & (noise > 0)
+        beside = np.abs(frequency_hz[:, np.newaxis] - self._lines_hz).min(axis=1)
+        use &= beside > _MASKED * width * self.cycles_per_m[1] * speed
+        ratio = power[use] / noise[use]
+        self._sum[use] += np.minimum(ratio, _CAP)
+        self._whole[use] += ratio
+        self._count += use
+
+    def found(self) -> Floats:
+        """Orders in cycles a metre, the strongest first, at most eight."""
+        enough = self._count >= _STROKES_MIN
+        strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
+        chance = np.where(enough, gamma.logsf(self._sum, np.maximum(self._count, 1)), 0.0)
+        limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
+        orders, apart = list[float](), round(_APART * _PADDED)
+        left = chance < limit
+        while left.any() and len(orders) < _MOST:
+            peak = int(np.argmax(np.where(left, strength, 0.0)))
+            orders.append(float(self.cycles_per_m[peak]))
+            left[max(peak - apart, 0) : peak + apart + 1] = False
+        return np.array(orders)
+
+
+def _over_position(residual: Floats, position_m: Floats, step_m: float) -> Floats:
+    """Means of the residual over even steps of the position."""
+    way = np.abs(position_m - position_m[0])
+    way = np.maximum.accumulate(way) + np.arange(way.size) * 1e-9 * step_m
+    edges = np.arange(0.0, way[-1], step_m)
+    total = np.interp(edges, way, np.cumsum(residual))
+    count = np.interp(edges, way, np.arange(way.size, dtype=np.float64))
+    return np.asarray(np.diff(total) / np.maximum(np.diff(count), 1e-9))

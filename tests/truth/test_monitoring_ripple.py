@@ -1,0 +1,91 @@
+"""What repeats with the motor's angle: orders found, allowed for, and no alarm; and a delay of the velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from livebode.monitoring import learn_machine
+from livebode.monitoring.ripple import Ripple, allowed_for, amplitudes, noise_power
+from livebode.motion.orders import OrderSpectrum, shaft_position
+from livebode.simulation import Sensor
+from studies.healthy import CONDITIONS, Condition, healthy_run, simulated, trial
+from studies.monitoring_axis import LINES, RADIUS_M, RATE_HZ
+
+COGGING_PER_M = 24 / (2 * np.pi * RADIUS_M)
+
+
+def spectrum(orders: dict[float, float], *, line_hz: float = 0.0, speeds: int = 30) -> OrderSpectrum:
+    """Strokes at random speeds with noise of 0.1, orders of these amplitudes, and what a model misses at a line."""
+    generator, found = np.random.default_rng(1), OrderSpectrum(LINES, 1.35, 0.114)
+    for speed in generator.uniform(0.114, 0.38, speeds):
+        time_s = np.arange(int(1.2 / speed * RATE_HZ)) / RATE_HZ
+        position_m = 0.3 + speed * time_s
+        residual = 0.1 * generator.standard_normal(time_s.size) + 0.1 * np.cos(2 * np.pi * line_hz * time_s)
+        for order, amplitude in orders.items():
+            residual += amplitude * np.cos(2 * np.pi * order * position_m + generator.uniform(0, 6))
+        found.add(residual, position_m)
+    return found
+
+
+def test_orders_are_found_whatever_their_phase_and_lines_are_none() -> None:
+    found = spectrum({COGGING_PER_M: 0.02, COGGING_PER_M / 4: 0.01}, line_hz=60.0).found()
+    assert sorted(found) == pytest.approx([COGGING_PER_M / 4, COGGING_PER_M], abs=0.4)
+
+
+def test_noise_and_what_a_model_misses_at_a_line_are_no_orders() -> None:
+    assert spectrum({}, line_hz=60.0).found().size == 0
+
+
+def test_the_shaft_swings_as_the_velocity_says() -> None:
+    """The cart's position is smooth; the shaft's own swing of 5 mrad at 60 Hz is in the velocity alone."""
+    time_s = np.arange(4000) / RATE_HZ
+    swing = 5e-3 * np.sin(2 * np.pi * 60 * time_s)
+    velocity = 10.0 + np.gradient(swing) * RATE_HZ
+    shaft_m = shaft_position(0.5 + 10.0 * RADIUS_M * time_s, velocity, 400, RATE_HZ)
+    inside = slice(500, 3500)
+    off = (shaft_m - 0.5 - 10.0 * RADIUS_M * time_s - RADIUS_M * swing)[inside]
+    assert np.ptp(off) < 0.02 * RADIUS_M * 5e-3
+
+
+def test_allowing_for_a_ripple_is_generalised_least_squares() -> None:
+    generator = np.random.default_rng(2)
+    s, psi, e = (generator.standard_normal((12, n)) for n in (4, 2, 1))
+    noise, spread = generator.uniform(0.5, 2.0, 12), np.array([0.7, 3.0])
+    inverse = np.linalg.inv(np.diag(noise) + psi @ np.diag(spread**2) @ psi.T)
+    weighted = [x.T / noise for x in (s, psi)]
+    score, information = allowed_for(
+        (weighted[0] @ e).T, (weighted[0] @ s)[None], (weighted[1] @ e).T, (weighted[0] @ psi)[None],
+        (weighted[1] @ psi)[None], spread,
+    )  # fmt: skip
+    assert score[0] == pytest.approx((s.T @ inverse @ e)[:, 0])
+    assert information[0] == pytest.approx(s.T @ inverse @ s)
+
+
+def test_the_size_of_each_order_and_the_noise_below_it_are_told_apart() -> None:
+    """Two orders whose windows resemble each other, of which one is not there; the noise at a line that they hit."""
+    generator, windows = np.random.default_rng(3), 2000
+    psi = generator.standard_normal((windows, 14, 4))
+    psi[:, :, 2:] += psi[:, :, :2]
+    amplitude = generator.standard_normal((windows, 2)) * 0.5
+    e = np.einsum("wlo,wo->wl", psi[:, :, :2], amplitude) + generator.standard_normal((windows, 14))
+    gram = np.einsum("wlo,wlp->wop", psi, psi)
+    found = amplitudes(np.einsum("wlo,wl->wo", psi, e), gram)
+    assert found == pytest.approx([0.5, 0.0], abs=0.05)
+    gain = (psi[:, :, 0::2] ** 2 + psi[:, :, 1::2] ** 2).swapaxes(1, 2)
+    power = noise_power(e**2, gain, Ripple(np.array([1.0, 2.0]), np.array([0.5, 0.0])))
+    assert power == pytest.approx(np.ones(14), rel=0.3)
+
+
+def test_cogging_and_a_delay_are_learned_and_raise_no_alarm() -> None:
+    """The healthy campaign in short (`make healthy`): both at once, runs that gave alarms before, a change detected."""
+    late = Sensor(noise_rad_per_s=0.1, velocity_differenced=True)
+    machine_with = Condition("both", drive={"torque_ripple_n_m": 0.05}, sensor=late, delay_samples=1)
+    assert {"ripple 0.05 N m", "delay of 1.5 samples"} < set(CONDITIONS)
+    runs = [simulated(machine_with, 9000, strokes=8)]
+    learned = learn_machine(runs, LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
+    assert learned.ripple.cycles_per_m == pytest.approx([COGGING_PER_M], abs=0.4)
+    assert learned.ripple.amplitude_n_m == pytest.approx([0.05 / np.sqrt(2)], rel=0.2)
+    assert learned.delay_s * RATE_HZ == pytest.approx(1.5, abs=0.02)
+    assert healthy_run(machine_with, learned, 20_000) == []
+    assert trial(machine_with, learned, 40_001) == "stiffness"
