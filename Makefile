@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies monitoring healthy fuzz crash system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy fuzz crash damage soak attacks system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -43,6 +43,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.live
+	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.dashboard
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
@@ -50,6 +51,12 @@ peers: $(VENV)/.bench  ## livebode and what others would take, on the same simul
 
 studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
 	$(BIN)/python -m studies
+
+repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
+	$(BIN)/python -m studies.repeating
+
+fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/fits.md)
+	$(BIN)/python -m studies.fit_bounds
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
@@ -65,8 +72,19 @@ fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sour
 	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
 	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
 
-crash: $(BUILT)  ## kill processes that record at 1,000 random moments
+damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_bit_flips.py
+	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_hostile.py
+
+crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -s tests/fault/test_live_killed.py
+
+soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
+	$(BIN)/python -m studies.soak
+
+attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
+	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/fault/test_dashboard_attacks.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

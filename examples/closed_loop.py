@@ -21,9 +21,10 @@ class Plant:
     """Two masses (11), (12) without friction; state φ, φ', x, x'; velocity φ' out."""
 
     keff: float = KEFF
+    bs: float = BS
 
     def continuous(self) -> tuple[np.ndarray, np.ndarray]:
-        k, b = self.keff, BS
+        k, b = self.keff, self.bs
         a = np.array(
             [
                 [0, 1, 0, 0],

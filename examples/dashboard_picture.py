@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from livebode.dashboard import Dashboard, Serving
-from livebode.session.demo import demo
+from livebode.session.demo import demo, demo_baseline
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 SECONDS, MOMENT_S = 40.0, 27.8
@@ -31,7 +31,8 @@ def main() -> None:
             target=demo,
             args=(Path(folder) / "demo",),
             kwargs={
-                "seconds": SECONDS, "seed": 1, "real_time": False, "progress": lambda *_: None, "audience": hub,
+                "seconds": SECONDS, "seed": 1, "real_time": False, "baseline": demo_baseline(2),
+                "progress": lambda *_: None, "audience": hub,
                 "draw": lambda *_: None,
             },
         )  # fmt: skip

@@ -45,11 +45,12 @@ def livebode(*arguments: object) -> Result:
 
 
 def signals(samples: int = 2000, noise: float = 0.01, seed: int = 0) -> dict[str, np.ndarray]:
-    """A plant of gain 2 behind a sample of delay, driven by a multisine at 50, 100 and 200 Hz."""
+    """A plant of gain 2 behind a sample of delay, driven by lines at 50, 100 and 200 Hz, in the periodic state."""
     rng = np.random.default_rng(seed)
-    w = np.resize(multisine(LINES), samples)
+    period = multisine(LINES)
+    w = np.resize(period, samples)
     u = w + noise * rng.standard_normal(samples)
-    y = 2 * np.concatenate([[0.0], u[:-1]]) + noise * rng.standard_normal(samples)
+    y = 2 * np.concatenate([period[-1:], u[:-1]]) + noise * rng.standard_normal(samples)
     return {"t": np.arange(samples) / RATE_HZ, "w": w, "u": u, "y": y}
 
 

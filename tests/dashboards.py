@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,15 +12,16 @@ from typing import Any
 import numpy as np
 
 from examples.closed_loop import RATE_HZ, Drive
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Block, Channel, Lines
+from livebode.nouns import Block, Channel, Lines, Responses
 from livebode.records import Run
 from livebode.session.axis import FitSection, LoopSection, RecordSection
 from livebode.session.fits import Fits
 from livebode.session.tracking import record
 from tests.browser import until
+from tests.responses import made
 
 LINES = Lines.parse("20:140:10", RATE_HZ, 400)
 UNITS = {"w": "N m", "u": "N m", "y": "rad/s", "x": "m"}
@@ -134,3 +136,12 @@ def whole_run(directory: Path, loop: dict[str, Any] | None = LOOP) -> Path:
     with Watched(directory, loop=loop) as run:
         run.go(SAMPLES)
     return directory
+
+
+def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0, rows: Responses | None = None) -> None:
+    """A run on these lines, with its first responses, that begins at this time."""
+    found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
+    found |= {"quantity": "plant", "unit": ""}
+    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
+    rows = rows or made(30, lines, hole=0.0, unit="")
+    hub.write(replace(rows, time_s=rows.time_s + from_s))

@@ -13,6 +13,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.nouns import Block, Channel, Event, Responses
 from livebode.records import Run
 from livebode.session.axis import RecordSection
+from livebode.session.event_groups import each_event
 from livebode.session.tracking import Outcome, record
 from tests.command import LINES, RATE_HZ, signals
 
@@ -34,12 +35,13 @@ def data(samples: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Machine:
-    """The same samples each time; `samples` says what the source knows of its end."""
+    """The same samples each time, numbered from `first` on; `samples` says what the source knows of its end."""
 
     data: np.ndarray
     samples: int | None = None
     block_samples: int = 170
     each: Callable[[int], None] = lambda _: None
+    first: int = 0
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -49,7 +51,8 @@ class Machine:
         rows = [NAMES.index(name) for name in channels]
         for start in range(0, self.data.shape[1], self.block_samples):
             self.each(start)
-            yield Block(self.data[rows, start : start + self.block_samples], tuple(channels), RATE_HZ, start=start)
+            piece = self.data[rows, start : start + self.block_samples]
+            yield Block(piece, tuple(channels), RATE_HZ, start=self.first + start)
 
 
 def machine(samples: int, each: Callable[[int], None] = lambda _: None) -> Machine:
@@ -104,7 +107,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
     assert number.size >= sample_min
     due = int(np.count_nonzero(responses.sample < number.size))
     assert len(found) == due
-    said = [event for event in run.events() if not event.kind.startswith(OWN)]
+    said = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
     # An event is written before the rows that belong to it are committed.
     assert said == list(events[: len(said)])
     assert len(said) >= sum(event.sample < number.size for event in events)

@@ -16,7 +16,7 @@ from examples.closed_loop import RATE_HZ
 from livebode.dashboard import Hub
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, VALUES_MAX
-from livebode.dashboard.notices import NOTICES_MAX, Notices, event_id
+from livebode.dashboard.notices import CAUSES_MAX, Notices, acknowledgement, event_id
 from livebode.dashboard.past import Past
 from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
@@ -172,17 +172,71 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
 
 def test_notices_are_bounded_and_known_again() -> None:
     notices = Notices()
-    for i in range(NOTICES_MAX + 500):
-        notices.take(Event("spike", i, float(i), "a spike"))
-    assert len(notices.since(0)) == NOTICES_MAX
+    for i in range(CAUSES_MAX + 500):
+        notices.take(Event("change", i, float(i), "changed", {"what": f"part {i}"}))
+    assert len(notices.since(0)) == CAUSES_MAX
+    notices = Notices()
     event = Event("change", 7, 1.0, "changed")
     notices.take(event)
     notices.take(event)
     assert notices.counts["change"] == 1
     before = notices.version
     notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": event_id(event)}))
-    assert [(n["id"], n["acknowledged"]) for n in notices.since(before)] == [(event_id(event), True)]
+    assert [(n["id"], n["count"], n["seen"]) for n in notices.since(before)] == [(event_id(event), 1, 1)]
     notices.take(Event("acknowledged", 9, 2.0, "seen", {"event": "unknown"}))
+
+
+def test_events_of_one_cause_are_one_notice_and_acknowledged_up_to_the_one_that_was_seen() -> None:
+    notices = Notices()
+    events = [Event("change", i, float(i), f"stiffness less, {i}", {"what": "stiffness"}) for i in range(1000)]
+    for event in events:
+        notices.take(event)
+    notices.take(Event("change", 5, 5.0, "inertia more", {"what": "inertia"}))
+    stiffness, inertia = notices.since(0)
+    assert (stiffness["count"], stiffness["first_s"], stiffness["last_s"]) == (1000, 0.0, 999.0)
+    assert stiffness["message"] == "stiffness less, 999"
+    assert inertia["count"] == 1
+    notice, count = notices.of(event_id(events[900]))  # type: ignore[misc]
+    notices.take(acknowledgement(notice, event_id(events[900]), count, 1000, 10.0))
+    assert [n["seen"] for n in notices.since(0)] == [901, 0]
+    assert notices.changed == {"stiffness", "inertia"}
+    notices.take(Event("change-cleared", 1001, 11.0, "stiffness as learned", {"what": "stiffness"}))
+    assert notices.changed == {"inertia"}
+
+
+def test_groups_that_the_run_made_are_counted_by_what_they_say() -> None:
+    """Their repeats are reported in growing steps; after a pause the same cause begins another group."""
+    notices = Notices()
+    for sample, name, count in ((0, "loss@0", 1), (10, "loss@0", 2), (40, "loss@0", 8), (900, "loss@900", 1)):
+        notices.take(Event("gap", sample, sample / 10, "a gap", {"group": name, "count": count, "first_s": 0.0}))
+    notices.take(Event("overflow", 950, 95.0, "dropped", {"group": "loss@900", "count": 2, "first_s": 90.0}))
+    (notice,) = notices.since(0)
+    assert (notice["cause"], notice["kind"], notice["count"], notice["last_s"]) == ("loss", "overflow", 10, 95.0)
+
+
+def test_moments_have_a_clock_where_a_machine_sends(tmp_path: Path) -> None:
+    found = {
+        "bins": list(LINES.bins),
+        "quiet_bins": [],
+        "window": LINES.window,
+        "rate_hz": RATE_HZ,
+        "quantity": "plant",
+    }
+    summary = {"found": found | {"unit": ""}, "configuration": {}}
+    for block, clock_s in (
+        (Block(np.zeros((1, 40)), ("y",), RATE_HZ, start=4000), None),
+        (LiveBlock(np.zeros((1, 40)), ("y",), RATE_HZ, start=4000, arrived_s=time.monotonic() - 5), time.time() - 6.01),
+    ):
+        hub = Hub("axis")
+        state = State("axis", 0, hub)
+        hub.begin(tmp_path, summary, None)
+        hub.followed(block)
+        state.refresh()
+        assert state.span()["clock_s"] == (None if clock_s is None else pytest.approx(clock_s, abs=0.5))
+    dated = made(5, LINES, hole=0.0)
+    hub.write(Responses(**{**vars(dated), "time_s": dated.time_s + 1.79e9}))
+    state.refresh()
+    assert state.span()["clock_s"] == 0.0
 
 
 def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.nouns import Event, Lines
 from livebode.records import Run
 from tests.browser import TABLET, Tab, chromium, until
-from tests.dashboards import LINES, LOOP, Watched, whole_run
+from tests.dashboards import LINES, Watched, begin, whole_run
 from tests.responses import made
 
 
@@ -93,15 +93,6 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         page.keyboard.press("f")
         tab.until("!bode.curves.reference")
         assert tab.wrong == []
-
-
-def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0) -> None:
-    """A run on these lines, with its first responses, that begins at this time."""
-    found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
-    found |= {"quantity": "plant", "unit": ""}
-    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
-    rows = made(30, lines, hole=0.0, unit="")
-    hub.write(replace(rows, time_s=rows.time_s + from_s))
 
 
 @contextlib.contextmanager

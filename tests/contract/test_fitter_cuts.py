@@ -17,11 +17,12 @@ BELT = TwoMass(radius_m=0.019)
 ROWS = 70
 
 
-def run() -> Responses:
-    """A wandering stiffness, with some rows that hold nothing."""
+def run(late_s: float = 0.0) -> Responses:
+    """A wandering stiffness, with some rows that hold nothing, and a delay."""
     grid = Grid.of(LINES)
     values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
     values[:, 2] *= np.linspace(1.0, 1.4, ROWS)
+    values[:, -1] = late_s
     found = noisy(BELT.at(values, grid), LINES, 0.01, ROWS)
     value = found.value.copy()
     value[30:34] = np.nan
@@ -36,10 +37,10 @@ def same(one: Parameters, other: Parameters) -> None:
     assert np.allclose(one.epsilon, other.epsilon, rtol=1e-6, atol=1e-9, equal_nan=True)
 
 
-@given(st.lists(st.integers(1, 40), max_size=12))
-@settings(max_examples=6, deadline=None)
-def test_any_way_of_cutting_gives_the_same(cuts: list[int]) -> None:
-    every = run()
+@given(st.lists(st.integers(1, 40), max_size=12), st.sampled_from([0.0, 4e-4]))
+@settings(max_examples=8, deadline=None)
+def test_any_way_of_cutting_gives_the_same(cuts: list[int], late_s: float) -> None:
+    every = run(late_s)
     whole = Fitter(BELT)
     expected = whole.process(every)
     edges = [0, *np.minimum(np.cumsum(cuts, dtype=int), ROWS).tolist(), ROWS]
@@ -49,8 +50,9 @@ def test_any_way_of_cutting_gives_the_same(cuts: list[int]) -> None:
     assert [e.kind for e in fitter.drain_events()] == [e.kind for e in whole.drain_events()]
 
 
-def test_a_resumed_fitter_equals_one_that_went_on() -> None:
-    every = run()
+@pytest.mark.parametrize("late_s", [0.0, 4e-4])
+def test_a_resumed_fitter_equals_one_that_went_on(late_s: float) -> None:
+    every = run(late_s)
     expected = Fitter(BELT).process(every)
     first = Fitter(BELT)
     head = first.process(every[:37])
@@ -61,6 +63,14 @@ def test_a_resumed_fitter_equals_one_that_went_on() -> None:
         Fitter(BELT, free=["delay"]).restore(first.snapshot())
     with pytest.raises(InputError, match="damaged"):
         second.restore(first.snapshot()[:40])
+
+
+def test_a_delay_is_taken_by_every_row_that_shows_it_and_by_none_where_it_is_held() -> None:
+    late = run(4e-4)
+    found = Fitter(BELT).process(late)
+    assert np.all(np.abs(found["delay"][found.ok] - 4e-4) < 4 * found.sigma[found.ok, -1])
+    assert np.all(Fitter(BELT, fixed={"delay": 0.0}).process(late)["delay"][found.ok] == 0.0)
+    assert np.all(Fitter(BELT).process(run())["delay"][found.ok] == 0.0)
 
 
 def test_events_tell_where_fits_fail_and_hold_again() -> None:

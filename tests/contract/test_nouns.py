@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib import pyplot
 
 from livebode.nouns import (
     PID,
@@ -19,6 +22,7 @@ from livebode.nouns import (
     Lines,
     Loop,
     PositionPD,
+    Quantity,
     Response,
     Responses,
     as_model,
@@ -209,3 +213,11 @@ def test_loops_that_cannot_be(make: object, says: str) -> None:
     with pytest.raises(InputError) as refused:
         make()
     assert says in str(refused.value)
+
+
+@pytest.mark.parametrize("quantity", ["plant", "open loop"])
+def test_an_exported_response_is_drawn_by_python_control(quantity: Quantity) -> None:
+    frd = replace(response(Lines.parse("20:80:20", 4000, 400)), quantity=quantity).to_control()
+    drawn = control.bode_plot(frd)
+    assert quantity in drawn.axes[0, 0].get_figure()._suptitle.get_text()
+    pyplot.close("all")

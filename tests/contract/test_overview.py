@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import tracemalloc
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,3 +37,19 @@ def test_it_keeps_every_nth_row(sizes: list[int]) -> None:
     assert np.array_equal(kept.sample, np.arange(0, first, stride))
     assert first == 0 or len(kept) > min(first, 2048) // 2
     assert np.array_equal(kept.value[:, 0].real, kept.sample)
+
+
+@pytest.mark.parametrize("rows", [0, 1, 5])
+def test_its_memory_stays_flat_however_many_batches_come(rows: int) -> None:
+    overview, first = Overview(), 0
+    tracemalloc.start()
+    held = []
+    for _ in range(2):
+        for _ in range(3_000):
+            overview.add(batch(first, rows))
+            first += rows
+        gc.collect()
+        held.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    # Twice the rows of which at most 2,048 are held, at some 130 bytes; one empty part a batch costs 2 kB each.
+    assert held[1] - held[0] < 2048 * 200

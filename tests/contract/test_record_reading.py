@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from livebode.estimation import Tracker
 from livebode.nouns import Block, Event, InputError
 from livebode.records import Run, RunDirectory
 from livebode.session.axis import RecordSection
+from livebode.session.event_groups import each_event
 from livebode.session.tracking import record
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 from tests.recorded import (
@@ -54,6 +56,11 @@ def record_until(sample: int, directory: Path, **options: object) -> None:
         record_machine(machine(SAMPLES), directory, progress=stop_at(sample), **options)
 
 
+def each(run: Run) -> list[Event]:
+    """Its events as they happened, before they were grouped."""
+    return [one for event in run.events() for one in each_event(event)]
+
+
 def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
     record(
@@ -63,7 +70,8 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     check_whole(tmp_path / "segments", SAMPLES)
     runs = [Run.open(tmp_path / name) for name in ("segments", "piece")]
     assert same(runs[0].responses(), runs[1].responses())
-    assert runs[0].events() == runs[1].events() == list(expected(SAMPLES)[1])
+    assert runs[0].events() == runs[1].events()
+    assert each(runs[0]) == list(expected(SAMPLES)[1])
     assert runs[0].summary["counts"] == runs[1].summary["counts"]
     assert [run.finished for run in runs] == [True, True]
     assert len(runs[0].segments) == 2 * SAMPLES // RATE_HZ
@@ -94,7 +102,7 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
         while not going.wait(0.001):
             if (directory / "run.json").exists():
                 run = Run.open(directory)
-                seen, said = run.responses(), run.events()
+                seen, said = run.responses(), each(run)
                 number = np.concatenate([np.zeros(0, int), *(t["sample"].to_numpy() for t in run.tables("samples"))])
                 assert same(seen, responses[: len(seen)])
                 assert said == list(events[: len(said)])
@@ -123,14 +131,13 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
 def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     record_until(1500, tmp_path / "run", again=False)
     held = check_beginning(tmp_path / "run", SAMPLES, 500)
-    without_end = replace(machine(SAMPLES), samples=None)
+    missing = 250
+    without_end = replace(machine(SAMPLES), samples=None, first=held + missing)
     record_machine(without_end, tmp_path / "run", again=False)
     run = Run.open(tmp_path / "run")
     assert not run.finished  # it was stopped, and may go on
     assert run.summary["counts"]["gaps"] == 1
     number = np.concatenate([table["sample"].to_numpy() for table in run.tables("samples")])
-    missing = int(number[held]) - held
-    assert missing >= 1
     assert np.array_equal(number, np.r_[:held, held + missing : held + missing + SAMPLES])
     # The same as if the machine had fallen silent for so long.
     tracker = Tracker(SETTINGS)
@@ -140,7 +147,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     ]
     assert same(run.responses(), type(parts[0]).join(parts))
     assert [event.kind for event in run.events()].count("gap") == 1
-    record_machine(without_end, tmp_path / "run", again=False)
+    record_machine(replace(without_end, first=held + 2 * missing + SAMPLES), tmp_path / "run", again=False)
     assert Run.open(tmp_path / "run").summary["counts"]["gaps"] == 2
 
 
@@ -218,8 +225,9 @@ def test_other_tools_read_the_segments(tmp_path: Path) -> None:
     responses = Run.open(tmp_path / "run").responses()
     rows = duckdb.sql(f"SELECT re FROM '{tmp_path}/run/responses/*.parquet' ORDER BY sample, frequency_hz").fetchall()
     assert np.array_equal(np.array(rows)[:, 0], responses.value.real.ravel(), equal_nan=True)
-    assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/run/manifest.jsonl'").fetchall() == [(4,)]
-    assert duckdb.sql(f"SELECT kind FROM '{tmp_path}/run/events.jsonl'").fetchall() == [("non-finite",), ("spike",)]
+    assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/run/manifest.jsonl'").fetchall() == [(8,)]
+    kinds = [kind for (kind,) in duckdb.sql(f"SELECT kind FROM '{tmp_path}/run/events.jsonl'").fetchall()]
+    assert kinds == ["noise-from-detection-lines", "non-finite", "spike"]
     table = pq.read_table(tmp_path / "run" / "samples")
     assert np.array_equal(table["u"].to_numpy(), data(SAMPLES)[1])
     for segment in Run.open(tmp_path / "run").segments:
@@ -284,3 +292,23 @@ def test_signals_that_mean_nothing_are_said_and_kept(tmp_path: Path) -> None:
     assert run.finished
     assert len(run.responses()) == SAMPLES // SETTINGS.step
     assert ["constant at 0" in event.message for event in run.events() if event.kind == "doubtful"] == [True]
+
+
+def test_an_empty_or_interrupted_query_ends_in_a_sentence(tmp_path: Path) -> None:
+    record_machine(machine(SAMPLES), tmp_path / "run")
+    for sql in ("", "  ;", "/* nothing */"):
+        done = livebode("query", tmp_path / "run", sql)
+        assert (done.code, done.out) == (2, "")
+        assert "the query is empty; write SQL on events, responses, samples" in done.err
+    command = [str(Path(sys.executable).with_name("livebode")), "query", str(tmp_path / "run")]
+    # What runs the tests may ignore the signal, and what it starts with it.
+    process = subprocess.Popen(
+        [*command, "SELECT 1; SELECT count(*) FROM range(100000000) a, range(100000) b WHERE a.range * b.range = 3"],
+        stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    # It is asking once it has used the processor for longer than it takes to start.
+    while sum(map(int, Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13])) < 250:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate()[1].strip() in ("", "Aborted.")
+    assert process.returncode == 130

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, InputError, Lines
+from livebode.nouns import Block, DamageWarning, InputError, Lines
 from livebode.records import Run
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 
@@ -38,10 +38,10 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
     for field in fields(found):
         a, b = getattr(found, field.name), getattr(expected, field.name)
         assert np.array_equal(a, b, equal_nan=a.dtype.kind in "fc") if isinstance(a, np.ndarray) else a == b, field.name
-    assert [event.kind for event in read.events()] == ["non-finite"]
+    assert [event.kind for event in read.events()] == ["noise-from-detection-lines", "non-finite"]
 
 
-def test_what_is_not_a_whole_run_is_refused(run: Path, tmp_path: Path) -> None:
+def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) -> None:
     def refused(path: Path) -> str:
         with pytest.raises(InputError) as error:
             Run.open(path).responses()
@@ -51,8 +51,13 @@ def test_what_is_not_a_whole_run_is_refused(run: Path, tmp_path: Path) -> None:
     table = run / "responses.parquet"
     whole = table.read_bytes()
     table.write_bytes(whole[: len(whole) // 2])
-    assert "responses.parquet' cannot be read" in refused(run)
+    with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is, and nothing of it can be read"):
+        assert len(Run.open(run).responses()) == 0
     (run / "run.json").write_text("{")
+    with pytest.warns(DamageWarning, match=r"run\.json' is damaged \(it has no checksum\); its copy"):
+        assert Run.open(run).events()
+    (run / "run-copy.json").write_text("[]")
     assert "run.json' cannot be read" in refused(run)
-    (run / "run.json").write_text("[]")
-    assert "does not name its lines" in refused(run)
+    (run / "run-copy.json").unlink()
+    (run / "run.json").write_text("{}")
+    assert "is not what a run writes (found: Field required)" in refused(run)

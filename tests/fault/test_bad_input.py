@@ -126,6 +126,7 @@ def test_files_that_are_not_what_they_seem(log: Path, tmp_path: Path) -> None:
     ("text", "says"),
     [
         ("[source", ("is not TOML",)),
+        (f"[lines]\nwindow=0x{'f' * 50_000}", ("lines.window is a whole number of 200000 bits", "correct it")),
         ("[signals]\noutput='y'", ("'source' is missing",)),
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\ninptu='u'", ("signals.inptu", "did you mean 'input'?")),
         ("[source]\nlog='log.parquet'\n[signals]\noutput=3", ("signals.output = 3",)),

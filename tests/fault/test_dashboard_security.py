@@ -6,8 +6,12 @@ import asyncio
 import contextlib
 import json
 import re
+import resource
 import socket
 import ssl
+import subprocess
+import sys
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -19,10 +23,12 @@ import pytest
 import websockets
 from websockets.sync.client import ClientConnection, connect
 
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, Serving, patience
 from livebode.dashboard.access import Access, TooManyTriesError
 from livebode.dashboard.app import SOCKETS_MAX
 from livebode.dashboard.guard import Guard
+from livebode.dashboard.listener import connections_max
+from livebode.dashboard.server import Faults
 from livebode.nouns import Event, InputError
 from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium, until
@@ -167,6 +173,7 @@ def test_every_answer_says_what_browsers_must_not_do(watched: Watched) -> None:
         assert "unsafe" not in policy
         assert "frame-ancestors 'none'" in policy
         assert headers["x-content-type-options"] == "nosniff"
+        assert "strict-transport-security" not in headers, "it is for TLS alone"
         assert "server" not in headers
     for path in ("/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fapp.py", "/static/uplot/../../app.py"):
         assert ask(watched, path)[0] == 404, path
@@ -279,8 +286,11 @@ def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
         answer(live, "facts")
         live.send("no json")
         assert answer(live, "error") == "the message is not JSON"
+        live.send(b"\x00\xff")
+        assert answer(live, "error") == "a message is text, not bytes"
         live.send('{"kind": "watch"}')
         answer(live, "facts")
+    assert not [line for line in watched.told if "internal error" in line]
 
 
 def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
@@ -353,6 +363,30 @@ def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, 
     assert not any(secret in str(refused.value) for secret in SERVE.values() if len(secret) > 5)
 
 
+@pytest.mark.parametrize("key", ["token_file", "viewer_token_file"])
+def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "the token"
+    path.write_text(TOKEN)
+    section = ServeSection.model_validate({key: path})
+    for mode in (0o644, 0o604, 0o620, 0o602):
+        path.chmod(mode)
+        with pytest.raises(InputError, match=re.escape(f"(mode {mode:04o}); run `chmod 600 '{path}'`")) as refused:
+            Serving.of(section)
+        assert TOKEN not in str(refused.value)
+    for mode in (0o600, 0o640, 0o400):
+        path.chmod(mode)
+        assert TOKEN in (Serving.of(section).token, Serving.of(section).viewer_token)
+
+
+def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "dashboard.md").read_text()
+    command = re.search(r"^    (.*token_urlsafe.*)$", text, re.MULTILINE).group(1)
+    path = tmp_path / "token"
+    command = command.replace("/etc/livebode/token", str(path)).replace("python ", f"{sys.executable} ")
+    subprocess.run(["sh", "-c", f"umask 022; {command}"], check=True)
+    assert Serving.of(ServeSection(token_file=path)).token == path.read_text().strip()
+
+
 def test_a_port_that_is_taken_is_said() -> None:
     with Dashboard(Serving("127.0.0.1", 0)) as first:
         port = int(first.url.rsplit(":", 1)[1].strip("/"))
@@ -377,8 +411,60 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
         )
         with urllib.request.urlopen(request, context=trust) as answer:
             assert "Secure" in answer.headers["set-cookie"]
+            assert answer.headers["strict-transport-security"] == "max-age=31536000"
         with pytest.raises((OSError, urllib.error.URLError)):
             urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
+
+
+def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As by a reload of the page: its connection is over before a request would have been due."""
+    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    authority, told = Authority(tmp_path, "authority"), list[str]()
+    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
+    with Dashboard(Serving("127.0.0.1", 0, tls=tls), told.append) as dashboard:
+        dashboard.hub("axis")
+        url = dashboard.url.replace("https", "wss") + "live"
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            live.recv()
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            time.sleep(1.5)  # the listener has looked at both
+            live.send('{"kind": "pause"}')
+            assert "facts" in json.loads(live.recv())
+    assert told == []
+    assert capfd.readouterr().err == ""
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    host = f"127.0.0.1:{port_of(watched)}"
+    head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
+    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
+        slow.sendall(head.encode())
+        assert slow.recv(100) == b""
+    assert "internal error" not in " ".join(watched.told)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("soft", "most"), [(1024, 128), (256, 64), (16, 8), (resource.RLIM_INFINITY, 128)])
+def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.MonkeyPatch, soft: int, most: int) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
+    assert connections_max() == most
+
+
+def test_faults_of_the_server_are_told_once_a_minute() -> None:
+    told = list[str]()
+    faults = Faults(told.append)
+    for _ in range(1000):
+        try:
+            raise ValueError("odd")
+        except ValueError as error:
+            faults.take(error)
+    assert len(told) == 1
+    assert "internal error in the dashboard: ValueError('odd') at" in told[0]
 
 
 def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:

@@ -102,8 +102,8 @@ def test_lines_off_or_closer_than_the_grid_are_refused_with_the_nearest_choice()
     assert finest == pytest.approx(2 * 4000 / 2**24, rel=1e-2)
     coarse = refused(lambda: choose(Wish(band_hz=(20, 1999), resolution_hz=3000), MACHINE), GridError)
     assert "the coarsest is 1600 Hz" in coarse
-    between = refused(lambda: choose(Wish(band_hz=(21, 39), resolution_hz=20), MACHINE), GridError)
-    assert "nearest are 20 and 40 Hz" in between
+    between = refused(lambda: choose(Wish(band_hz=(31, 49), resolution_hz=20), MACHINE), GridError)
+    assert "nearest are 30 and 50 Hz" in between
     twice = refused(lambda: choose(Wish(lines="20, 20", window=400), MACHINE), GridError)
     assert "more than once" in twice
 
@@ -195,6 +195,7 @@ def test_names_that_pass_compile(tmp_path):
     assert "suffix" in refused(lambda: write(tmp_path / "a.xyz", waveform))
 
 
+GIVEN = {"lines": "20:140:20", "window": 400, "kind": "multisine"}
 WRONG = [
     ({"kind": "multisin"}, "should be 'multisine', 'odd'"),
     ({"bands_hz": [20, 140]}, "did you mean 'band_hz'?"),
@@ -203,8 +204,8 @@ WRONG = [
     ({"seed": 1.5}, "should be a valid integer"),
     ({"seed": -1}, "seed=-1"),
     ({"amplitude_n_m": 0}, "amplitude_n_m=0"),
-    ({"amplitude_n_m": [1, 2]}, "2 amplitudes for 7 lines"),
-    ({"amplitude_n_m": [1, 1, 1, 0, 1, 1, 1]}, "no power at 80 Hz"),
+    ({"amplitude_n_m": [1, 2]} | GIVEN, "2 amplitudes for 7 lines"),
+    ({"amplitude_n_m": [1, 1, 1, 0, 1, 1, 1]} | GIVEN, "no power at 80 Hz"),
     ({"amplitude_n_m": [1, 2], "kind": "prbs"}, "lists 2 amplitudes, but 'prbs' has one"),
     ({"amplitude_n_m": [1, 2], "shape": "equal snr"}, "leave one out"),
     ({"window": 0}, "window=0"),
@@ -216,7 +217,7 @@ WRONG = [
     ({"amplitude_n_m": 1e-200}, "amplitude_n_m=1e-200"),
     ({"accuracy": 1e-300}, "accuracy=1e-300"),
     ({"crest_factor_max": 0.9}, "below 1"),
-    ({"crest_factor_max": 2.0, "resolution_n_m": 0.7, "amplitude_n_m": 0.5}, "rounding to steps of 0.7"),
+    ({"crest_factor_max": 2.0, "resolution_n_m": 0.7, "amplitude_n_m": 0.5} | GIVEN, "rounding to steps of 0.7"),
     ({"resolution_n_m": 1e-320}, "resolution_n_m=1e-320"),
     ({"band_hz": [20, 140, 200]}, "at most 2 items"),
     ({"band_hz": "20:140"}, "valid list"),
@@ -226,13 +227,14 @@ WRONG = [
     ({"window": 400, "resolution_hz": 20}, "resolution_hz and window both say"),
     ({"kind": "prbs", "window": 400}, "no window of 400"),
     ({"kind": "prbs", "order": 9, "resolution_hz": 5}, "resolution_hz and order both say"),
-    ({"kind": "odd", "phases": "random"}, "setting of kind 'multisine'"),
+    ({"kind": "stepped", "phases": "random"}, "setting of lines together"),
+    ({"mains_hz": [50, 0]}, "mains_hz=[50, 0] is not a list of frequencies above 1 Hz"),
     ({"order": 9}, "setting of kind 'prbs'"),
     ({"sweep": "linear"}, "setting of kind 'chirp'"),
     ({"periods": 2}, "setting of kind 'stepped'"),
     ({"window": 3}, "take a window of 67 samples"),
     ({"kind": "chirp", "band_hz": [20, 20], "resolution_hz": 5}, "take a wider band"),
-    ({"kind": "odd", "band_hz": [20, 20], "resolution_hz": 5}, "take a wider band"),
+    ({"kind": "odd", "band_hz": [20, 20], "resolution_hz": 5}, "nearest are 17.5 and 22.5 Hz; widen the band"),
 ]
 
 

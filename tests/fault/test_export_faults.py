@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import signal
@@ -43,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
         (("--to", "csv", "--at", "nan"), "nan is not a moment"),
         (("--to", "csv", "--at", "99"), "no valid response stands within half a window (0.05 s) of 99 s; the nearest"),
-        (("--to", "csv", "--parameters"), "has no parameters.parquet"),
+        (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )
 def test_what_cannot_be(run: Path, tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
@@ -65,7 +66,9 @@ def test_no_run_and_no_file(run: Path, tmp_path: Path) -> None:
 def test_a_damaged_table_leaves_nothing(run: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     broken.mkdir()
-    (broken / "run.json").write_bytes((run / "run.json").read_bytes())
+    summary = json.loads((run / "run.json").read_text())
+    del summary["files"], summary["crc32"]
+    (broken / "run.json").write_text(json.dumps(summary))
     table = pq.read_table(run / "responses.parquet")
     pq.write_table(table.slice(0, table.num_rows - 1), broken / "responses.parquet")
     for to in ("csv", "mat", "netcdf", "uff"):
@@ -73,9 +76,9 @@ def test_a_damaged_table_leaves_nothing(run: Path, tmp_path: Path) -> None:
         assert done.code == 2
         assert "ends within a response" in done.err
     pq.write_table(pa.table({"time_s": [1.0]}), broken / "parameters.parquet")
-    assert "has no column 'schedule'" in livebode("export", broken, "--to", "csv", "--parameters").err
+    assert "have no column 'schedule'" in livebode("export", broken, "--to", "csv", "--parameters").err
     (broken / "parameters.parquet").write_bytes(b"PAR1")
-    assert "parameters.parquet' cannot be read" in livebode("export", broken, "--to", "csv", "--parameters").err
+    assert "parameters' cannot be read" in livebode("export", broken, "--to", "csv", "--parameters").err
     assert list(tmp_path.iterdir()) == [broken]
 
 

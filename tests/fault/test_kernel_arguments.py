@@ -102,6 +102,12 @@ def test_hop(hop):
         SlidingDFT(8, [1]).process(np.zeros(4), hop)
 
 
+@pytest.mark.parametrize("power", [63, 64, 20_000])
+def test_a_hop_that_no_computer_counts_to_is_refused(power):
+    with pytest.raises(ValueError, match="hop is larger than 9223372036854775807 samples; give a smaller one"):
+        SlidingDFT(8, [1]).process(np.zeros(4), 2**power)
+
+
 def test_hop_may_be_larger_than_the_block_and_any_kind_of_integer():
     dft = SlidingDFT(8, [1])
     assert dft.process(np.zeros(40), 2**62).shape == (0, 1)

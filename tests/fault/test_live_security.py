@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import socket
 import ssl
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pyads.testserver import PLCVariable
 
 from livebode.nouns import InputError
 from livebode.session import Axis
-from livebode.sources.live import SourceSettings, encode_layout, encode_samples, open_source
+from livebode.sources.live import SourceSettings, encode_layout, encode_samples, make_source, open_source
 from tests.peers.broker import TOPIC, Mosquitto, publisher, stop
 from tests.peers.certificates import Authority, self_signed
 from tests.peers.opcua import OpcUaPeer
-from tests.peers.peer import CHANNELS, RATE_HZ, Feeding, batches, program, until
+from tests.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, free_port, program, until
+from tests.peers.plc import RingPeer
 
 SECRET = "correct horse battery"
 
@@ -197,6 +201,7 @@ def test_secrets_that_are_not_there(given, message):
             {"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "security": "Basic256Sha256"},
             "needs certificate_file too",
         ),
+        ({"url": "udp://127.0.0.1:1", "sender": "drive"}, "source.sender = 'drive' is not an IP address"),
         ({"url": "ads://h"}, "needs net_id, symbol and channels"),
         ({"url": "ads://h", "net_id": "1.2", "symbol": "MAIN.x", "channels": ["w"]}, "no AMS net id"),
         (
@@ -208,3 +213,59 @@ def test_secrets_that_are_not_there(given, message):
 def test_settings_that_cannot_be(given, message):
     with pytest.raises(InputError, match=message):
         open_source(SourceSettings(**given))
+
+
+@pytest.mark.parametrize("interface", ["127.0.0.1", "::"])
+def test_datagrams_of_others_than_the_sender_are_dropped_and_named(interface):
+    port, given = free_port(socket.SOCK_DGRAM), batches(40, epoch=5)
+    host = f"[{interface}]" if ":" in interface else interface
+    settings = SourceSettings(url=f"udp://{host}:{port}", sender="127.0.0.2", timeout_s=PATIENCE_S)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mine, socket.socket(type=socket.SOCK_DGRAM) as other:
+        mine.bind(("127.0.0.2", 0))
+        other.bind(("127.0.0.3", 0))
+
+        def send() -> None:
+            for ours, strange in zip(given, batches(40, epoch=6)):
+                for link, batch in ((other, strange), (mine, ours)):
+                    link.sendto(encode_layout(CHANNELS, RATE_HZ), ("127.0.0.1", port))
+                    link.sendto(encode_samples(batch, double=True), ("127.0.0.1", port))
+                time.sleep(0.01)
+
+        with Feeding(send), open_source(settings) as source:
+            blocks = source.blocks()
+            epochs = {next(blocks).origin.epoch for _ in range(10)}
+            events = [event for event in source.drain_events() if event.kind == "foreign"]
+    assert epochs == {5}
+    assert events[0].message == "a datagram from 127.0.0.3 was dropped; source.sender is 127.0.0.2"
+
+
+def test_an_answer_of_a_plc_that_is_too_short_is_a_connection_that_is_tried_again(tmp_path):
+    """As a PLC gives while its program is loaded anew."""
+
+    class ShortPeer(RingPeer):
+        def _prepare(self) -> None:
+            super()._prepare()
+            answer, self.short = self._memory.get_variable_by_indices, True
+
+            def shortened(group: int, offset: int) -> PLCVariable:
+                found = answer(group, offset)
+                if self.short:
+                    return PLCVariable("part", bytes(found.value[:7]), found.ads_type, "")
+                return found
+
+            self._memory.get_variable_by_indices = shortened
+
+    with ShortPeer(tmp_path) as peer:
+
+        def script() -> None:
+            peer.wait_ready()
+            until(lambda: source._outage, "the short answer to be noticed")
+            peer.short = False
+            for batch in batches(4, epoch=3):
+                peer.send(batch)
+
+        source = make_source(SourceSettings(**peer.settings | {"timeout_s": PATIENCE_S}))
+        with Feeding(script), source.open():
+            assert next(source.blocks()).rate_hz == RATE_HZ
+        (event,) = [event for event in source.drain_events() if event.kind == "disconnected"]
+    assert "the PLC's answer cannot be used" in event.message

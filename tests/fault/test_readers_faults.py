@@ -23,6 +23,7 @@ from hypothesis import strategies as st
 
 from livebode.nouns import InputError
 from livebode.sources import open_log, sinumerik_spectra
+from livebode.sources.safexml import parse
 from tests.recordings import WRITERS, dspace, signals, with_time, write, write_dspace73
 
 MODULES = sorted(WRITERS)
@@ -196,6 +197,7 @@ def test_xml_that_declares_entities_or_is_something_else(tmp_path):
     assert "declares a document type" in refused(text(tmp_path, bomb, "a.xml"))
     assert "time records of 0 signals" in refused(text(tmp_path, "<html><body/></html>", "b.xml"))
     assert "deeper than" in refused(text(tmp_path, "<a>" * 1000 + "</a>" * 1000, "c.xml"))
+    assert "more than 1048576 elements" in refused(text(tmp_path, f"<a>{'<b/>' * (1 << 20)}</a>", "d.xml"))
     with pytest.raises(InputError, match="no cross-spectrum"):
         sinumerik_spectra(write("sinumerik", tmp_path, signals()))
 
@@ -339,3 +341,20 @@ def test_memory_stays_bounded_whatever_the_length(module, tmp_path):
     assert kept_mib > samples * 16 / 2**20
     assert grown_mib < kept_mib - samples * 8 / 2**20
     assert grown_mib < 128
+
+
+@pytest.mark.parametrize("long", ['<a b="{}"/>', "<a><!-- {} --></a>", "<{}/>", "<a><?b {}?></a>"])
+def test_xml_with_one_long_tag_is_refused_after_its_first_part(tmp_path, long):
+    """The parser would read all of it again with every piece: quadratic in its length."""
+    path = tmp_path / "a.xml"
+    with path.open("w") as file:
+        file.write(long.split("{}")[0])
+        file.truncate(200 << 20)  # what follows is not even read
+        file.write("x" * (2 << 20))
+    assert "has a tag or comment of more than 1048576 bytes" in refused(path)
+
+
+def test_xml_with_much_text_is_read(tmp_path):
+    """Long text is no token: a record of a control is one."""
+    path = text(tmp_path, f"<a>{'x' * (4 << 20)}<b/></a>", "a.xml")
+    assert len(parse(path).text) == 4 << 20

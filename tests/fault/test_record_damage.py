@@ -1,8 +1,11 @@
-"""A damaged record gives what was committed before the damage, or is refused with a sentence; never anything else."""
+"""A damaged record gives all that is not damaged and says exactly what is lost, or is refused with a sentence."""
 
 from __future__ import annotations
 
 import shutil
+import warnings
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,80 +14,137 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import InputError
+from livebode.nouns import DamageWarning, Event, InputError
 from livebode.records import Run
-from livebode.records.segments.frames import COMMIT, ROWS, to_frame, whole_frames
-from livebode.records.segments.journal import Commit, Journal, head
-from livebode.records.segments.json_lines import to_line, whole_lines
+from livebode.records.segments.damage import total
+from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
+from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
+from livebode.records.segments.json_lines import in_line, to_line
 from livebode.records.table import Table
-from tests.recorded import check_beginning, machine, record_machine
+from tests.recorded import check_beginning, expected, machine, record_machine, same
 
 SAMPLES = 2600
 TABLE = Table(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
 
 
-def journal_of(commits: int) -> tuple[bytes, list[int]]:
-    """A journal, and the end of each of its commits."""
-    data, ends = head({"a": TABLE, "b": TABLE}), []
-    for k in range(commits):
-        for at in range(2):
-            rows = pa.record_batch([pa.array([k]), pa.array([k / 2])], schema=TABLE.schema)
-            data += to_frame(ROWS, rows.serialize(), table=at)
-        data += Commit(k + 1, (k + 1) / 2, 0.0, 10 * k, {"one": bytes([k] * k), "two": b"\0"}).to_frame()
-        ends.append(len(data))
-    return data, ends
+@dataclass(frozen=True)
+class Piece:
+    """A frame of the journal below: whose rows it holds, or which commit it is; None in its head."""
+
+    start: int
+    end: int
+    table: str | None
+    commit: int | None
 
 
-WHOLE, ENDS = journal_of(6)
+def commit(number: int) -> Commit:
+    rows = {"a": number, "b": number}
+    states = {"one": bytes([number] * number), "two": b"\0"}
+    return Commit(10 * number, float(number), 0.0, 10 * number, states, rows)
 
 
-def check(path: Path, data: bytes, changed_at: int) -> None:
-    path.write_bytes(data)
-    found = Journal.read(path)
-    commits = sum(end <= changed_at for end in ENDS)
-    assert found.length == ([0, *ENDS])[commits]
-    if commits:
-        assert found.commit is not None
-        assert (found.commit.sample, found.commit.events_bytes) == (commits, 10 * (commits - 1))
-        assert found.commit.states == {"one": bytes([commits - 1] * (commits - 1)), "two": b"\0"}
-        for name in ("a", "b"):
-            table = pa.Table.from_batches(found.rows[name])
-            assert table["sample"].to_pylist() == list(range(commits))
-    else:
-        assert (found.commit, found.rows) == (None, {})
+def journal_of(commits: int) -> tuple[bytes, list[Piece]]:
+    """A journal with a row of both tables before each commit, and its frames."""
+    data, pieces = head({"a": TABLE, "b": TABLE}, commit(0)), []
+    pieces.append(Piece(0, len(data), None, None))
+    for k in range(1, commits + 1):
+        rows = pa.record_batch([pa.array([10 * k - 1]), pa.array([k - 0.1])], schema=TABLE.schema)
+        for at, table in enumerate("ab"):
+            frame = to_frame(ROWS, rows.serialize(), table=at)
+            pieces.append(Piece(len(data), len(data) + len(frame), table, k))
+            data += frame
+        frame = commit(k).to_frame()
+        pieces.append(Piece(len(data), len(data) + len(frame), None, k))
+        data += frame
+    return data, pieces
+
+
+COMMITS = 6
+WHOLE, PIECES = journal_of(COMMITS)
+
+
+def read(run: Path, data: bytes) -> Journal:
+    (run / "open").mkdir(parents=True, exist_ok=True)
+    (run / name_of(1)).write_bytes(data)
+    return Journal.read(run, 1)
+
+
+def rows_of(found: Journal, table: str) -> list[int]:
+    return [(sample + 1) // 10 for batch in found.rows.get(table, []) for sample in batch["sample"].to_pylist()]
 
 
 @given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))
-def test_a_changed_byte_ends_the_journal_at_the_commit_before(
+def test_a_changed_byte_costs_what_its_frame_held_and_is_counted(
     tmp_path_factory: pytest.TempPathFactory, at: int, change: int
 ) -> None:
     data = bytearray(WHOLE)
     data[at] ^= change
-    check(tmp_path_factory.getbasetemp() / "changed", bytes(data), at)
+    found = read(tmp_path_factory.getbasetemp() / "changed", bytes(data))
+    hit = next(piece for piece in PIECES if piece.start <= at < piece.end)
+    last = COMMITS - (hit.table is None and hit.commit == COMMITS)
+    assert found.commit == commit(last)
+    for table in "ab":
+        assert rows_of(found, table) == [k for k in range(1, last + 1) if (table, k) != (hit.table, hit.commit)]
+    assert [place.rows for place in found.damages] == [{hit.table: 1} if hit.table else {}]
+    if hit.commit is not None:
+        k = hit.commit
+        # Where a commit is what is damaged, the one behind it follows.
+        end = k if hit.table else k + 1
+        assert found.damages[0].begin == (10 * (k - 1), k - 1)
+        assert found.damages[0].end == (None if end > COMMITS else (10 * end, end))
 
 
-@given(st.integers(0, len(WHOLE)), st.binary(max_size=40))
-def test_a_torn_journal_ends_at_its_last_commit(tmp_path_factory: pytest.TempPathFactory, at: int, rest: bytes) -> None:
-    if WHOLE[at:].startswith(rest):
-        rest = b""
-    check(tmp_path_factory.getbasetemp() / "torn", WHOLE[:at] + rest, at)
+@given(st.integers(0, len(WHOLE)))
+def test_a_torn_journal_ends_at_its_last_commit_and_is_not_damaged(
+    tmp_path_factory: pytest.TempPathFactory, at: int
+) -> None:
+    found = read(tmp_path_factory.getbasetemp() / "torn", WHOLE[:at])
+    commits = [piece.commit for piece in PIECES if piece.table is None and piece.end <= at]
+    if commits:
+        assert found.commit == commit(commits[-1] or 0)
+        assert found.length == max(p.end for p in PIECES if p.table is None and p.end <= at)
+        assert rows_of(found, "a") == rows_of(found, "b") == list(range(1, 1 + (commits[-1] or 0)))
+    assert found.damages == []
+
+
+@given(st.integers(PIECES[0].end, len(WHOLE) - 40), st.integers(1, 5000))
+def test_a_lost_stretch_of_a_journal_is_counted(tmp_path_factory: pytest.TempPathFactory, at: int, length: int) -> None:
+    found = read(tmp_path_factory.getbasetemp() / "stretch", WHOLE[:at] + bytes(length) + WHOLE[at + length :])
+    for table in "ab":
+        assert sorted(set(rows_of(found, table))) == rows_of(found, table)
+    if found.commit == commit(COMMITS):
+        lost = {table: COMMITS - len(rows_of(found, table)) for table in "ab"}
+        assert total(found.damages)["rows"] == {table: n for table, n in lost.items() if n}
+
+
+def test_the_next_journal_tells_what_a_damaged_end_held(tmp_path: Path) -> None:
+    data = bytearray(WHOLE)
+    data[PIECES[-1].start + 30] ^= 1
+    data[PIECES[-2].start + 30] ^= 1
+    read(tmp_path, bytes(data))
+    (tmp_path / name_of(2)).write_bytes(head({"a": TABLE, "b": TABLE}, commit(COMMITS)))
+    found = read_sealed(tmp_path, 1)
+    assert rows_of(found, "a") == list(range(1, COMMITS + 1))
+    assert rows_of(found, "b") == list(range(1, COMMITS))
+    assert [place.rows for place in found.damages] == [{"b": 1}]
 
 
 @given(st.binary(max_size=200))
 def test_frames_of_anything_end_somewhere(data: bytes) -> None:
-    assert next(bytes(payload) for *_, payload, _ in whole_frames(to_frame(COMMIT, data) + data)) == data
+    found = list(frames(to_frame(COMMIT, data) + data))
+    assert found[0].payload == data
+    assert all(a.end == b.start for a, b in pairwise(found))
 
 
 @given(
     st.lists(st.dictionaries(st.text(min_size=1), st.text() | st.integers() | st.floats(allow_nan=False), min_size=1))
 )
-def test_lines_come_back_and_a_damaged_one_ends_them(values: list[dict[str, object]]) -> None:
+def test_objects_come_back_where_the_line_ends_between_them_are_damaged(values: list[dict[str, object]]) -> None:
     lines = [to_line(value) for value in values]
-    data = b"".join(lines)
     finite = [{k: None if v in (np.inf, -np.inf) else v for k, v in value.items()} for value in values]
-    assert whole_lines(data) == (finite, len(data))
-    if lines:
-        assert whole_lines(data[:-2]) == (finite[:-1], len(data) - len(lines[-1]))
+    assert [found for line in lines for found in in_line(line)] == finite
+    joined = b"*".join(line[:-1] for line in lines)
+    assert [found for found in in_line(joined) if isinstance(found, dict)] == finite
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +154,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run
 
 
-@settings(max_examples=60)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_a_changed_file_of_a_finished_run_is_told(finished: Path, data: st.DataObject) -> None:
-    files = sorted(path.relative_to(finished) for path in finished.rglob("*") if path.suffix in (".parquet", ".jsonl"))
+def test_a_changed_file_of_a_finished_run_is_told_and_the_rest_is_read(finished: Path, data: st.DataObject) -> None:
+    files = sorted(p.relative_to(finished) for p in finished.rglob("*") if p.suffix in (".parquet", ".jsonl", ".json"))
     name = data.draw(st.sampled_from(files))
     other = finished.with_name("changed")
     shutil.rmtree(other, ignore_errors=True)
@@ -106,9 +166,87 @@ def test_a_changed_file_of_a_finished_run_is_told(finished: Path, data: st.DataO
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= data.draw(st.integers(1, 255))
     (other / name).write_bytes(content)
-    run = Run.open(other)
-    with pytest.raises(InputError, match=r"is damaged|cannot be read"):
-        print(len(run.responses()), len(run.events()), len(list(run.tables("samples"))))
+    whole = Run.open(finished)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DamageWarning)
+        run = Run.open(other)
+        found = run.responses(), run.events(), list(run.tables("samples"))
+    told = [str(damage.details["file"]) for damage in run.damages]
+    assert told == ([] if name.name == "run-copy.json" else [str(name)] * len(told))
+    assert told or name.name == "run-copy.json"
+    segment = next((s for s in whole.segments if s.name == str(name)), None)
+    lost = dict.fromkeys(("responses", "samples"), 0) | ({segment.table: segment.rows} if segment else {})
+    assert len(found[0]) == len(whole.responses()) - lost["responses"] // len(whole.lines)
+    assert sum(t.num_rows for t in found[2]) == SAMPLES - lost["samples"]
+    kept = [event for event in found[1] if event.kind != "record-damaged"]
+    assert len(whole.events()) - len(kept) == (name.name == "events.jsonl" and kept != whole.events())
+
+
+def flip(path: Path, at: float) -> None:
+    content = bytearray(path.read_bytes())
+    content[int(at * len(content))] ^= 4
+    path.write_bytes(content)
+
+
+class StopError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("at", [0.2, 0.5, 0.8])
+def test_a_run_with_a_damaged_journal_is_continued_behind_the_damage(tmp_path: Path, at: float) -> None:
+    def stop(done: int, _: int | None) -> None:
+        if done > 1900:
+            raise StopError
+
+    run = tmp_path / "run"
+    with pytest.raises(StopError):
+        record_machine(machine(SAMPLES), run, progress=stop)
+    held = check_beginning(run, SAMPLES, 1000)
+    journals = sorted((run / "open").iterdir())
+    flip(journals[-1], at)
+    told: list[Event] = []
+    record_machine(machine(SAMPLES), run, tell=told.append)
+    assert [event.kind for event in told] == ["record-continued", "record-damaged"]
+    assert told[0].sample == held
+    check_damage(run, told[1], journals[-1].name)
+    with pytest.raises(InputError, match="is finished"):
+        record_machine(machine(SAMPLES), run)
+
+
+def check_damage(run: Path, told: Event, journal: str) -> None:
+    """That exactly what the event says is missing, and everything else is there."""
+    assert told in Run.open(run).events()
+    assert (run / "damaged" / journal).exists()
+    details = told.details
+    place = details["places"][0]
+    assert Run.open(run).summary["record"]["damaged"] == {
+        "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
+    }  # fmt: skip
+    number = np.concatenate([table["sample"].to_numpy() for table in Run.open(run).tables("samples")])
+    lost = np.setdiff1d(np.arange(SAMPLES), number)
+    assert lost.size == details["rows"].get("samples", 0)
+    responses = Run.open(run).responses()
+    due = expected(SAMPLES)[0]
+    gone = ~np.isin(due.sample, responses.sample)
+    assert np.count_nonzero(gone) * len(due.lines) == details["rows"].get("responses", 0)
+    assert same(responses, due[~gone])
+    for sample in (*lost, *due.sample[gone]):
+        assert place["begin"][0] <= sample < place["end"][0]
+
+
+def test_a_journal_that_is_damaged_while_the_process_runs_is_closed_without_what_is_lost(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+
+    def each(start: int) -> None:
+        if start == 850:
+            flip(run / "open" / "000001.journal", 0.6)
+
+    told: list[Event] = []
+    record_machine(machine(SAMPLES, each), run, tell=told.append)
+    assert [event.kind for event in told] == ["record-damaged"]
+    check_damage(run, told[0], "000001.journal")
+    assert told[0].details["rows"]
+    assert "are lost" in told[0].message
 
 
 def test_a_lost_journal_is_told(tmp_path: Path) -> None:
@@ -123,4 +261,5 @@ def test_a_lost_journal_is_told(tmp_path: Path) -> None:
         path.write_bytes(b"rubbish")
     with pytest.raises(InputError, match="no whole journal"):
         record_machine(machine(SAMPLES), tmp_path / "run")
-    check_beginning(tmp_path / "run", SAMPLES, 1000)  # what is closed can be read all the same
+    with pytest.warns(DamageWarning, match="7 bytes at its beginning"):
+        check_beginning(tmp_path / "run", SAMPLES, 1000)  # what is closed can be read all the same

@@ -24,7 +24,7 @@ from tests.starved import on_a_limited_file
 ROOT = Path(__file__).parents[2]
 RATE_HZ = 1000.0
 Y = samples_of([Channel("y", "m")])
-SUMMARY = {"found": {"bins": [1], "window": 10, "rate_hz": RATE_HZ, "quiet_bins": []}}
+SUMMARY = {"found": {"bins": [1], "window": 10, "rate_hz": RATE_HZ, "quiet_bins": [], "quantity": "plant", "unit": ""}}
 
 
 def _send(say: Connection, run: Path) -> None:

@@ -1,63 +1,85 @@
-"""`livebode demo` finds what it did to the belt, and nothing where nothing was done.
-
-Over the seeds the change found scatters by 0.4 %; motion and friction bias it by up to 0.5 %.
-"""
+"""`livebode demo` finds by its baseline what it did to the belt, and reports it everywhere in the same sentence."""
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from livebode.estimation import Tracker
-from livebode.nouns import InputError, Responses
-from livebode.session.demo import LOSS, demo_axis, demo_settings, finding, stiffness_scale
-from livebode.simulation import BeltAxis, SimulatedAxis
+from livebode.monitoring import Baseline, Monitor
+from livebode.nouns import Event, InputError
+from livebode.session.audience import Audience
+from livebode.session.demo import LOSS, demo, demo_axis, demo_baseline, demo_settings
+from livebode.simulation import SimulatedAxis
 from tests.command import livebode
+from tests.reports import Page
+
+_WINDOW_S = 0.2
 
 
-def tracked(axis: BeltAxis) -> Responses:
-    tracker = Tracker(demo_settings())
-    return Responses.join([tracker.process(block) for block in SimulatedAxis(axis).blocks()])
+@cache
+def baseline() -> Baseline:
+    return demo_baseline(2)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_it_finds_the_loss_and_its_moment(seed: int) -> None:
-    axis = demo_axis(20.0, seed)
-    sentence = finding(tracked(axis), axis)
-    at, change, sigma = map(float, re.search(r"Since (\S+) s .* has (\S+) % ± (\S+) % less", sentence).groups())
-    assert change == pytest.approx(100 * LOSS, abs=1.5)
-    assert sigma < 1.0
-    assert at == pytest.approx(10.0, abs=0.2)
+class Heard(Audience):
+    """What a page is sent."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+
+    def write_event(self, event: Event) -> None:
+        self.events.append(event)
 
 
-def test_a_healthy_belt_is_called_unchanged() -> None:
-    axis = replace(demo_axis(20.0, 4), faults=())
-    responses = tracked(axis)
-    assert "did not change" in finding(responses, axis)
-    _, scale = stiffness_scale(responses, axis)
-    assert np.median(scale) == pytest.approx(1.0, abs=0.02)
+def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(tmp_path: Path) -> None:
+    done = livebode("demo", "--fast", "--out", tmp_path / "run")
+    assert done.code == 0, done.err
+    (change,) = [
+        event
+        for line in (tmp_path / "run" / "events.jsonl").read_text("utf-8").splitlines()
+        if (event := json.loads(line))["kind"] == "change"
+    ]
+    assert (change["details"]["what"], change["details"]["place_m"]) == ("stiffness", None)
+    assert change["details"]["since_s"] == pytest.approx(11.0, abs=2 * _WINDOW_S)
+    assert abs(change["details"]["amount_percent"] + 100 * LOSS) < 2 * change["details"]["bound_percent"]
+    monitoring = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))["monitoring"]
+    assert done.out.splitlines()[-2:] == [change["message"], monitoring["message"]]
+    assert livebode("report", tmp_path / "run", "--out", tmp_path / "report").code == 0
+    page = Page((tmp_path / "report.html").read_text("utf-8"))
+    assert re.search(f"ALARM {re.escape(change['message'])}", page.text)
+    heard = Heard()
+    demo(
+        tmp_path / "again", seconds=22, seed=1, real_time=False, baseline=baseline(), progress=lambda *_: None,
+        audience=heard, draw=lambda *_: None,
+    )  # fmt: skip
+    assert change["message"] in [event.message for event in heard.events]
+    first, again = ((tmp_path / name / "responses.parquet").read_bytes() for name in ("run", "again"))
+    assert first == again
 
 
-def test_the_command_is_reproducible_and_leaves_a_run(tmp_path: Path) -> None:
-    runs = []
-    for name in ("a", "b"):
-        result = livebode("demo", "--fast", "--seconds", 8, "--seed", 7, "--out", tmp_path / name, "--json")
-        assert result.code == 0, result.err
-        runs.append(json.loads(result.out))
-    assert runs[0]["finding"] == runs[1]["finding"]
-    a, b = ((tmp_path / name / "responses.parquet").read_bytes() for name in ("a", "b"))
-    assert a == b
-    assert (tmp_path / "a" / "tracking.png").is_file()
-    text = livebode("demo", "--fast", "--seconds", 8, "--out", tmp_path / "a").out
-    assert "stiffness" in text.splitlines()[-1]
+def test_a_healthy_axis_raises_no_alarm() -> None:
+    settings = demo_settings()
+    monitor, tracker = Monitor(baseline(), settings), Tracker(settings)
+    events = [e for b in SimulatedAxis(demo_axis(40.0, 9)).blocks() for e in monitor.process(b, tracker.process(b))]
+    assert [event.message for event in events + monitor.finish()] == []
 
 
-@pytest.mark.parametrize("seconds", [0, 7.9, -1, float("nan"), 1e9])
-def test_runs_too_short_or_too_long_are_refused(seconds: float) -> None:
-    with pytest.raises(InputError, match="is not between 8 and 3600"):
-        demo_axis(seconds, 1)
+def test_the_lines_leave_bins_for_the_noise_and_none_is_at_the_mains() -> None:
+    lines = demo_settings().lines
+    assert len(lines) >= 21
+    assert len(lines.quiet) >= 20
+    assert not {50.0, 60.0, 100.0, 120.0, 150.0, 180.0} & set(lines.frequency_hz.tolist())
+
+
+@pytest.mark.parametrize("seconds", [0, 15.9, -1, float("nan"), 1e9])
+def test_runs_too_short_or_too_long_are_refused(tmp_path: Path, seconds: float) -> None:
+    with pytest.raises(InputError, match="is not between 16 and 3600"):
+        demo(
+            tmp_path, seconds=seconds, seed=1, real_time=False, baseline=baseline(), progress=lambda *_: None,
+            audience=Audience(), draw=lambda *_: None,
+        )  # fmt: skip

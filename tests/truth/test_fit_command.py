@@ -126,7 +126,8 @@ def test_a_directory_that_is_no_run_is_refused(machine: Path, tmp_path: Path) ->
     result = livebode("fit", out)
     assert result.code == 2
     assert "broken" in result.err
-    (out / "run.json").write_text("{}")
+    for name in ("run.json", "run-copy.json"):
+        (out / name).write_text("{}")
     assert livebode("fit", out).code == 2
 
 

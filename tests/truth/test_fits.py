@@ -190,6 +190,28 @@ def test_friction_at_standstill_gives_no_numbers_and_none_without(newtons: float
     assert "friction" in words[newtons]
 
 
+@pytest.mark.parametrize("free", [["B"], ["BL"], ["B", "BL"]])
+def test_a_friction_that_is_not_there_leaves_the_other_parameters_valid_and_has_an_upper_limit(free: list[str]) -> None:
+    found = Fitter(BELT, free=free).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 200))
+    assert found.ok.all()
+    cover = np.mean(np.abs(found.value - TRUTH) <= found.bound(), axis=0)
+    assert cover[:4].min() >= 0.95 - 3 * 0.0155
+    assert np.all(found.value[:, 4:6] >= 0)
+    one = fit(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=free)
+    assert {name for name in BELT.names if one.at_most(name) is not None} == set(free)
+
+
+def test_a_friction_that_is_there_is_found_with_its_bound() -> None:
+    truth = TRUTH + np.array([0, 0, 0, 0, 0.01, 20.0, 0])
+    found = Fitter(BELT, free=["B", "BL"]).process(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 200))
+    assert found.ok.all()
+    cover = np.mean(np.abs(found.value - truth) <= found.bound(), axis=0)
+    assert cover.min() >= 0.95 - 3 * 0.0155
+    one = fit(noisy(BELT.at(truth, Grid.of(FINE)), FINE, 0.01, 1)[0], BELT, free=["B", "BL"])
+    assert one.at_most("BL") is None
+    assert one.at_most("Js") is None
+
+
 def test_three_masses_fit_the_axis_of_three() -> None:
     axis = BeltAxis(mechanics=Mechanics(masses=3))
     lines = Lines.parse("20:400:5", rate_hz=4000, window=800)
@@ -197,7 +219,12 @@ def test_three_masses_fit_the_axis_of_three() -> None:
     two, three = (fit(noisy(value, lines, 1e-3, 1)[0], m) for m in (BELT, ThreeMass(radius_m=0.019)))
     assert three.status == "ok", three.sentence
     assert three.epsilon < 0.01
-    assert two.status != "ok" or two.epsilon > 10 * three.epsilon
+    assert three.taken == ()
+    assert two.taken == ("further mode",)
+    assert two["mode"] == pytest.approx(144.3, rel=0.01)
+    assert two["resonance"] == pytest.approx(three["resonance_1"], rel=1e-3)
+    alone = Fitter(BELT).process(Responses.of(noisy(value, lines, 1e-3, 1)[0]))
+    assert alone.epsilon[0] > 0.01
     poles = np.abs(np.linalg.eigvals(axis.linear(0.8).a)) / (2 * np.pi)
     modes = np.unique(poles[poles > 1].round(1))
     assert [three["resonance_1"], three["resonance_2"]] == pytest.approx(list(modes), rel=0.005)
@@ -217,7 +244,11 @@ def test_the_motor_bench_is_what_its_description_says(band_hz: tuple[float, floa
     assert found["resonance"] == pytest.approx(76.22, abs=0.1)
     assert found["resonance_damping"] == pytest.approx(0.019, abs=0.003)
     assert found["inertia_ratio"] == pytest.approx(1.0, abs=0.03)
-    assert found.bound("resonance") < 0.2
+    # What the model lacks is alike at neighbouring lines (correlation 0.5), so that the bound is wider than it was
+    # when each line counted as independent: 0.21 Hz instead of 0.14 over the narrowest band.
+    assert found.bound("resonance") < 0.25
+    assert not found.complete
+    assert found.taken == ()
 
 
 def test_the_motor_benchs_bounds_hold_the_scatter_between_its_periods() -> None:

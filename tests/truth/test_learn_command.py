@@ -62,7 +62,7 @@ def test_learn_and_tell(tmp_path: Path) -> None:
     assert "the belt's stiffness is 2" in found.out or "the belt's stiffness is 1.9" in found.out
     monitoring = json.loads((tmp_path / "two" / "run.json").read_text("utf-8"))["monitoring"]
     assert [s["what"] for s in monitoring["standing"]] == ["stiffness"]
-    assert [e["kind"] for e in events(tmp_path / "two")] == ["change"]
+    assert [e["kind"] for e in events(tmp_path / "two")] == ["change", "noise-from-detection-lines"]
 
     again = run(
         log, tmp_path / "three", *MOVING, "--baseline", tmp_path / "healthy.json", "--false-alarms", "once a day"
@@ -122,7 +122,8 @@ def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
         for start in range(0, data.shape[1], 1000)
     ]
     axis = toml.with_name("live.toml")
-    axis.write_text(toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"'))
+    text = toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"')
+    axis.write_text(text.replace("[tracking]\n", "[tracking]\nhop = 20\n"))  # that of a recording by default
     command = [Path(sys.executable).with_name("livebode"), "run", axis, "--baseline", base, "--out", out]
     done = subprocess.run([*map(str, command)], input=b"".join(lines), capture_output=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ from livebode.records import Run
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.command import RATE_HZ, livebode, signals, write_parquet
-from tests.peers.peer import PATIENCE_S
+from tests.peers.peer import PATIENCE_S, free_port, until
 from tests.peers.plain import TcpPeer
 
 CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
@@ -123,3 +126,34 @@ def test_sources_that_cannot_be(tmp_path, source, message):
     assert result.code == 2
     assert message in result.err
     assert "secret" not in result.err
+
+
+def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
+    """A second sender and a restart of the first: each is said where livebode was started, and not with every batch."""
+    given = sent(400)
+    stranger = [replace(batch, epoch=77) for batch in given]
+    again = [replace(batch, first_sample=batch.first_sample - 70_000, epoch=10) for batch in given]
+    port = free_port(socket.SOCK_DGRAM)
+    process = started(axis(tmp_path, f'url = "udp://127.0.0.1:{port}"'), tmp_path / "live")
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        layout = encode_layout(CHANNELS, float(RATE_HZ))
+        until(lambda: listens(sender, layout), "the port to be open")
+        mixed = [batch for pair in zip(given, stranger) for batch in pair]
+        for batch in mixed * 2 + again * 2:
+            sender.send(encode_samples(batch, double=True))
+            time.sleep(0.002)
+    until(lambda: (tmp_path / "live" / "events.jsonl").exists(), "the run to begin")
+    until(lambda: b"restart" in (tmp_path / "live" / "events.jsonl").read_bytes(), "the restart to be recorded")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE_S)
+    said = err.decode().splitlines()
+    assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
+    assert sum("the sender began anew at its sample 0" in line for line in said) == 1
+
+
+def listens(sender: socket.socket, frame: bytes) -> bool:
+    try:
+        return bool(sender.send(frame) and sender.send(frame))
+    except ConnectionRefusedError:
+        return False

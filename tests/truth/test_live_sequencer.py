@@ -7,11 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.nouns import Channel
-from livebode.sources.live import Batch, LiveBlock, Sequencer
+from livebode.sources.live import Batch, LiveBlock, Position, Sequencer
+from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.said import BURST, Said
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
@@ -56,6 +57,7 @@ def displaced(batches: list[Batch], bound: int, draw: st.DataObject) -> list[Bat
     return [batches[i] for i in order]
 
 
+@settings(deadline=None)
 @given(
     lengths=st.lists(st.integers(1, 5), min_size=1, max_size=25),
     first=st.integers(0, 10**12),
@@ -81,6 +83,7 @@ def test_reordering_within_the_bound_and_repeats_change_nothing(lengths, first, 
     assert said.counts["reordered"] == late
 
 
+@settings(deadline=None)
 @given(
     lengths=st.lists(st.integers(1, 5), min_size=3, max_size=40),
     bound=st.integers(0, 6),
@@ -101,6 +104,7 @@ def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
     assert [event.sample for event in events] == [b.start for b in blocks if b.gap]
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=60), st.integers(0, 8))
 def test_whatever_comes_samples_are_right_and_ascend(pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: every sample that comes out is at its place, once."""
@@ -146,13 +150,119 @@ def test_a_restart_soon_after_the_start_without_an_epoch():
     assert said.counts["repeat"] == 0
 
 
-def test_a_second_sender_does_not_take_turns():
+def test_a_second_sender_is_dropped_and_named_while_the_first_one_sends():
     a, b = stream([10] * 50, 0, 1), stream([10] * 50, 0, 2)
     said = Said()
     blocks = passed([batch for pair in zip(a, b) for batch in pair], said, reorder=0)
+    assert content(blocks) == content(passed(a, reorder=0))
+    assert (said.counts["restart"], said.counts["foreign"]) == (0, 50)
+    assert said.drain()[0].details == {"epoch": "0x2", "sender_sample": 0}
+
+
+@settings(deadline=None)
+@given(st.integers(0, 8), st.integers(2, 6), st.integers(30, 50))
+def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strange, at):
+    """It is trusted again, with its own numbers: all but what the other one's samples stand for is there, in time."""
+    good = stream([10] * 100, 1000, 1)
+    said = Said()
+    blocks = passed(good[:at] + stream([10] * strange, 7, 2) + good[at:], said, reorder=reorder)
+    mine = [block for block in blocks if block.origin.epoch == 1]
+    found = np.concatenate([block.data[0] for block in mine])
+    assert np.array_equal(found, np.concatenate([np.arange(block.start, block.stop) for block in mine]) + 1000)
+    assert found[-1] == 1999
+    assert len(found) == 1000 - 10 * strange
+    back = [event for event in said.drain() if event.kind == "restart"]
+    assert [event.details["epoch"] for event in back] == ["0x2", "0x1"]
+    assert back[1].details["lost_samples"] == 10 * strange
+    assert "name its address in source.sender" in back[1].message
+
+
+@settings(deadline=None)
+@given(st.integers(0, 8), st.integers(1, 2), st.integers(20, 40))
+def test_batches_half_an_hour_ahead_are_not_believed_while_the_stream_goes_on(reorder, strange, at):
+    good = stream([10] * 60, 1000)
+    ahead = stream([10] * strange, 1000 + int(1800 * RATE_HZ))
+    said = Said()
+    blocks = passed(good[:at] + ahead + good[at:], said, reorder=reorder)
+    assert content(blocks) == content(passed(good, reorder=reorder))
+    assert {kind: count for kind, count in said.counts.items() if count} == {"foreign": strange}
+
+
+@pytest.mark.parametrize("reorder", [0, 8])
+def test_a_real_jump_of_half_an_hour_is_a_loss_of_exactly_so_long(reorder):
+    jump = int(1800 * RATE_HZ)
+    a, b = stream([10] * 40, 1000), stream([10] * 40, 1400 + jump)
+    said = Said()
+    blocks = passed(a + b, said, reorder=reorder)
+    assert np.array_equal(
+        np.concatenate([block.data[0] for block in blocks]), np.r_[1000:1400, 1400 + jump : 1800 + jump]
+    )
+    (event,) = said.drain()
+    assert (event.kind, event.details["missing_samples"], event.sample) == ("loss", jump, 400 + jump)
+
+
+def left_at(sample: int, number: int, epoch: int, away_s: float) -> Position:
+    """A stream that was left so long before the batches here arrive, which is at 0."""
+    now = ClockReading.at(0.0)
+    return Position(sample, epoch, number, RATE_HZ, ClockReading(now.unix_s - away_s, now.uptime_s - away_s, now.boot))
+
+
+def resumed(position: Position, batches: list[Batch], said: Said, **options: int) -> list[LiveBlock]:
+    sequencer = Sequencer(said, **options)
+    sequencer.resume(position)
+    return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
+
+
+@settings(deadline=None)
+@given(st.sampled_from([0, 1]), st.integers(0, 8), st.integers(0, 40_000), st.integers(0, 300))
+def test_a_stream_continues_by_the_senders_numbers_whatever_the_clock_says(epoch, reorder, missing, again):
+    """A broker that kept what came in 20 s, and gives some of it again, as well as a sender that was not heard."""
+    again -= again % 10
+    position = left_at(5000, 105_000, epoch, 20.0)
+    batches = stream([10] * (again // 10 + 40), 105_000 + missing - again if missing == 0 else 105_000 + missing, epoch)
+    if epoch == 0 and missing == 0:
+        batches = batches[again // 10 :]
+    said = Said()
+    blocks = resumed(position, batches, said, reorder=reorder)
+    number = np.concatenate([np.arange(block.start, block.stop) for block in blocks])
+    assert np.array_equal(np.concatenate([block.data[0] for block in blocks]), number + 100_000)
+    assert number[0] == 5000 + missing
+    losses = [event.details["missing_samples"] for event in said.drain() if event.kind == "loss"]
+    assert losses == ([missing] if missing else [])
+    assert said.counts["restart"] == 0
+
+
+@pytest.mark.parametrize("epoch", [0, 2])
+def test_a_sender_that_began_anew_meanwhile_is_an_estimate_by_the_computers_clock(epoch):
+    position = left_at(5000, 905_000, 0 if epoch == 0 else 1, 20.0)
+    said = Said()
+    blocks = resumed(position, stream([10] * 60, 0, epoch), said, reorder=0)
+    assert (blocks[0].start, blocks[0].gap) == (5000 + 20 * RATE_HZ - 10, True)
+    (event,) = said.drain()
+    assert event.kind == "restart"
+    assert "which is an estimate" in event.message
+    assert event.details["estimated_samples"] == 20 * RATE_HZ - 10
+
+
+def test_numbers_of_a_sender_without_epoch_that_the_clock_contradicts_are_a_restart():
+    """It cannot have sent five minutes in 20 s."""
+    said = Said()
+    blocks = resumed(left_at(5000, 105_000, 0, 20.0), stream([10] * 40, 1_305_000, 0), said, reorder=0)
+    assert blocks[0].start == 5000 + 20 * RATE_HZ - 10
     assert said.counts["restart"] == 1
-    assert said.counts["foreign"] >= 48
-    assert [block.gap for block in blocks].count(True) == 1
+
+
+YEARS = 10 * 365 * 86400.0
+
+
+@pytest.mark.parametrize(("step_s", "boot"), [(YEARS, "a"), (-3600.0, "a"), (YEARS, "b"), (-3600.0, "b"), (0.0, "b")])
+def test_a_computer_clock_that_is_wrong_is_not_used_and_named(step_s, boot):
+    """Since the computer's start the time is known from another clock; over a start of it there is none."""
+    before = ClockReading(1.8e9, 1000.0, "a")
+    now = ClockReading(1.8e9 + 20.0 + step_s, 1020.0 if boot == "a" else 5.0, boot)
+    found = pause(before, now)
+    assert found.seconds == (20.0 if boot == "a" or step_s == 0.0 else None)
+    assert ("set its date and time" in found.remark or "check its date and time" in found.remark) == (step_s != 0.0)
 
 
 def test_one_stray_batch_far_away_does_not_derail_the_stream():

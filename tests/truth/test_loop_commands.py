@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ import pytest
 
 from examples.closed_loop import RATE_HZ, Drive
 from livebode.excitation import multisine
+from livebode.margins import margins
 from livebode.nouns import Lines
 from livebode.records import Run
 from tests.command import livebode, write_parquet
-from tests.loops import BELT, Case
+from tests.loops import BELT, Case, parameters, values
 from tests.truth.test_margins import read
 
 LINES = Lines.parse("20:140:10", RATE_HZ, 400)
@@ -47,11 +49,11 @@ radius_m = 0.019
 """
 
 
-def record(path: Path, seed: int) -> Path:
-    """Two seconds of the closed loop, with a gap in it."""
+def record(path: Path, seed: int, late: int = 0) -> Path:
+    """Two seconds of the closed loop, with a gap in it; u acts `late` ticks after it was logged."""
     w = 0.3 * multisine(LINES)
     u, y = Drive().run(w, 20, sigma=0.1, seed=seed)
-    columns = {"w": np.resize(w, u.size), "u": u[0], "y": y[0]}
+    columns = {"w": np.resize(w, u.size), "u": np.roll(u[0], -late), "y": y[0]}
     columns["y"][700] = np.nan
     return write_parquet(path, columns)
 
@@ -91,6 +93,34 @@ def test_a_loop_that_is_described_beside_the_run_is_judged_and_tuned(run: Path) 
     assert "EXTRAPOLATED" in done.out
     assert "lines alone" in done.out
     assert livebode("margins", run, "--ms", 1.0).code == 2
+
+
+def test_a_run_with_a_delay_gets_margins_with_it_and_none_where_it_is_held_at_zero(run: Path) -> None:
+    """u is logged two ticks before it acts; the loop described is four times sharper."""
+    folder = run.parent / "late"
+    folder.mkdir()
+    record(folder / "log.parquet", 3, late=2)
+    axis = AXIS.format(gain=4 * 0.2308, delay=0)
+    for name, more in (("free", ""), ("held", "fixed = {delay = 0.0}\n")):
+        (folder / f"{name}.toml").write_text(axis + more, encoding="utf-8")
+        done = livebode("run", folder / f"{name}.toml", "--out", folder / name)
+        assert done.code == 0, done.err
+    free, held = (json.loads(livebode("margins", folder / name, "--json").out) for name in ("free", "held"))
+    true = margins(replace(parameters(BELT[np.newaxis]), value=delayed(2)), Case(BELT, gain=4 * 0.2308).open, (20, 140))
+    for i, name in enumerate(true.names):
+        one = free["margins"][name]
+        assert abs(one["value"] - true.value[0, i]) < 2 * one["bound_95"] + 1e-9, name
+    assert held["status"] == "contradicted by the lines"
+    assert held["margins"]["gain_margin"]["value"] is None
+    assert held["tuning"]["verdict"] == "refused"
+    assert "free what it lacks" in held["message"]
+    assert "no margins: the two-mass model contradicts the lines" in livebode("margins", folder / "held").out
+
+
+def delayed(ticks: float) -> np.ndarray:
+    at = values(BELT[np.newaxis])
+    at[:, -1] = ticks / RATE_HZ
+    return at
 
 
 def test_the_run_itself_holds_its_margins(run: Path) -> None:

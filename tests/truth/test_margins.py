@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.fitting import Fitter, Grid, Rigid
-from livebode.margins import Margins, OpenLoop, margins
+from livebode.margins import Margins, OpenLoop, against_lines, margins
 from livebode.nouns import PID, InputError, Lines, Loop, Responses
-from tests.loops import BELT, MODEL, Case, parameters
+from tests.loops import BELT, MODEL, Case, parameters, values
 
 LINES = Lines.parse("20:140:5", rate_hz=4000, window=800)
 BAND_HZ = (20.0, 140.0)
@@ -142,3 +142,42 @@ def test_what_cannot_be_is_refused() -> None:
         read(Case(BELT)).of("phase")
     with pytest.raises(InputError, match="probability=1"):
         read(Case(BELT)).bound(1)
+
+
+def delayed(gain: float, ticks: float) -> tuple[Case, Margins, Responses]:
+    """A loop, its true margins with a delay in the plant, and 100 noisy responses of that plant."""
+    case, at = Case(BELT, gain=gain), values(BELT[np.newaxis])
+    at[:, -1] = ticks / case.rate_hz
+    truth = MODEL.at(at[0], Grid.of(LINES))
+    true = margins(replace(parameters(BELT[np.newaxis]), value=at), case.open, BAND_HZ)
+    return case, true, responses_of(truth, 0.01 * float(np.median(np.abs(truth))), 100, seed=4)
+
+
+def test_a_delay_that_nobody_freed_is_found_and_the_margins_cover_the_true_ones() -> None:
+    case, true, measured = delayed(0.6, 1.5)
+    found = margins(Fitter(MODEL).process(measured), case.open, BAND_HZ)
+    assert found.ok.all()
+    apart = np.abs(found.value - true.value) <= found.bound()
+    print(f"true {true.value[0].round(3)}, coverage {apart.mean(axis=0)}")
+    # 100 fits scatter by 2.2 points of the coverage.
+    assert apart.mean(axis=0).min() >= 0.95 - 3 * 0.022
+    assert against_lines(found, measured, case.loop).ok.all()
+
+
+@pytest.mark.parametrize("ticks", [1.5, 3.0])
+def test_a_fit_that_the_lines_contradict_has_no_margins(ticks: float) -> None:
+    case, true, measured = delayed(0.6, ticks)
+    held = margins(Fitter(MODEL, fixed={"delay": 0.0}).process(measured), case.open, BAND_HZ)
+    assert np.all(held.of("gain_margin") > true.of("gain_margin") + 5)
+    found = against_lines(held, measured, case.loop)
+    assert set(found.status) == {"contradicted by the lines"}
+    assert np.isnan(found.value).all()
+    assert np.isnan(found.bound()).all()
+    assert set(found.place.ravel()) == {"none"}
+
+
+def test_lines_do_not_contradict_true_margins() -> None:
+    for gain in (0.1, 0.2308, 0.6):
+        case, _, measured = delayed(gain, 0.0)
+        found = against_lines(margins(Fitter(MODEL).process(measured), case.open, BAND_HZ), measured, case.loop)
+        assert found.ok.all()

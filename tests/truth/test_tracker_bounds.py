@@ -117,11 +117,11 @@ def test_windows_further_apart_are_covered_too() -> None:
 
 
 def test_quiet_bins_are_safe_if_somewhat_wide() -> None:
-    # Interpolating Ĝ between lines 2 bins apart adds to the noise near the resonance, so coverage may only be high.
+    # The larger of two estimates, of which one is high near the resonance, so coverage may only be high.
     found = responses(400, "joint", noise="quiet")
     error = errors(400, found, 4)
     within = [np.mean(error <= np.array([r[3].bound(c) for r in found])) for c in (1, 2)]
-    assert 0.60 <= within[0] <= 0.75
+    assert 0.60 <= within[0] <= 0.80
     assert 0.97 <= within[1] <= 1.0
 
 
@@ -164,5 +164,5 @@ def test_coherence_is_that_of_the_noise() -> None:
     noisy = np.fft.fft(y.reshape(RUNS, -1, 400), axis=2)[:, :, bins]
     expected = signal / (signal + np.var(noisy, axis=(0, 1)))
     found = np.mean([r.coherence[9] for r in responses(400, "joint")], axis=0)
-    # The estimate from ten periods is high by (1 − γ²)/10.
-    assert np.allclose(1 - found, 0.9 * (1 - expected), rtol=0.1)
+    # What chance adds to an estimate from ten periods, (1 − γ²)/10, is taken off.
+    assert np.allclose(1 - found, 1 - expected, rtol=0.1)

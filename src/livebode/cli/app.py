@@ -8,11 +8,12 @@ above stopped from outside.
 from __future__ import annotations
 
 import errno
-import io
 import os
 import signal
 import sys
 import traceback
+import warnings
+from typing import Any
 
 import typer
 
@@ -28,9 +29,10 @@ from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
 from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
+from livebode.cli.terminal import protect
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
-from livebode.nouns import InputError
+from livebode.nouns import DamageWarning, InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -100,10 +102,16 @@ def _explained(error: Exception) -> tuple[str, int]:
 def _prepare_process() -> None:
     for number in _ENDING:
         signal.signal(number, _end)
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal that lacks a letter shows another one, rather than nothing and an error.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+    protect()
+    warnings.showwarning = _warn
+    warnings.simplefilter("default", DamageWarning)
+
+
+def _warn(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
+    if issubclass(category, DamageWarning):
+        print(f"livebode: {message}", file=sys.stderr)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
 def _end(number: int, _frame: object) -> None:

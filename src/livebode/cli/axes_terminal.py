@@ -8,16 +8,16 @@ import traceback
 from collections.abc import Mapping
 from typing import Any
 
-from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from livebode.cli.terminal import console
 from livebode.nouns import Event, InputError
 from livebode.session import Session, StoppedError
 from livebode.session.axis_thread import AxisThread
 
-_COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "last event")
+_COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
 _EVENT_LETTERS = 60
 _LOOKS_A_REDRAW = 5
 
@@ -27,7 +27,7 @@ class AxesTerminal:
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
-        self._console = Console(stderr=True, highlight=False)
+        self._console = console(stderr=True)
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
         self._shown: dict[AxisThread, str] = {}
         self._looks = 0
@@ -78,7 +78,7 @@ def table_of(threads: list[AxisThread]) -> Table:
     """One line for each axis."""
     table = Table(box=None, pad_edge=False)
     for column in _COLUMNS:
-        table.add_column(column, justify="right" if column in _COLUMNS[2:7] else "left", no_wrap=True)
+        table.add_column(column, justify="right" if column in _COLUMNS[2:8] else "left", no_wrap=True)
     for thread in threads:
         table.add_row(*map(Text, _row(thread)))
     return table
@@ -103,6 +103,7 @@ def _row(thread: AxisThread) -> tuple[str, ...]:
         str(status.responses),
         "" if health is None else str(health.lost),
         "" if status.latency_s is None else f"{1e3 * status.latency_s:.1f} ms",
+        "" if health is None else f"{health.waiting_s:.1f} s",
         event if len(event) <= _EVENT_LETTERS else event[:_EVENT_LETTERS] + "…",
     )
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
@@ -16,9 +19,11 @@ from livebode.records import to_json
 from livebode.session import Relay
 from livebode.session.axis import ServeSection
 
+_SHOWN = 4
+
 
 def demo_command(
-    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 22.0,
     fast: Annotated[bool, typer.Option("--fast", help="As fast as it can, not at the machine's pace.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the noise; the same seed gives the same run.")] = 1,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; an earlier demo there is replaced.")] = Path(
@@ -29,14 +34,19 @@ def demo_command(
     as_json: Json = False,
 ) -> None:
     """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from livebode.session.demo import demo  # with the simulation
+    from livebode.session.demo import LEARNED_S, demo, demo_baseline  # with the simulation
 
-    console = Console(stderr=True, highlight=False)
+    console = terminal.console(stderr=True)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
+    with (
+        console.status(f"Learning the healthy axis from {LEARNED_S:g} s of its strokes")
+        if not as_json
+        else nullcontext()
+    ):
+        baseline = demo_baseline(seed + 1)
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # Whoever tries it is shown the page while the machine works; the port that others expect is left to them.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
@@ -52,27 +62,29 @@ def demo_command(
             def progress(done: int, total: int | None) -> None:
                 bar.update(task, completed=seconds * done / (total or done))
 
-            outcome, found = demo(
+            outcome = demo(
                 out,
                 seconds=seconds,
                 seed=seed,
                 real_time=not fast,
+                baseline=baseline,
                 progress=progress,
                 audience=Numbers(audience_of("demo")),
                 draw=drawing("simulated belt axis", ("u", "velocity")),
             )
         if as_json:
-            print(to_json({"directory": str(outcome.directory), "finding": found} | outcome.summary), flush=True)
+            print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
             return
         show(outcome)
-        print(f"\n{found}", flush=True)
+        sys.stdout.flush()
 
 
 def _numbers(responses: Responses) -> str:
-    """The newest response in a line: where the cart is, and the magnitude at each line."""
+    """The newest response in a line: where the cart is, and the magnitude at some of the lines."""
     if not len(responses) or not responses.valid[-1].any():
         return "waiting for the first whole window"
     newest = responses[-1]
     f = newest.lines.frequency_hz
-    levels = " ".join(f"{db:+.1f}" for db in newest.magnitude_db)
-    return f"cart at {newest.schedule:.2f} m, dB at {f[0]:.0f} … {f[-1]:.0f} Hz: {levels}"
+    some = slice(None, None, max(1, len(f) // _SHOWN))
+    levels = ", ".join(f"{hz:.0f} Hz {db:+.1f} dB" for hz, db in zip(f[some], newest.magnitude_db[some]))
+    return f"cart at {newest.schedule:.2f} m: {levels}"

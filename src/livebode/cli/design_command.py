@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.nouns import InputError, counted
 from livebode.records import to_json
@@ -60,9 +61,8 @@ def design_command(
 
 def _working() -> AbstractContextManager[object]:
     """On a terminal a sign of life: thousands of lines take their time."""
-    from rich.console import Console
 
-    return Console(stderr=True).status("choosing")
+    return terminal.console(stderr=True).status("choosing")
 
 
 def _band(text: str) -> list[float]:
@@ -80,9 +80,8 @@ def _draw(design: Design, path: Path) -> None:
 
 
 def _show(design: Design) -> None:
-    from rich.console import Console
 
-    console = Console(highlight=False, markup=False)
+    console = terminal.console(markup=False)
     table = _table()
     table.add_column("chosen")
     table.add_column("value")
@@ -90,7 +89,7 @@ def _show(design: Design) -> None:
     for choice in design.choices:
         table.add_row(choice.what, choice.value, choice.why)
     console.print(table)
-    if design.machine.noise > 0:
+    if design.machine.noise > 0 or design.encoder_counts is not None:
         _show_lines(console, design)
     for note in design.machine.notes:
         console.print(f"note: {note}", soft_wrap=True)
@@ -104,19 +103,23 @@ def _table() -> Table:
 
 def _show_lines(console: Console, design: Design) -> None:
     """What each line tells; of many lines some, the weakest among them."""
+    from livebode.design.encoder import COUNTS_MIN
+
     relative, windows = design.accuracy.relative, design.windows
     each = -(-len(relative) // _LINES_SHOWN)
     first = int(relative.argmax()) % each
     table = _table()
     for head in ("line", "in the spectrum", "σ of a window", f"95 % bound, {counted(windows, 'window')}"):
         table.add_column(head, justify="right")
-    shown = zip(
-        design.waveform.lines.frequency_hz, design.waveform.amplitude, relative, design.accuracy.reached(windows)
-    )
-    for f, amplitude, sigma, bound in list(shown)[first::each]:
-        table.add_row(
-            f"{f:.6g} Hz", f"{amplitude:.4g} N m", f"{100 * sigma:.3g} % of |G|", f"{100 * bound:.3g} % of |G|"
-        )
+    counts, reached = design.encoder_counts, design.accuracy.reached(windows)
+    if counts is not None:
+        table.add_column("at the encoder", justify="right")
+    for i in range(first, len(relative), each):
+        cells = [f"{design.waveform.lines.frequency_hz[i]:.6g} Hz", f"{design.waveform.amplitude[i]:.4g} N m"]
+        cells += [f"{100 * share:.3g} % of |G|" for share in (relative[i], reached[i])]
+        if counts is not None:
+            cells.append(f"{counts[i]:.3g} counts{'' if counts[i] >= COUNTS_MIN else ': not measurable'}")
+        table.add_row(*cells)
     console.print()
     console.print(table)
     if each > 1:

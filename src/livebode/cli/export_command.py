@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -39,8 +40,8 @@ def export_command(
     name = record.path.resolve()
     path = out or name.with_name(name.name + "-parameters" * parameters + export.ENDINGS[to])
     if parameters:
-        table = export.ParameterTable(record.path)
-        written = export.save(path, lambda partial: export.TABLES[to](partial, table), force=force)
+        table = export.ParameterTable(record.path, partial(record.tables, "parameters"))
+        written = export.save(path, lambda path: export.TABLES[to](path, table), force=force)
         print(f"{path}: {written.rows} parameter values")
         return
     if at is not None:
@@ -51,7 +52,7 @@ def export_command(
         parts = iter([mean_response(record.batches())])
     else:
         parts = record.batches()
-    written = export.save(path, lambda partial: export.FORMATS[to](partial, parts, record.summary), force=force)
+    written = export.save(path, lambda path: export.FORMATS[to](path, parts, record.summary), force=force)
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
     print(f"{path}: {written.rows} response{'s' * (written.rows != 1)} at {len(record.lines)} lines{left_out}")
 

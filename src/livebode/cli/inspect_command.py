@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
 from livebode.nouns import InputError
 from livebode.records import to_json
@@ -17,11 +18,6 @@ if TYPE_CHECKING:
     from livebode.session.inspection import Inspection
 
 _LINES_SHOWN = 24
-
-
-class _Console(Console):
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError  # the entry point knows what to do; Rich would end with 1
 
 
 def inspect_command(
@@ -41,7 +37,7 @@ def inspect_command(
     if as_json:
         print(to_json(found.plain()))
         return
-    console = _Console(highlight=False, markup=False)  # names and units may hold brackets
+    console = terminal.console(markup=False)  # names and units may hold brackets
     _show_recording(found, console)
     if found.excitation is not None:
         _show_excitation(found, console)
@@ -87,6 +83,13 @@ def _show_excitation(found: Inspection, console: Console) -> None:
         console.print(f"transient: the first {first} from the steady state")
     if excitation.outlying:
         console.print(f"outlying (spikes, pauses): periods {', '.join(map(str, excitation.outlying))}")
+    if slips := excitation.slips:
+        missing = sum(slip.missing for slip in slips)
+        console.print(
+            f"phase slips: {len(slips)}, first at sample {slips[0].sample}; {abs(missing)} samples "
+            f"{'missing' if missing >= 0 else 'repeated'} in all without a gap; realigned here, and by a run",
+            soft_wrap=True,
+        )
     console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
     table = Table(box=None, header_style="bold")
     for heading in ("line Hz", "amplitude", "SNR at output dB"):

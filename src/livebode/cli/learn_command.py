@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.nouns import InputError
 from livebode.records import to_json
@@ -25,13 +26,12 @@ def learn_command(
     as_json: Json = False,
 ) -> None:
     """Learn what the healthy machine is like, for `livebode run --baseline`."""
-    from rich.console import Console
 
     from livebode.session.learning import learn  # with the simulation
 
     if out.exists() and not force:
         raise InputError(f"{str(out)!r} exists already; take another --out, or --force to replace it")
-    console = Console(stderr=True, highlight=False)
+    console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
         baseline = learn(runs, say=status.update)
     baseline.save(out)

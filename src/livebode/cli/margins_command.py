@@ -53,9 +53,11 @@ def show_loop(found: LoopReport) -> None:
     low, high = found.fit.band_hz
     print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
     if not found.margins.ok[0]:
-        print(f"  no margins: {found.margins.status[0]}; check the loop's description and the fit")
+        print(f"  no margins: {found.message}")
     else:
         _show_margins(found.margins)
+        if found.fit.taken or not found.fit.complete:
+            print(f"  {found.fit.about_bounds}")
     size, bound, at_hz = found.at_lines
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
     if len(found.places) > 1:
@@ -75,7 +77,7 @@ def _show_margins(margins: Margins) -> None:
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
         known = "" if bound[i] < abs(value) else ", not known"
         print(f"  {WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
-    print("  ± holds 95 % of what noise does to the fit; where EXTRAPOLATED, no line checks the model")
+    print("  ± is by the fit's covariance, 1.96 sigma; where EXTRAPOLATED, no line checks the model")
 
 
 def _show_tuning(found: Tuning) -> None:

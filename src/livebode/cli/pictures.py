@@ -10,6 +10,7 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import Any
 
+from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.fitting import Fit
 from livebode.nouns import Model, Responses
 from livebode.session import Draw, Outcome
@@ -35,17 +36,19 @@ def show(outcome: Outcome) -> None:
     from livebode.report import terminal_bode
 
     size = get_terminal_size((100, 30))
-    print(
+    print_drawn(
         terminal_bode(
             outcome.responses,
             width=min(size.columns, 140),
             height=max(16, min(size.lines - 4, 36)),
-            colour=sys.stdout.isatty() and "NO_COLOR" not in os.environ,
+            colour=is_terminal() and "NO_COLOR" not in os.environ,
             unicode="utf" in (sys.stdout.encoding or "").lower(),
         )
     )
     print(f"{counted(outcome.summary)}\n{outcome.directory}/")
     found = outcome.summary["found"]
+    for line in _judged(found):
+        print(line)
     if (moving := found.get("motion", {}).get("model")) is not None:
         _show_moving(moving)
     if "fit" in outcome.summary:
@@ -58,6 +61,25 @@ def show(outcome: Outcome) -> None:
         _show_monitoring(outcome.summary["monitoring"])
 
 
+_REASONS = {
+    "distorted": "distortion by friction, backlash or steps of a sensor",
+    "hum": "hum of the mains",
+    "steps": "less than half a step of the sensor",
+}
+
+
+def _judged(found: dict[str, Any]) -> list[str]:
+    """Where the noise came from if not from the scatter between periods, and lines with a reason against them."""
+    lines = []
+    judged = found.get("judged", {})
+    if moved := judged.get("noise_from_detection_lines"):
+        lines.append(f"the schedule moves: noise of {_many(moved, 'response')} from detection lines (non-excited bins)")
+    for kind, frequency_hz in judged.get("invalid_lines_hz", {}).items():
+        where = ", ".join(f"{f:g}" for f in frequency_hz)
+        lines.append(f"not valid at {where} Hz: {_REASONS[kind]} (see events.jsonl)")
+    return lines
+
+
 def counted(summary: dict[str, Any]) -> str:
     """How much was tracked, in a line."""
     counts, speed, found = (summary[part] for part in ("counts", "speed", "found"))
@@ -65,7 +87,8 @@ def counted(summary: dict[str, Any]) -> str:
     gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     return (
         f"{_many(counts['responses'], 'response')} at {_many(len(found['frequency_hz']), 'line')}{invalid}, "
-        f"from {counts['samples']} samples{gaps}: "
+        f"from {counts['samples']} samples{gaps}, one in {_many(found['hop'], 'sample')} "
+        f"({found['rate_hz'] / found['hop']:.4g}/s): "
         f"{speed['recorded_s']:.1f} s of machine tracked in {speed['run_s']:.2f} s"
     )
 
@@ -83,7 +106,7 @@ def _show_moving(model: dict[str, Any]) -> None:
 def _show_loop(found: dict[str, Any]) -> None:
     """The margins in a line; `livebode margins` says more."""
     if not (worst := found["worst_over_places"]):
-        print(f"no margins: {found['status']}; check the loop's description and the fit")
+        print(f"no margins: {found['message']}")
         return
     print(f"margins, worst of {_many(found['places'], 'fit')} over the run: {margins_in_short(worst)}")
 
@@ -118,9 +141,13 @@ def show_fit(found: Fit, of: str) -> None:
         print(f"  no numbers ({found.status}): {found.sentence}")
         return
     for name, value, bound, unit in found.rows():
+        if (limit := found.at_most(name)) is not None:
+            print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
+            continue
         print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
-    print(f"  ± holds 95 %; the model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+    print(f"  {found.about_bounds}")
+    print(f"  the fitted model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
 
 
 def _many(number: int, noun: str) -> str:

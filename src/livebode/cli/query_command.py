@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Json
 from livebode.nouns import InputError
 from livebode.records import Run, to_json
@@ -42,7 +43,6 @@ def query_command(
 
 
 def _show(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)
@@ -51,7 +51,7 @@ def _show(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
     for row in rows:
         table.add_row(*(f"{value:.9g}" if isinstance(value, float) else str(value) for value in row))
     # A file or a pipe has no width to keep to.
-    Console(width=None if sys.stdout.isatty() else 1 << 14, markup=False, highlight=False).print(table)
+    terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)
 
 
 def _plain(value: Any) -> Any:

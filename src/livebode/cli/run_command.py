@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import AudienceOf, served
@@ -69,6 +70,13 @@ def run_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
+    accept_roles: Annotated[
+        bool,
+        typer.Option("--accept-roles", help="Keep these roles, whatever the recording shows."),
+    ] = False,
+    all_periods: Annotated[
+        bool, typer.Option("--all-periods", help="Keep a transient at the beginning of a recording.")
+    ] = False,
     go_on: Annotated[
         bool,
         typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
@@ -95,6 +103,8 @@ def run_command(
             "differenced": difference or None,
             "spikes": spikes or None,
             "hann": hann,
+            "accept_roles": accept_roles or None,
+            "all_periods": all_periods or None,
         },
         "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
     }
@@ -141,10 +151,9 @@ def _window(text: str | None) -> int | str | None:
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
     """One recording, with a bar."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = terminal.console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -99,7 +99,7 @@ class Access:
         return self._limited(role) if role is not None and self._clock() < until else None
 
     def _check(self, token: str, address: str) -> Role | None:
-        address = _network(address)
+        address = network(address)
         count, until = self._wrong.get(address, (0, 0.0))
         if (left := until - self._clock()) > 0:
             raise TooManyTriesError(left)
@@ -142,7 +142,7 @@ def _session(cookie: str) -> str:
     return "" if found is None else found.value
 
 
-def _network(address: str) -> str:
+def network(address: str) -> str:
     """The address, or the network of 64 bits that one customer of IPv6 has."""
     try:
         known = ipaddress.ip_address(address.partition("%")[0])

@@ -10,8 +10,7 @@ from starlette.applications import Starlette
 from starlette.background import BackgroundTask
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
-from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
@@ -29,6 +28,7 @@ from livebode.nouns import InputError, Responses
 _HERE = Path(__file__).parent
 SOCKETS_MAX = 16
 """Browsers at once."""
+_FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
@@ -45,8 +45,7 @@ def application(board: Board, serving: Serving) -> Guard:
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
         WebSocketRoute("/live", pages.live),
-        Mount("/static/uplot", StaticFiles(directory=_HERE / "_vendor" / "uplot")),
-        Mount("/static", StaticFiles(directory=_HERE / "static")),
+        Route("/static/{name:path}", pages.static),
     ]
     handlers = {InputError: _sorry, TooManyTriesError: _wait}
     return Guard(Starlette(routes=routes, exception_handlers=handlers), serving.names, serving.tls is not None)
@@ -57,14 +56,15 @@ class _Pages:
 
     def __init__(self, board: Board, serving: Serving) -> None:
         self._board, self._secure = board, serving.tls is not None
+        self._files = _files()
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
             return RedirectResponse("/login", 303)
-        return FileResponse(_HERE / "static" / "index.html")
+        return self._file("index.html")
 
     async def login_page(self, _request: Request) -> Response:
-        return FileResponse(_HERE / "static" / "login.html")
+        return self._file("login.html")
 
     async def login(self, request: Request) -> Response:
         data = await body(request)
@@ -85,6 +85,9 @@ class _Pages:
         answer = JSONResponse({})
         answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=self._secure)
         return answer
+
+    async def static(self, request: Request) -> Response:
+        return self._file(request.path_params["name"])
 
     async def past(self, request: Request) -> Response:
         """Rows of a span of time."""
@@ -157,6 +160,10 @@ class _Pages:
         finally:
             self._board.clients.discard(client)
 
+    def _file(self, name: str) -> Response:
+        content, kind = self._files.get(name, (b"not found\n", ""))
+        return Response(content, 200 if kind else 404, media_type=kind or "text/plain")
+
     def _role(self, request: Request) -> str | None:
         headers = request.headers
         return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), _address(request))
@@ -170,6 +177,16 @@ class _Pages:
         if state.quantities is None:
             raise InputError("the run has not begun; wait for its first samples")
         return state
+
+
+def _files() -> dict[str, tuple[bytes, str]]:
+    """Content and type of what the page consists of. In memory: a file takes a thread for each who asks unasked."""
+    found = {}
+    for folder, prefix in ((_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")):
+        for path in folder.iterdir():
+            if kind := _FILE_TYPES.get(path.suffix):
+                found[prefix + path.name] = path.read_bytes(), kind
+    return found
 
 
 def _as(state: State, responses: Responses, span: asked.Span) -> Responses:

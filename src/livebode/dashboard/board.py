@@ -86,18 +86,19 @@ class Board:
             self._jobs -= 1
 
     def acknowledge(self, axis: int, key: str) -> None:
-        """Have it recorded that a person has seen an event; InputError where that cannot be."""
+        """Have it recorded that a person has seen an event, and all of the same cause before; InputError if not."""
         state = self.states[axis]
-        shown = state.notices.of(key)
-        if shown is None:
+        found = state.notices.of(key)
+        if found is None:
             raise InputError("there is no such event")
         if state.hub is None or state.finished:
             raise InputError("the run has ended, and its record is closed; events can be acknowledged while it goes on")
-        if shown["acknowledged"]:
+        notice, count = found
+        if notice.seen >= count:
             return
         newest = state.newest
         sample, time_s = (int(newest.sample[0]), float(newest.time_s[0])) if newest is not None else (0, 0.0)
-        if not state.hub.say(acknowledgement(shown, sample, time_s)):
+        if not state.hub.say(acknowledgement(notice, key, count, sample, time_s)):
             raise InputError("too many acknowledgements wait to be recorded; try again in a moment")
 
     def close(self) -> None:

@@ -57,7 +57,10 @@ class Client:
     async def _hear(self) -> None:
         count, since = 0, time.monotonic()
         while True:
-            text = await self._socket.receive_text()
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            text = message.get("text")
             now = time.monotonic()
             if now - since > 1:
                 count, since = 0, now
@@ -66,6 +69,8 @@ class Client:
                 await self._socket.close(1008, "too many messages")
                 return
             try:
+                if text is None:
+                    raise InputError("a message is text, not bytes")
                 await self._heed(wish(text, len(self._board.states)))
             except (InputError, KeyError) as error:
                 await self._tell({"error": str(error)})

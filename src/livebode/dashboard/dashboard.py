@@ -20,7 +20,8 @@ from livebode.dashboard.viewed import Viewed
 from livebode.nouns import InputError
 
 HEADER_BYTES_MAX = 16 << 10
-_CONNECTIONS_MAX = 128
+BACKLOG = 4096
+"""Connections that the system holds until they are taken in; one that finds no room tries again a second later."""
 _START_S = 30.0
 _END_S = 2
 
@@ -87,7 +88,8 @@ class Dashboard:
         try:
             import uvicorn
 
-            from livebode.dashboard.patience import PatientProtocol
+            from livebode.dashboard.patience import IDLE_S, PatientProtocol
+            from livebode.dashboard.server import Server
         except ImportError as error:
             raise InputError(
                 f"the dashboard needs {error.name}, which is not installed; pip install 'livebode[dashboard]'"
@@ -108,17 +110,16 @@ class Dashboard:
             ws_max_size=2048,
             ws_max_queue=8,
             ws_per_message_deflate=False,
-            limit_concurrency=_CONNECTIONS_MAX,
             h11_max_incomplete_event_size=HEADER_BYTES_MAX,
-            timeout_keep_alive=30,
+            timeout_keep_alive=int(IDLE_S),
             timeout_graceful_shutdown=_END_S,
             ssl_certfile=tls[0],
             ssl_keyfile=tls[1],
         )
-        # What strangers send is no news; a fault of ours is.
-        logging.getLogger("uvicorn").setLevel(logging.ERROR)
-        logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
-        self._server = uvicorn.Server(config)
+        # What strangers send is no news; a fault of ours is told by Faults, without a traceback for each.
+        logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
+        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
+        self._server = Server(config, self._socket, self._tell)
         self._thread = threading.Thread(target=self._run, name="livebode dashboard", daemon=True)
         self._thread.start()
         until = time.monotonic() + _START_S
@@ -141,24 +142,29 @@ class Dashboard:
     async def _work(self) -> None:
         from livebode.dashboard.app import application
         from livebode.dashboard.board import Board
+        from livebode.dashboard.server import Faults
 
+        self._faults = Faults(self._tell)
+        asyncio.get_running_loop().set_exception_handler(self._faults.handler)
         board = Board(self._states, self._viewed, Access(self._serving, self._tell))
         self._application = application(board, self._serving)
         beating = asyncio.create_task(board.run())
         beating.add_done_callback(self._stopped)
-        assert self._socket is not None
         try:
-            await self._server.serve(sockets=[self._socket])
+            await self._server.serve()
         finally:
             beating.cancel()
             board.close()
 
     def _stopped(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._tell(f"the dashboard stands still by a fault of its own, the run goes on: {error!r}")
+            self._tell(f"the dashboard stopped: internal error ({error!r}); the run continues")
 
     async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
-        await self._application(scope, receive, send)
+        try:
+            await self._application(scope, receive, send)
+        except Exception as error:
+            self._faults.take(error)
 
 
 def _listening(serving: Serving) -> socket.socket:
@@ -167,7 +173,8 @@ def _listening(serving: Serving) -> socket.socket:
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         found.bind((serving.address, serving.port))
-        found.listen(128)
+        found.listen(BACKLOG)
+        found.setblocking(False)
     except OSError as error:
         found.close()
         if error.errno == errno.EADDRINUSE:

@@ -7,11 +7,13 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 BODY_BYTES_MAX = 4096
 _QUERY_MAX = 1024
+_YEAR_S = 365 * 86400
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -45,9 +47,9 @@ class Guard:
             return
         why = self._wrong(scope)
         if why:
-            await _refuse(scope, receive, send, *why)
+            await _refuse(scope, receive, _speaking(send, self._scheme == "https"), *why)
             return
-        await self._app(scope, receive, _speaking(send))
+        await self._app(scope, receive, _speaking(send, self._scheme == "https"))
 
     def _wrong(self, scope: Scope) -> tuple[int, str] | None:
         headers = Headers(scope=scope)
@@ -87,12 +89,14 @@ class Guard:
         return True
 
 
-def _speaking(send: Send) -> Send:
+def _speaking(send: Send, tls: bool) -> Send:
     async def say(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name, value in _SAID.items():
                 headers[name] = value
+            if tls:
+                headers["strict-transport-security"] = f"max-age={_YEAR_S}"
             headers.setdefault("cache-control", "no-store")
         await send(message)
 
@@ -104,14 +108,17 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: 
         await receive()
         await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
         return
-    await PlainTextResponse(why + "\n", status, headers=dict(_SAID))(scope, receive, send)
+    await PlainTextResponse(why + "\n", status)(scope, receive, send)
 
 
 async def body(request: Any) -> bytes | None:
-    """The body of a request; None where it is longer than any that the page sends."""
+    """The body of a request; None where it is longer than any that the page sends, or did not come whole."""
     data = b""
-    async for part in request.stream():
-        data += part
-        if len(data) > BODY_BYTES_MAX:
-            return None
+    try:
+        async for part in request.stream():
+            data += part
+            if len(data) > BODY_BYTES_MAX:
+                return None
+    except ClientDisconnect:
+        return None
     return data

@@ -11,6 +11,7 @@ from typing import Any
 
 from livebode.nouns import Block, Event, Parameters, Responses
 from livebode.session import Audience
+from livebode.session.overview import Overview
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -20,6 +21,7 @@ VALUES_MAX = 1 << 20
 EVENTS_MAX = 4096
 _SAYINGS_MAX = 64
 _DELAYS = 1024
+_INTERVALS = 16
 
 
 class Hub(Audience):
@@ -35,7 +37,13 @@ class Hub(Audience):
         self.begun: Mapping[str, Any] | None = None
         self.ended: Mapping[str, Any] | None = None
         self.health: Callable[[], Health] | None = None
+        self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
+        self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
+        self.followed_s = 0.0
+        """`time.monotonic()` of the newest samples, or of the run's beginning."""
+        self.clock_s: float | None = None
+        """Seconds since 1970 at the run's time 0, by this computer's clock at the first Block of a live source."""
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
         self._lock = threading.Lock()
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
@@ -43,10 +51,15 @@ class Hub(Audience):
         self._events: deque[Event] = deque(maxlen=EVENTS_MAX)
         self._sayings: list[Event] = []
 
+    def share(self, overview: Overview) -> None:
+        self.overview = overview
+
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         with self._lock:  # what waits is of a run before, whose lines may be others
             self._rows, self._values = deque(), 0
         self.directory, self.health, self.ended = directory, health, None
+        self.followed_s, self.clock_s = time.monotonic(), None
+        self.intervals_s.clear()
         self.begun = summary
 
     def write(self, responses: Responses) -> None:
@@ -69,8 +82,16 @@ class Hub(Audience):
     def followed(self, block: Block) -> None:
         self.samples = block.stop
         self.gaps += block.gap
+        if not len(block):
+            return
+        now_s = time.monotonic()
+        self.intervals_s.append(now_s - self.followed_s)
+        self.followed_s = now_s
         if isinstance(block, LiveBlock):
-            self.delays_s.append(time.monotonic() - block.arrived_s)
+            delay_s = self.followed_s - block.arrived_s
+            self.delays_s.append(delay_s)
+            if self.clock_s is None:
+                self.clock_s = time.time() - delay_s - (block.origin_s + block.stop / block.rate_hz)
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self.ended = summary

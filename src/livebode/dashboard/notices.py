@@ -1,48 +1,142 @@
-"""Notices: a run's events as the page shows them, and who has seen them."""
+"""Notices: a run's events as the page shows them, one for each cause, and how many of them somebody has seen."""
 
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Any
 
 from livebode.nouns import Event
 
 ACKNOWLEDGED = "acknowledged"
-NOTICES_MAX = 2000
+CAUSES_MAX = 500
+_KNOWN_MAX = 4096
 _PLAIN_MAX = 4000  # letters of a message
+_SUBJECTS = ("what", "reason", "status", "channel")
+
+
+@dataclass
+class Notice:
+    """The events of one cause in a run.
+
+    Attributes
+    ----------
+    cause
+        What they have in common.
+    id, kind, message
+        Of the newest.
+    first_s, last_s
+        Time of the first and of the newest.
+    count, seen
+        How many there were, and how many of them somebody acknowledged.
+    changed
+        The version at which it changed last.
+    """
+
+    cause: str
+    id: str
+    kind: str
+    message: str
+    first_s: float
+    last_s: float
+    count: int = 0
+    seen: int = 0
+    changed: int = 0
+    _group: str = ""
+    _before: int = 0
+
+    def take(self, event: Event) -> None:
+        """One more, or as many as the event says that there were."""
+        self.id, self.kind, self.message = event_id(event), event.kind, event.message[:_PLAIN_MAX]
+        group, count = event.details.get("group"), event.details.get("count")
+        if isinstance(group, str) and isinstance(count, int):
+            if group != self._group:  # the same cause again, after a pause
+                self._group, self._before = group, self.count
+            self.count = max(self.count, self._before + count)
+        else:
+            self.count += 1
+        self.last_s = max(self.last_s, event.time_s)
+
+    def plain(self) -> dict[str, Any]:
+        """For the page."""
+        names = ("cause", "id", "kind", "message", "first_s", "last_s", "count", "seen")
+        return {name: getattr(self, name) for name in names}
 
 
 class Notices:
-    """The newest events of a run, with those that somebody acknowledged marked."""
+    """The causes of a run's events, the newest last."""
 
     def __init__(self) -> None:
         self.version = 0
         self.counts: dict[str, int] = {}
-        self._shown: dict[str, dict[str, Any]] = {}
+        self.changed: set[str] = set()
+        """What is not as learned now."""
+        self._shown: OrderedDict[str, Notice] = OrderedDict()
+        self._known: OrderedDict[str, tuple[str, int]] = OrderedDict()  # cause, and which of its events
 
     def take(self, event: Event) -> None:
-        """An event, or that another one was acknowledged."""
+        """An event, or that others were acknowledged."""
         self.version += 1
         if event.kind == ACKNOWLEDGED:
-            if (seen := self._shown.get(str(event.details.get("event")))) is not None:
-                seen |= {"acknowledged": True, "changed": self.version}
+            self._acknowledged(event)
             return
         key = event_id(event)
-        if key not in self._shown:
-            self.counts[event.kind] = self.counts.get(event.kind, 0) + 1
-        self._shown.setdefault(key, {"acknowledged": False}).update(
-            id=key, kind=event.kind, time_s=event.time_s, message=event.message[:_PLAIN_MAX], changed=self.version
-        )
-        while len(self._shown) > NOTICES_MAX:
-            self._shown.pop(next(iter(self._shown)))
+        if key in self._known:
+            return
+        cause = cause_of(event)
+        self.counts[event.kind] = self.counts.get(event.kind, 0) + 1
+        if event.kind in ("change", "change-corrected"):
+            self.changed.add(str(event.details.get("what", "machine")))
+        elif event.kind == "change-cleared":
+            self.changed.discard(str(event.details.get("what", "machine")))
+        notice = self._shown.get(cause)
+        if notice is None:
+            first_s = event.details.get("first_s")
+            began_s = float(first_s) if isinstance(first_s, int | float) else event.time_s
+            notice = Notice(cause, key, event.kind, "", began_s, event.time_s)
+            self._shown[cause] = notice
+        notice.take(event)
+        notice.changed = self.version
+        self._shown.move_to_end(cause)
+        self._known[key] = cause, notice.count
+        for held, most in ((self._shown, CAUSES_MAX), (self._known, _KNOWN_MAX)):
+            if len(held) > most:
+                held.popitem(last=False)
 
-    def of(self, key: str) -> dict[str, Any] | None:
-        """One that is shown."""
-        return self._shown.get(key)
+    def of(self, key: str) -> tuple[Notice, int] | None:
+        """That of an event, and which of its events this is."""
+        cause, number = self._known.get(key, ("", 0))
+        notice = self._shown.get(cause)
+        return None if notice is None else (notice, number)
 
     def since(self, version: int) -> list[dict[str, Any]]:
         """Those that came or changed after `version`, oldest first."""
-        return [shown for shown in self._shown.values() if shown["changed"] > version]
+        return [notice.plain() for notice in self._shown.values() if notice.changed > version]
+
+    def _acknowledged(self, event: Event) -> None:
+        found = self.of(str(event.details.get("event")))
+        if found is None:
+            return
+        notice, count = found[0], event.details.get("count")
+        # In runs recorded before causes were grouped each event was acknowledged alone.
+        seen = max(notice.seen, count) if isinstance(count, int) else notice.seen + 1
+        notice.seen, notice.changed = min(seen, notice.count), self.version
+
+
+def cause_of(event: Event) -> str:
+    """What events have in common that are shown as one: the group that the run put them in, or kind and subject.
+
+    >>> cause_of(Event("gap", 7, 1.0, "a gap", {"group": "loss@7", "count": 1}))
+    'loss'
+    >>> cause_of(Event("change", 7, 1.0, "changed", {"what": "stiffness"}))
+    'change: stiffness'
+    """
+    group = event.details.get("group")
+    if isinstance(group, str):
+        return group.partition("@")[0]
+    subjects = [str(event.details[name]) for name in _SUBJECTS if name in event.details]
+    return ": ".join([event.kind, *subjects[:1]])[:200]
 
 
 def event_id(event: Event) -> str:
@@ -51,7 +145,8 @@ def event_id(event: Event) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
-def acknowledgement(shown: dict[str, Any], sample: int, time_s: float) -> Event:
-    """The event that records that a person has seen another."""
-    details = {"event": shown["id"], "kind": shown["kind"], "time_s": shown["time_s"]}
-    return Event(ACKNOWLEDGED, sample, time_s, f"acknowledged: {shown['message']}", details)
+def acknowledgement(notice: Notice, key: str, count: int, sample: int, time_s: float) -> Event:
+    """The event that records that a person has seen `count` events of a cause, of which `key` is the last."""
+    details = {"event": key, "kind": notice.kind, "time_s": notice.last_s, "cause": notice.cause, "count": count}
+    often = f" ({count} events of this cause)" if count > 1 else ""
+    return Event(ACKNOWLEDGED, sample, time_s, f"acknowledged: {notice.message}{often}", details)

@@ -10,6 +10,7 @@ ROWS_MAX = 2400
 EVERY_S = 0.05
 """At most one response is kept in so many seconds of the machine: 2,400 are two minutes."""
 _VALUES_MAX = 1 << 21
+_PARTS_MAX = 64
 
 
 class Recent:
@@ -36,8 +37,9 @@ class Recent:
         self._parts.append(kept)
         self._kept += len(kept)
         self.count += len(kept)
-        if self._kept > 2 * self._most(responses):
-            self._parts = [Responses.join(self._parts)[-self._most(responses) :]]
+        if len(self._parts) > _PARTS_MAX or self._kept > 2 * self._most(responses):
+            # The rows of a part take a third of what its arrays do when it has one row. Joined again, they are a copy.
+            self._parts = [Responses.join([Responses.join(self._parts)[-self._most(responses) :]])]
             self._kept = len(self._parts[0])
 
     def newest(self, rows: int) -> Responses | None:
@@ -49,7 +51,8 @@ class Recent:
         while at and found < rows:
             at -= 1
             found += len(self._parts[at])
-        return Responses.join(self._parts[at:])[-rows:]
+        first = self._parts[at][-(rows - found + len(self._parts[at])) :]
+        return Responses.join([first, *self._parts[at + 1 :]])
 
     def all(self) -> Responses | None:
         """What is kept."""

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ipaddress
+import os
+import shlex
 import ssl
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from livebode.session.axis import ServeSection
 from livebode.sources.live.secret import secret
 
 TOKEN_LETTERS_MIN = 32
-_MAKE = 'python -c "import secrets; print(secrets.token_urlsafe(32))"'
+_MAKE = 'umask 077; python -c "import secrets; print(secrets.token_urlsafe(32))"'
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,6 +84,8 @@ def _loopback(address: str) -> bool:
 
 def _token(key: str, variable: str | None, path: Path | None) -> str | None:
     token = secret("serve", key, variable, path)
+    if path is not None:
+        _check_rights(key, path)
     if token is None:
         return None
     if len(token) < TOKEN_LETTERS_MIN or not token.isascii() or not token.isprintable() or " " in token:
@@ -88,6 +93,16 @@ def _token(key: str, variable: str | None, path: Path | None) -> str | None:
             f"serve.{key} is no token of at least {TOKEN_LETTERS_MIN} letters and digits; make one with `{_MAKE}`"
         )
     return token
+
+
+def _check_rights(key: str, path: Path) -> None:
+    """InputError where other users may read or change the file. Its group may read it: so services share secrets."""
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if os.name == "posix" and mode & (stat.S_IROTH | stat.S_IWOTH | stat.S_IWGRP):
+        raise InputError(
+            f"serve.{key}_file = {str(path)!r} can be read or changed by other users (mode {mode:04o}); "
+            f"run `chmod 600 {shlex.quote(str(path))}`, and make another token if others may have read it"
+        )
 
 
 def _tls(section: ServeSection) -> tuple[Path, Path] | None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from livebode.session.said import said
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
+_SILENT_S = 2.0
+_SINCE_1970_S = 1e8  # what is later is a date: a run's own clock does not reach three years
 _GROWS_S = 10.0
 _SENT = 90  # three seconds of what browsers were sent: what a person freezes is among them
 
@@ -54,7 +57,9 @@ class State:
 
     def _empty(self) -> None:
         self.newest: Responses | None = None
-        self.recent, self.overview = Recent(), Overview()
+        self.recent = Recent()
+        self._shared = None if self.hub is None else self.hub.overview
+        self.overview = self._shared or Overview()
         self.trends, self.notices = Trends(), Notices()
         self.first_s = self.last_s = float("nan")
         self.finished = False
@@ -129,7 +134,8 @@ class State:
             return
         self._seen += len(responses)
         self._grew = time.monotonic()
-        self.overview.add(responses)
+        if self._shared is None:
+            self.overview.add(responses)
         self.recent.add(responses)
         use = np.flatnonzero(responses.valid.any(axis=1))
         at = int(use[-1]) if use.size else len(responses) - 1
@@ -214,8 +220,24 @@ class State:
         }
 
     def span(self) -> dict[str, Any]:
-        """From when to when there is something to see."""
-        return {"first_s": self.first_s, "last_s": self.last_s, "live": self.live, "growing": self.growing}
+        """From when to when there is something to see, and by which clock."""
+        return {
+            "first_s": self.first_s,
+            "last_s": self.last_s,
+            "live": self.live,
+            "growing": self.growing,
+            "clock_s": self.clock_s,
+        }
+
+    @property
+    def clock_s(self) -> float | None:
+        """Seconds since 1970 at the run's time 0; None where the run has no clock but its own.
+
+        What happens before a run begins is dated.
+        """
+        if self.quantities is None or self.last_s > _SINCE_1970_S:
+            return 0.0
+        return None if self.hub is None else self.hub.clock_s
 
     def health(self) -> dict[str, Any]:
         """How source and tracking are doing."""
@@ -228,6 +250,7 @@ class State:
             "responses": self._seen,
             "responses_per_s": gone / (now - then) if now > then and before >= 0 else None,
             "events": self.notices.counts,
+            "alarms": sorted(self.notices.changed),
             "ms_at_lines": self._largest_sensitivity(),
         }
         hub = self.hub
@@ -235,6 +258,8 @@ class State:
             return found | {"counts": self._summary.get("counts"), "source": self._summary.get("source")}
         delays = np.array(hub.delays_s) * 1e3
         found |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
+        silent_s, usual_s = now - hub.followed_s, median([*hub.intervals_s, 0.0])
+        found |= {"silent_s": silent_s, "stale": silent_s > max(_SILENT_S, 3 * usual_s)}
         if delays.size:
             found |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
         if hub.health is not None:

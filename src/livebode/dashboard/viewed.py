@@ -13,7 +13,7 @@ import pyarrow as pa
 from livebode.dashboard.hub import Item
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import Rows
-from livebode.nouns import Responses
+from livebode.nouns import Event, Responses
 from livebode.records import Run
 
 
@@ -26,6 +26,7 @@ class Viewed:
         self._sample = self._parameter_sample = -1
         self._last_s = -inf
         self._events = 0
+        self._damages: list[Event] = []
 
     @property
     def finished(self) -> bool:
@@ -45,19 +46,24 @@ class Viewed:
         behind_s = self._last_s, inf  # segments before that are not read again
         items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
         rows = list(self._parameters(behind_s))
-        events = self._run.events()
-        items += events[self._events :]
-        self._events = len(events)
+        items += self._new_events()
         return items, rows, self._run.summary, self._run.finished
 
     def _rest(self, state: State) -> None:
         for model, name, unit, rows in self._parameters(None):
             state.trends.add(model, name, unit, rows)
-        events = self._run.events()
-        state.take(list(events))
-        self._events = len(events)
+        state.take(list(self._new_events()))
         state.finished = self._run.finished
         state.read()
+
+    def _new_events(self) -> list[Event]:
+        events = self._run.events()
+        new, self._events = events[self._events :], len(events)
+        for damage in self._run.damages:
+            if damage not in (*self._damages, *new):
+                new.append(damage)
+        self._damages = self._run.damages
+        return new
 
     def _responses(self, state: State, part: Responses) -> None:
         if (new := self._new(part)) is not None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.design.choose import Design
+from livebode.estimation.settings import DETECTION_LINES_MIN
 from livebode.nouns import Lines
 
 
@@ -41,7 +42,7 @@ def axis_text(
     tracked: dict[str, Any] = {"estimator": "joint", "hop": design.hop} | dict(tracking or {})
     if averaged:
         tracked |= {"average": True, "forgetting": 1.0}
-    if moves and lines.quiet and not motion:
+    if moves and len(lines.quiet) >= DETECTION_LINES_MIN and not motion:
         tracked |= {"noise": "quiet"}
     tables: dict[str, Mapping[str, Any]] = {
         "source": {"log": log},

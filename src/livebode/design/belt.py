@@ -47,6 +47,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
         rate_hz=axis.drive.rate_hz,
         noise=axis.sensor.noise_rad_per_s,
         stroke_s=seconds / 2 if moves else None,
+        encoder_step_m=radius * axis.sensor.encoder_step_rad,
         notes=(_DRY,) if axis.friction.dry and not moves else (),
     )
 

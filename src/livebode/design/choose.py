@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from livebode.design.accuracy import Accuracy, accuracy_of
+from livebode.design.accuracy import Accuracy, Floats, accuracy_of
+from livebode.design.encoder import encoder_counts
 from livebode.design.explain import Choice, explained
 from livebode.design.grid import grid
 from livebode.design.limits import Bearable, beyond, check_known, room
@@ -70,8 +71,14 @@ class Design:
         """In how long to bring the excitation in, whole periods: the peaks are those of the periodic state."""
         return self.waveform.ramp_periods * self.waveform.lines.window / self.waveform.lines.rate_hz
 
+    @property
+    def encoder_counts(self) -> Floats | None:
+        """Amplitude of each line at the motor's encoder, counts, shape (lines,); None where its step is not known."""
+        return encoder_counts(self.waveform, self.machine)
+
     def plain(self) -> dict[str, Any]:
         """For JSON."""
+        counts = self.encoder_counts
         lines = self.waveform.lines
         low_high = {name: {"low": p.low, "high": p.high, "unit": UNITS[name], "place": p.place, "motion_alone": p.own}
                     for name, p in worst(self.peaks).items()}  # fmt: skip
@@ -88,6 +95,7 @@ class Design:
             "sigma": self.accuracy.sigma.tolist(),
             "sigma_relative": self.accuracy.relative.tolist(),
             "bound_95_relative": self.accuracy.reached(self.windows).tolist(),
+            "encoder_counts": None if counts is None else counts.tolist(),
             "windows": self.windows,
             "recording_s": self.recording_s,
             "hop": self.hop,

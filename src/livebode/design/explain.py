@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from livebode.design.encoder import encoder_words
 from livebode.design.grid import Grid
 from livebode.design.limits import Bearable
 from livebode.design.machine import UNITS, Quantity
+from livebode.design.mains import mains_words
 from livebode.design.peaks import Peak, worst
 from livebode.nouns import counted
 
@@ -33,11 +36,14 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     """The table: what was chosen, and why."""
     waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
     f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
-    spacing = f"{np.diff(f).min():g} Hz apart" if len(f) > 1 else "alone"
+    spacing = f"{np.diff(f).min():g} Hz apart or more" if len(f) > 1 else "alone"
+    if len(f) > 1 and np.ptp(np.diff(lines.bins)) == 0:
+        spacing = f"{f[1] - f[0]:g} Hz apart"
     bound = design.accuracy.reached(design.windows)
     weakest = int(np.argmax(bound))
     rows = [
         Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
+        Choice("mains", _listed_hz(design.wish.mains_hz), mains_words(lines, design.wish.mains_hz, found.mains)),
         Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
         Choice("amplitude", _amplitude(design), amplitude_why),
         Choice(
@@ -48,12 +54,18 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     if machine.noise > 0:
         told = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
         rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
+    if (counts := design.encoder_counts) is not None:
+        rows.append(Choice("encoder", *encoder_words(counts, f, moves=machine.stroke_s is not None)))
     rows.append(Choice("recording", _duration(design.recording_s), recording_why))
     rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
     even = lines.window % design.hop == 0
     hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
     rows.append(Choice("hop", f"{design.hop} samples", hop_why))
     return tuple(rows)
+
+
+def _listed_hz(frequencies: Sequence[float]) -> str:
+    return ", ".join(f"{f:g}" for f in frequencies) + " Hz" if frequencies else "not avoided"
 
 
 def _duration(seconds: float) -> str:

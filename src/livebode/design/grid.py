@@ -8,15 +8,17 @@ from math import ceil, floor, gcd, lcm, log2
 
 import numpy as np
 
+from livebode.design.mains import meets_mains
 from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
-from livebode.excitation import check_band, chirp_lines, odd_lines, stepped_lines
+from livebode.excitation import check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 from livebode.nouns import GridError, Lines, counted
 from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
+_GROUP = 4  # odd bins of which one is not excited
 _BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
 _HOP_NEAR = 1.25  # times a twentieth of the window, or that part of it
 _LONGER_MAX = 1.05  # than the resolution asks for, to find a window that a hop divides
@@ -35,6 +37,7 @@ class Grid:
     held_ticks: int = 1
     base: Lines | None = None  # of a stepped sine: the grid of one step
     periods: int = 0  # of each step
+    mains: tuple[int, ...] = ()  # bins of the band that were left out for the mains
 
 
 def grid(wish: Wish, rate_hz: float) -> Grid:
@@ -72,30 +75,50 @@ def _found(wish: Wish, rate_hz: float) -> Grid:
         check_window(wish.window, rate_hz)
     apart = 1 if wish.kind in ("chirp", "stepped") else _QUIET_BETWEEN
     window, why = (wish.window, "as given") if wish.window else _window(wish.resolution_hz or 0.0, apart, rate_hz)
-    if wish.kind == "odd":
-        found = odd_lines(low, high, rate_hz, window, seed=wish.seed)
-        return Grid(found, why, "odd bins, one in four of them quiet at random: distortion shows there")
     if wish.kind == "chirp":
         return Grid(chirp_lines(low, high, rate_hz, window), why, "every bin of the band")
-    first, last = ceil(low * window / rate_hz / apart - 1e-9), floor(high * window / rate_hz / apart + 1e-9)
-    bins = [k * apart for k in range(max(first, 1), last + 1)]
-    if not bins:
-        raise GridError(_no_line(low, high, apart * rate_hz / window, apart, rate_hz))
-    words = "the band's bins"
-    if apart == _QUIET_BETWEEN:
-        words = "every second bin of the band; those between show the noise"
-        if len(bins) == 1:
-            words = "the one in the band; its neighbours show the noise"
-    return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, words))
+    if wish.kind == "stepped":
+        first, last = ceil(low * window / rate_hz - 1e-9), floor(high * window / rate_hz + 1e-9)
+        bins = [k for k in range(max(first, 1), last + 1) if 2 * k < window]
+        if not bins:
+            raise GridError(_no_line(low, high, 1, window, rate_hz))
+        bins, mains = _without_mains(wish, bins, rate_hz / window)
+        return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
+    return _odd(wish, low, high, window, rate_hz, why)
 
 
-def _no_line(low: float, high: float, step_hz: float, apart: int, rate_hz: float) -> str:
-    """Why the band holds none of these lines, and what would."""
-    below = step_hz * floor(low / step_hz)
-    near = [f for f in (below, below + step_hz) if 0 < f < rate_hz / 2]
+def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: str) -> Grid:
+    """Odd bins: with every second one only even the excitation would repeat after half the window."""
+    all_odd = odd_bins(low, high, rate_hz, window).tolist()
+    if not all_odd:
+        raise GridError(_no_line(low, high, _QUIET_BETWEEN, window, rate_hz))
+    bins, mains = _without_mains(wish, all_odd, rate_hz / window)
+    if wish.kind == "odd" and len(bins) >= _GROUP:
+        lines = odd_lines(low, high, rate_hz, window, group=_GROUP, seed=wish.seed, without=mains)
+        words = (
+            "odd bins, one in four of them not excited, at random: noise and distortion show there and at the even ones"
+        )
+        return Grid(lines, why, words, mains=mains)
+    words = "odd bins; the even ones between show noise and even distortion"
+    return Grid(Lines.of_bins(bins, window, rate_hz), why, words, mains=mains)
+
+
+def _without_mains(wish: Wish, bins: list[int], resolution_hz: float) -> tuple[list[int], tuple[int, ...]]:
+    """The bins away from the mains, and those left out for it; all of them where more than half would go."""
+    met = meets_mains(bins, resolution_hz, wish.mains_hz)
+    left = [k for k, near in zip(bins, met) if not near]
+    return (left, tuple(k for k, near in zip(bins, met) if near)) if 2 * len(left) >= len(bins) else (bins, ())
+
+
+def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -> str:
+    """Why the band holds none of these lines (every bin, or the odd ones), and what would."""
+    bin_hz, odd = rate_hz / window, apart - 1
+    below = apart * floor((low / bin_hz - odd) / apart) + odd
+    near = [k * bin_hz for k in (below, below + apart) if 0 < 2 * k < window]
     told = f"; the nearest are {' and '.join(f'{f:g}' for f in near)} Hz" if near else ""
     finer = f", or take a window of {ceil(apart * rate_hz / (high - low))} samples" if high > low else ""
-    return f"no line of the {step_hz:g} Hz grid lies in {low:g} … {high:g} Hz{told}; widen the band{finer}"
+    which = "odd line" if odd else "line"
+    return f"no {which} of the {bin_hz:g} Hz grid lies in {low:g} … {high:g} Hz{told}; widen the band{finer}"
 
 
 def _stepped(wish: Wish, found: Grid) -> Grid:

@@ -90,6 +90,8 @@ class Machine:
         What the prediction leaves out, in sentences.
     band_hz
         Where the responses are known; None everywhere.
+    encoder_step_m
+        Way of the motor from one count of its encoder to the next; 0 where it is not known.
     """
 
     places: tuple[Place, ...]
@@ -99,10 +101,13 @@ class Machine:
     stroke_s: float | None = None
     notes: tuple[str, ...] = ()
     band_hz: tuple[float, float] | None = None
+    encoder_step_m: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.places:
             raise InputError("the machine has no place; describe it at one at least")
+        if not (np.isfinite(self.encoder_step_m) and self.encoder_step_m >= 0):
+            raise InputError(f"encoder_step_m={self.encoder_step_m} is not a finite number of at least 0")
         check_noise(self.noise)
 
     def torque(self, place: Place, frequency_hz: Floats) -> Complex:

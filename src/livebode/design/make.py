@@ -38,7 +38,7 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
             about |= {"periods": found.periods, "step_samples": found.base.window}
             samples = stepped_sine(found.base, each, periods=found.periods)
         else:
-            phases: Phases = "random" if wish.kind == "odd" else wish.phases or "low crest"
+            phases: Phases = wish.phases or "low crest"
             about |= {"phases": phases}
             samples = multisine(lines, each, phases, seed=wish.seed)
     # A mean moves a loop at its start, far more than the lines do, and tells nothing; a PRBS and a chirp have one.
@@ -52,7 +52,7 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
 
 
 def _lower(wish: Wish) -> str:
-    searched = wish.kind != "multisine" or wish.phases in (None, "low crest")
+    searched = wish.phases in (None, "low crest")
     return "a PRBS" if searched else "phases = 'low crest'"
 
 

@@ -93,6 +93,7 @@ def measured_machine(
     motion: Extremes | None = None,
     stroke_s: float | None = None,
     notes: tuple[str, ...] = (),
+    encoder_counts_per_turn: int = 0,
 ) -> Machine:
     """The Machine around a plant of which only the response is known, at one place.
 
@@ -117,6 +118,8 @@ def measured_machine(
         Seconds in which the motion passes each place once; None for an axis that stands.
     notes
         For `Machine.notes`.
+    encoder_counts_per_turn
+        Of the motor's encoder; 0 where it is not known.
 
     The load is taken to go with the motor: above the first antiresonance its travel differs.
 
@@ -138,9 +141,11 @@ def measured_machine(
     own = _motion(motion or {}, stroke_s)
     band_hz = given.band_hz if isinstance(given, MeasuredResponse) else None
     place = Place(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")
+    step_m = 2 * np.pi * radius_m / encoder_counts_per_turn if encoder_counts_per_turn > 0 else 0.0
     return Machine(
-        places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz
-    )
+        places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz,
+        encoder_step_m=step_m,
+    )  # fmt: skip
 
 
 def _motion(given: Extremes, stroke_s: float | None) -> Extremes:

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from livebode.design.mains import MAINS_HZ
 from livebode.excitation import Phases, check_order
 from livebode.excitation.chirp import Sweep
 from livebode.nouns import InputError
@@ -15,9 +16,10 @@ from livebode.nouns import InputError
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]
 
-_WHOSE = {"phases": "multisine", "order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
+_WHOSE = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
 _RESOLUTION_MIN_HZ = 1e-6
 _STEP_MIN = 1e-12
+_MAINS_MIN_HZ = 1.0
 _ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
 
 
@@ -32,10 +34,10 @@ class Wish:
     lines, window
         Lines as in `Lines.parse`, and the period in samples.
     kind
-        "multisine"; "odd": odd lines of random phase with quiet ones among them, to tell distortion; "prbs", "chirp",
-        "stepped": one line after the other.
+        "odd", which is chosen for a band: odd bins, one in four of them left quiet at random, to tell distortion from
+        noise; "multisine", which is chosen for `lines`; "prbs", "chirp", "stepped": one line after the other.
     phases
-        Of a multisine: "low crest", which is chosen, "schroeder" or "random".
+        Of lines that are excited together: "low crest", which is chosen, "schroeder" or "random".
     shape
         Amplitudes of the lines: "flat", or for an "equal snr" at the output of the machine.
     amplitude_n_m
@@ -55,6 +57,8 @@ class Wish:
         Windows that each step of a stepped sine takes; 4 are chosen.
     seed
         Of all that is random: the same seed, the same excitation.
+    mains_hz
+        Mains whose harmonics the lines of a band avoid, by half a bin, where the grid allows; empty: none.
 
     Raises
     ------
@@ -66,7 +70,7 @@ class Wish:
     resolution_hz: float | None = None
     lines: str | None = None
     window: int | None = None
-    kind: Kind = "multisine"
+    kind: Kind | None = None
     phases: Phases | None = None
     shape: Shape = "flat"
     amplitude_n_m: float | Sequence[float] | None = None
@@ -78,8 +82,11 @@ class Wish:
     sweep: Sweep | None = None
     periods: int | None = None
     seed: int = 0
+    mains_hz: Sequence[float] = MAINS_HZ
 
     def __post_init__(self) -> None:
+        if self.kind is None:
+            object.__setattr__(self, "kind", "odd" if self.lines is None else "multisine")
         for name, known in (
             ("kind", get_args(Kind)),
             ("phases", (None, *get_args(Phases))),
@@ -92,11 +99,20 @@ class Wish:
         self._check_amplitude()
         self._check_whose()
         self._check_grid()
+        self._check_mains()
+
+    def _check_mains(self) -> None:
+        if not all(np.isfinite(mains) and mains >= _MAINS_MIN_HZ for mains in self.mains_hz):
+            raise InputError(
+                f"mains_hz={list(self.mains_hz)} is not a list of frequencies above 1 Hz, such as [50, 60]"
+            )
 
     def _check_whose(self) -> None:
         for name, kind in _WHOSE.items():
             if getattr(self, name) is not None and self.kind != kind:
                 raise InputError(f"{name} is a setting of kind {kind!r}, and kind is {self.kind!r}; leave it out")
+        if self.phases is not None and self.kind not in ("multisine", "odd"):
+            raise InputError(f"phases is a setting of lines together, and kind is {self.kind!r}; leave it out")
         if self.lines is not None and self.kind not in ("multisine", "stepped"):
             raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
         if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):

@@ -56,8 +56,8 @@ class AroundLines(Generic[W]):
         return self._lines.repeatability()
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call: what is missing, and what was left out."""
-        return self._watch.drain()
+        """Events since the last call: what is missing, what was left out, and how lines were judged."""
+        return sorted(self._watch.drain() + self._lines.drain(), key=lambda event: event.sample)
 
     def finish(self) -> Responses | None:
         """What is held back at the end: nothing, every response has come; None where nothing came."""

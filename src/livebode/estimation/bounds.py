@@ -24,3 +24,21 @@ def between_periods(moments: Moments) -> Floats:
     """
     numerator, denominator = moments.pair
     return np.asarray(moments.unexplained(numerator / denominator) / moments.unbiased[:, np.newaxis])
+
+
+def unbiased(coherence: Floats, moments: Moments) -> Floats:
+    """γ² without what chance adds: (1 − γ²)/m over m periods, shape (rows, lines)."""
+    return np.asarray(np.maximum(1 - (1 - coherence) / (1 - moments.of_mean[:, np.newaxis]), 0.0))
+
+
+def contained(sigma: Floats, dof: Floats, distortion: Floats, dof_distortion: float) -> tuple[Floats, Floats]:
+    """Sigma (rows, lines) and degrees of freedom (rows,) of noise and distortion together.
+
+    The degrees of freedom are matched in two moments (Satterthwaite 1946); of the lines the least counts. A distortion
+    that is not known (NaN) adds nothing.
+    """
+    noise, added = sigma**2, np.where(np.isfinite(distortion), distortion**2, 0.0)
+    together = noise + added
+    of_line = together**2 / (noise**2 / dof[:, np.newaxis] + added**2 / dof_distortion)
+    least = np.where(np.isfinite(of_line), of_line, np.inf).min(axis=1)
+    return np.sqrt(together), np.where((added > 0).any(axis=1), np.fmin(dof, least), dof)

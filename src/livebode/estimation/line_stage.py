@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.estimation.bounds import between_periods, power
+from livebode.estimation.bounds import between_periods, contained, power, unbiased
+from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
 from livebode.estimation.hann import Hann
 from livebode.estimation.moments import Moments, PeriodMoments
+from livebode.estimation.movement import Movement
 from livebode.estimation.quantities import convert
-from livebode.estimation.quiet import NEIGHBOURS, QuietNoise
+from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows
-from livebode.nouns import Channel, Responses
+from livebode.nouns import Channel, Event, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,6 +27,17 @@ Complex = NDArray[np.complex128]
 # A window counts as excited at a line down to this share of the largest power seen: above the rounding of the DFT,
 # below any excitation that somebody meant.
 _EXCITED = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What is known of each line: shapes (rows, lines), of `dof` (rows,)."""
+
+    value: Complex
+    sigma: Floats
+    dof: Floats
+    distortion: Floats
+    weight: Complex
 
 
 class LineStage:
@@ -36,33 +50,49 @@ class LineStage:
     ----------
     settings
         Lines, signals, estimator and options.
+    sent
+        The bins that there are; None where any can be had.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, sent: Collection[int] | None = None) -> None:
         lines = settings.lines
         self._settings, self._roles = settings, settings.roles
         self._hann = Hann(lines) if settings.hann else None
-        self._quiet = QuietNoise(lines) if settings.noise == "quiet" else None
+        self._detection = None
+        if settings.uses_detection_lines:
+            # Only a reference that is the excitation itself shows that these bins are without it.
+            outside = beyond(lines) if settings.method.reference == "excitation" else ()
+            self._detection = DetectionNoise(lines, tuple(k for k in outside if sent is None or k in sent))
         self._places = max(1, lines.window // settings.step)
         self._moments = PeriodMoments(self._places, len(lines), settings.forgetting, own=settings.average)
+        self._movement = Movement(self._places)
+        self._moving = 0
         self._largest = 0.0
+        self._events: list[Event] = []
 
     @property
     def bins(self) -> NDArray[np.int64]:
         """The bins that it needs, in the order in which it takes them."""
         lines = self._settings.lines
         bins = self._hann.bins if self._hann else np.asarray(lines.bins)
-        return np.concatenate([bins, lines.quiet]).astype(np.int64) if self._quiet else bins
+        return np.concatenate([bins, self._detection.bins]).astype(np.int64) if self._detection else bins
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        return self._moments.state() | {"largest": np.array([self._largest])}
+        own = {"largest": np.array([self._largest]), "moving": np.array([self._moving])}
+        return self._moments.state() | self._movement.state() | own
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         self._moments.load(state)
-        self._largest = float(state["largest"][0])
+        self._movement.load(state)
+        self._largest, self._moving = float(state["largest"][0]), int(state["moving"][0])
+
+    def drain(self) -> list[Event]:
+        """Events since the last call."""
+        events, self._events = self._events, []
+        return events
 
     def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record: rate, window, lines, hop."""
+        """What the responses stand on, as plain data for a record: rate, window, lines, hop, the noise's origin."""
         lines = self._settings.lines
         return {
             "rate_hz": lines.rate_hz,
@@ -71,6 +101,7 @@ class LineStage:
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
+            "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving},
         }
 
     def excitation_power(self) -> Floats:
@@ -92,7 +123,14 @@ class LineStage:
         seen = self._moments.now.weight > 0
         return values[seen].mean(axis=0) if seen.any() else np.full(values.shape[1], np.nan)
 
-    def process(self, rows: Rows, place: NDArray[np.int64], centre: Floats, channels: Sequence[Channel]) -> Responses:
+    def process(
+        self,
+        rows: Rows,
+        place: NDArray[np.int64],
+        centre: Floats,
+        channels: Sequence[Channel],
+        repeating: Repeating | None = None,
+    ) -> Responses:
         """Responses of consecutive spectra.
 
         Parameters
@@ -105,37 +143,43 @@ class LineStage:
             Time and schedule at each window's centre, shape (2, rows).
         channels
             Names and units of the signals.
+        repeating
+            What the periods before show of errors that repeat with the excitation; None where there are no samples.
         """
         with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
-            return self._responses(rows, place, centre, response_unit(channels, self._settings))
+            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating)
 
-    def _responses(self, rows: Rows, place: NDArray[np.int64], centre: Floats, unit: str) -> Responses:
-        s, lines = self._settings, slice(0, len(self._settings.lines))
+    def _responses(
+        self, rows: Rows, place: NDArray[np.int64], centre: Floats, unit: str, repeating: Repeating | None
+    ) -> Responses:
+        s = self._settings
         spectrum = self._hann.combine(rows.spectrum, place) if self._hann else rows.spectrum
         signals: dict[Role, Complex] = dict(zip(self._roles, spectrum))
-        reference = signals[s.method.reference][:, lines]
-        pair = np.stack([signals["output"][:, lines], signals[s.method.denominator][:, lines]]) * reference.conj()
-        powers = np.stack([power(reference), power(signals["output"][:, lines]), self._quiet_power(signals, pair)])
+        pair, reference, powers = self._seen(signals)
         excited = self._excited(powers[0], rows.whole)
         usable = rows.clean & excited.any(axis=1)
         series = int(place[0] // s.step - 1) % self._places if usable.size else 0
+        moving = self._moves(series, centre, rows.sample) if usable.size else usable
         first = rows.sample - s.lines.window + 1
         moment = np.concatenate([centre, first[np.newaxis]])
         spectra = np.concatenate([pair, reference[np.newaxis]])
         moments = self._moments.update(series, spectra, powers, moment, usable)
-        value, sigma, dof = self._estimate(pair, powers, moments)
+        estimate = self._estimate(pair, powers, moments, moving, repeating)
         if s.average:
-            first, moment = moments.first, moments.moment
+            begun = moments.weight > 0  # until then there is no mean, only the window's own moment
+            first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
         # An average goes on through windows that it leaves out.
         seen = rows.whole if s.average else rows.clean
-        valid = seen[:, np.newaxis] & excited & np.isfinite(value)
-        several = np.isfinite(moments.dof)[:, np.newaxis]
+        valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)
+        if repeating is not None:
+            valid &= ~(repeating.invalid & ~moving[:, np.newaxis])
+        several = valid & np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
-            value=np.where(valid, value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, sigma, np.nan),
-            dof=dof,
-            coherence=np.where(valid & several, moments.coherence, np.nan),
+            value=np.where(valid, estimate.value, complex(np.nan, np.nan)),
+            sigma=np.where(valid, estimate.sigma, np.nan),
+            dof=estimate.dof,
+            coherence=np.where(several, unbiased(moments.coherence, moments), np.nan),
             valid=valid,
             first=first,
             sample=rows.sample,
@@ -143,41 +187,103 @@ class LineStage:
             schedule=moment[1],
             quantity=s.quantity,
             unit=unit,
+            input_coherence=np.where(several, self._input_coherence(moments), np.nan),
+            weight=np.where(valid, estimate.weight, complex(np.nan, np.nan)),
+            distortion=np.where(valid, estimate.distortion, np.nan),
         )
 
-    def _quiet_power(self, signals: dict[Role, Complex], pair: Complex) -> Floats:
-        """Noise of one window by the quiet bins, as a power of numerator·conj(reference); zero without them."""
-        if self._quiet is None:
+    def _seen(self, signals: dict[Role, Complex]) -> tuple[Complex, Complex, Floats]:
+        """Numerator and denominator times conj(reference) (2, rows, lines), reference, and the powers of moments."""
+        method, lines = self._settings.method, slice(0, len(self._settings.lines))
+        reference, output = signals[method.reference][:, lines], signals["output"][:, lines]
+        denominator = signals[method.denominator][:, lines]
+        pair = np.stack([output, denominator]) * reference.conj()
+        noise = self._detected(signals, pair)
+        return pair, reference, np.stack([power(reference), power(output), noise, power(denominator)])
+
+    def _detected(self, signals: dict[Role, Complex], pair: Complex) -> Floats:
+        """Noise of one window by the detection lines, as a power of numerator·conj(reference); zero without them."""
+        if self._detection is None:
             return np.zeros(pair.shape[1:])
-        at, quiet = slice(0, pair.shape[2]), slice(pair.shape[2], None)
-        output, denominator = signals["output"][:, quiet], signals[self._settings.method.denominator][:, quiet]
-        return self._quiet.power(pair[0] / pair[1], output, denominator) * power(
-            signals[self._settings.method.reference][:, at]
-        )
+        method, at, beside = self._settings.method, slice(0, pair.shape[2]), slice(pair.shape[2], None)
+        reference = power(signals[method.reference])
+        excited = None
+        if method.reference == "excitation":
+            excited = reference[:, beside] / reference[:, at].mean(axis=1, keepdims=True)
+        output, denominator = signals["output"][:, beside], signals[method.denominator][:, beside]
+        return self._detection.power(pair[0] / pair[1], output, denominator, excited) * reference[:, at]
 
-    def _estimate(self, pair: Complex, powers: Floats, moments: Moments) -> tuple[Complex, Floats, Floats]:
-        """Value and sigma (rows, lines), and the degrees of freedom (rows,)."""
+    def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which windows see a machine that moves; an Event for the first where its noise is judged otherwise."""
+        moving = self._movement.process(series, centre[1])
+        if self._detection is None:
+            return np.zeros(len(sample), dtype=np.bool_)
+        if self._moving == 0 and moving.any():
+            at = int(np.argmax(moving))
+            self._events.append(
+                Event(
+                    "noise-from-detection-lines",
+                    int(sample[at]),
+                    float(centre[0, at]),
+                    "the schedule moves: the noise is taken from detection lines (non-excited bins), because the "
+                    "scatter between periods contains the motion",
+                )
+            )
+        self._moving += int(np.count_nonzero(moving))
+        return moving
+
+    def _input_coherence(self, moments: Moments) -> Floats:
+        """γ² of reference and input; NaN where the estimator has no input of its own."""
+        if self._settings.method.reference == self._settings.method.denominator:
+            return np.full(moments.means.shape[1:], np.nan)
+        return unbiased(moments.input_coherence, moments)
+
+    def _estimate(
+        self, pair: Complex, powers: Floats, moments: Moments, moving: NDArray[np.bool_], repeating: Repeating | None
+    ) -> Estimate:
+        """Value, sigma, distortion and weight (rows, lines), and the degrees of freedom (rows,)."""
         s, f = self._settings, self._settings.lines.frequency_hz
         numerator, denominator = moments.pair if s.average else pair
-        ratio = numerator / denominator
-        share = moments.of_mean if s.average else np.ones(len(ratio))
-        if self._quiet:
-            noise = moments.power[2] if s.average else powers[2]
-            dof = NEIGHBOURS / share
-        else:
-            noise, dof = between_periods(moments), moments.dof
+        excitation = moments.power[0] if s.average else powers[0]
+        value = numerator / denominator
+        share = moments.of_mean if s.average else np.ones(len(value))
+        noise, dof = self._noise(powers[2], moments, moving, share)
         sigma = np.sqrt(noise * share[:, np.newaxis]) / np.abs(denominator)
+        distortion = np.full(value.shape, np.nan)
+        if repeating is not None:
+            distortion = np.where(moving[:, np.newaxis], np.nan, repeating.distortion)
+            sigma, dof = contained(sigma, dof, distortion, repeating.dof)
+        slope = np.ones_like(value)
         if s.method.through_loop:
-            ratio, slope = s.loop.plant(ratio, f)
-            sigma = sigma * np.abs(slope)
+            value, slope = s.loop.plant(value, f)
+        # U/W is (Y/W)/G, whatever it is that was divided.
+        weight = powers[0] + 0j if s.method.reference == "input" else numerator / excitation / value
         if s.quantity != "plant":
-            entered = s.loop.entry_at(f) * (moments.power[0] if s.average else powers[0])
+            entered = s.loop.entry_at(f) * excitation
             # Without a description of the controller the signals tell what it did: F·y = E·w − u.
             known = s.loop.feedback is not None
             feedback = s.loop.feedback_at(f) if known else (entered - denominator) / numerator
-            ratio, slope = convert(s.quantity, ratio, feedback)
-            sigma = sigma * np.abs(slope)
-        return ratio, sigma, dof
+            value, by_plant = convert(s.quantity, value, feedback)
+            slope, weight = slope * by_plant, np.full_like(value, complex(np.nan, np.nan))
+        scale = np.abs(slope)
+        return Estimate(value, sigma * scale, dof, distortion * scale, weight)
+
+    def _noise(self, now: Floats, moments: Moments, moving: NDArray[np.bool_], share: Floats) -> tuple[Floats, Floats]:
+        """Variance of numerator − Ĝ·denominator for one window (rows, lines), and its degrees of freedom (rows,).
+
+        `now` is the power at the detection lines in this window. Where the machine moves it alone counts, because the
+        scatter between periods contains the motion; else that scatter counts, or with "quiet" the larger of the two.
+        """
+        periods, dof = between_periods(moments), moments.dof
+        if self._detection is None:
+            return periods, dof
+        remembered = moments.power[2]
+        beside = remembered if self._settings.average else now
+        if self._settings.noise == "quiet":
+            periods = np.fmax(periods, np.where(np.isfinite(periods), remembered, beside))
+            dof = np.where(np.isfinite(dof), dof, self._detection.dof)
+        dof = np.where(moving, self._detection.dof / share, dof)
+        return np.where(moving[:, np.newaxis], beside, periods), dof
 
     def _excited(self, power: Floats, whole: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which lines have a share of the largest excitation so far, shape of `power` (rows, lines)."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MEANS, _SCATTER = 9, 4
+_MEANS, _SCATTER = 10, 4
 _SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, but for rounding
 
 
@@ -26,8 +26,8 @@ class Moments:
     Attributes
     ----------
     means
-        Means of the real and imaginary parts of numerator, denominator and reference (6) and of three powers (3),
-        shape (9, rows, lines). Real and in one array, so that a period is taken in by few calls.
+        Means of the real and imaginary parts of numerator, denominator and reference (6) and of four powers (4),
+        shape (10, rows, lines). Real and in one array, so that a period is taken in by few calls.
     scatter
         Σλ^i|δnum|², Σλ^i|δden|² and the real and imaginary part of Σλ^i·δnum·conj(δden) with δ the deviation from the
         mean, shape (4, rows, lines).
@@ -55,13 +55,18 @@ class Moments:
         return np.asarray((self.means[0] ** 2 + self.means[1] ** 2) / (self.means[6] * self.means[7]))
 
     @property
+    def input_coherence(self) -> Floats:
+        """The same of the denominator's signal, |S_rd|²/(S_rr·S_dd), shape (rows, lines)."""
+        return np.asarray((self.means[2] ** 2 + self.means[3] ** 2) / (self.means[6] * self.means[9]))
+
+    @property
     def repeatability(self) -> Floats:
         """|S_r|²/S_rr: the share of the reference's power that its mean keeps, shape (rows, lines)."""
         return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
 
     @property
     def power(self) -> Floats:
-        """Means of the powers, shape (3, rows, lines)."""
+        """Means of the powers, shape (4, rows, lines)."""
         return self.means[6:]
 
     @property
@@ -153,7 +158,8 @@ class PeriodMoments:
         Parameters
         ----------
         spectra, power
-            Numerator, denominator, reference, and three powers, each shape (3, rows, lines).
+            Numerator, denominator, reference, shape (3, rows, lines), and four powers, shape (4, rows, lines): of
+            reference and output (for the coherence), of the noise at detection lines, and of the denominator's signal.
         moment
             Time, schedule and oldest sample, shape (3, rows).
         usable

@@ -9,6 +9,9 @@ from typing import Literal
 from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
 from livebode.nouns import InputError, Lines, Loop, Quantity
 
+DETECTION_LINES_MIN = 4
+"""Detection lines that noise can be taken from."""
+
 QUANTITIES: tuple[Quantity, ...] = ("plant", "open loop", "closed loop", "sensitivity")
 
 
@@ -38,8 +41,9 @@ class Settings:
         λ per period, 0 < λ ≤ 1: the memory behind `sigma` and coherence, and behind the value when averaging.
         0.8 remembers about nine periods, 1 all.
     noise
-        Where sigma comes from: "periods", the scatter between them, or "quiet", the bins between the lines that the
-        excitation leaves without power (for an axis in motion, whose change from period to period is no noise).
+        Where the noise in sigma comes from: "periods", the scatter between them; "quiet", the larger of that and of
+        what detection lines (non-excited bins) show; "auto", the scatter between periods. Where the schedule moves,
+        "auto" and "quiet" take the detection lines alone, because the scatter contains the motion.
     differenced
         Channels that are differenced before the DFT (and divided by 1 − z⁻¹ after it): a position that drifts.
     hann
@@ -67,7 +71,7 @@ class Settings:
     hop: int | None = None
     average: bool = False
     forgetting: float = 0.8
-    noise: Literal["periods", "quiet"] = "periods"
+    noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: tuple[str, ...] = ()
     hann: bool = False
     spikes: tuple[str, ...] = ()
@@ -104,7 +108,7 @@ class Settings:
         for name, known in (
             ("estimator", tuple(ESTIMATORS)),
             ("quantity", QUANTITIES),
-            ("noise", ("periods", "quiet")),
+            ("noise", ("auto", "periods", "quiet")),
             ("dtype", ("float64", "float32")),
         ):
             if (word := getattr(self, name)) not in known:
@@ -125,6 +129,12 @@ class Settings:
         """The hop in samples, chosen or given."""
         assert self.hop is not None
         return self.hop
+
+    @property
+    def uses_detection_lines(self) -> bool:
+        """Whether noise is taken from detection lines, always or where the schedule moves."""
+        possible = self.schedule is not None and not self.hann and len(self.lines.quiet) >= DETECTION_LINES_MIN
+        return self.noise == "quiet" or (self.noise == "auto" and possible)
 
     @property
     def roles(self) -> tuple[Role, ...]:
@@ -153,7 +163,16 @@ def default_hop(window: int) -> int:
     >>> default_hop(400), default_hop(2500), default_hop(2047)
     (20, 125, 89)
     """
-    wanted = max(1.0, window / 20)
+    return nearest_hop(window, window / 20)
+
+
+def nearest_hop(window: int, wanted: float) -> int:
+    """The divisor of the window nearest to a hop of `wanted` samples (by ratio), so that all hops are equal.
+
+    >>> nearest_hop(400, 200.0), nearest_hop(250, 100.0), nearest_hop(100, 200.0)
+    (200, 125, 100)
+    """
+    wanted = min(max(1.0, wanted), float(window))
     small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
     divisors = small + [window // d for d in small]
     nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))

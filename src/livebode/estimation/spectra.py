@@ -80,6 +80,7 @@ class LineSpectra:
         self._plain = bool(np.all(self._after == 1))
         self._dft = self._fresh()
         self._next = -1
+        self.known_spikes = np.zeros(0, dtype=np.int64)
         self._last_bad = [-1, -1]  # numbers of the last sample that was not finite, and of the last spike
         self._before = np.zeros(differenced.size)
         self._started = False
@@ -125,7 +126,12 @@ class LineSpectra:
             finite[:, implausible] = 0.0
         missing = np.concatenate([not_finite, implausible])
         # What was put in for a missing sample may stand out, but is no spike of the signal.
-        spikes = _NONE if self._spikes is None else np.setdiff1d(self._spikes.process(finite), missing)
+        spikes = _NONE
+        if self._spikes is not None:
+            known = self.known_spikes[
+                (self.known_spikes >= self._next) & (self.known_spikes < self._next + data.shape[1])
+            ]
+            spikes = np.setdiff1d(np.union1d(self._spikes.process(finite), known - self._next), missing)
         step = max(self._step, _ROW_VALUES_MAX // (self._after.size or 1) * self._step)
         parts = [self._spectra(finite[:, i : i + step], i) for i in range(0, finite.shape[1], step)]
         spectrum = np.concatenate([p[0] for p in parts], axis=1)

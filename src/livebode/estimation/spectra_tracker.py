@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,10 +48,12 @@ class SpectraTracker(AroundLines[SpectraWatch]):
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
         _check(settings, layout)
+        if settings.noise == "auto" and not set(settings.lines.quiet) <= set(layout.bins):
+            settings = replace(settings, noise="periods")
         self.settings, self._layout = settings, layout
         names = [channel.name for channel in layout.signals]
         self._signals = [names.index(settings.channel(role) or "") for role in settings.roles]
-        self._lines = LineStage(settings)
+        self._lines = LineStage(settings, layout.bins)
         bins = self._lines.bins
         why = "a Hann window needs" if settings.hann else "the noise needs"
         self._columns = layout.columns([int(k) for k in bins], why)

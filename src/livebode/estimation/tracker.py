@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
+from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.watch import Watch
-from livebode.nouns import Block, InputError, Responses
+from livebode.nouns import Block, Event, InputError, Responses
 
 
 class Tracker(AroundLines[Watch]):
@@ -26,6 +29,8 @@ class Tracker(AroundLines[Watch]):
     ----------
     settings
         Lines, signals, estimator and options.
+    repeating
+        Whether to watch for errors that repeat with the excitation (`RepeatingErrors`); not in what a model leaves.
 
     Examples
     --------
@@ -42,7 +47,7 @@ class Tracker(AroundLines[Watch]):
     (80, array([6.021]))
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
         self.settings = settings
         self._roles = settings.roles
         self._lines = LineStage(settings)
@@ -57,13 +62,25 @@ class Tracker(AroundLines[Watch]):
             settings.dtype,
         )
         self._centre = Centre(window)
+        self._repeating = RepeatingErrors(settings) if repeating else None
         self._watch = Watch(window)
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
             "centre": self._centre,
+            **({"repeating": self._repeating} if self._repeating else {}),
             "watch": self._watch,
         }
+
+    def found(self) -> dict[str, Any]:
+        """What the responses stand on, as plain data for a record, and which lines have a reason against them."""
+        found = super().found()
+        return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call: what is missing, what was left out, and how lines were judged."""
+        repeating = self._repeating.drain() if self._repeating else []
+        return sorted(super().drain_events() + repeating, key=lambda event: event.sample)
 
     def _named(self, channels: tuple[str, ...]) -> NDArray[np.bool_]:
         return np.array([self.settings.channel(role) in channels for role in self._roles])
@@ -71,6 +88,10 @@ class Tracker(AroundLines[Watch]):
     @property
     def _identity(self) -> str:
         return self.settings.identity
+
+    def know_spikes(self, samples: NDArray[np.int64]) -> None:
+        """Numbers of samples to leave out as spikes besides those that are found; nothing where none are watched."""
+        self._spectra.known_spikes = samples
 
     def process(self, block: Block) -> Responses:
         """Responses at the hops of this Block, which follows the one before.
@@ -93,10 +114,14 @@ class Tracker(AroundLines[Watch]):
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()
+            if self._repeating is not None:
+                self._repeating.restart(block.start)
         rows = self._spectra.process(channels)
         self._watch.take(block, rows)
         centre_s = block.origin_s + (rows.sample - (s.lines.window - 1) / 2) / block.rate_hz
         centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
-        responses = self._lines.process(rows, (rows.sample + 1) % s.lines.window, centre, block.channels)
+        repeating = None if self._repeating is None else self._repeating.process(channels, rows, schedule, block)
+        place = (rows.sample + 1) % s.lines.window
+        responses = self._lines.process(rows, place, centre, block.channels, repeating)
         self._nothing = responses[0:0]
         return responses

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from math import gcd
+
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.nouns import GridError, Lines
 from livebode.nouns.lines import WINDOW_MAX, check_window
 
 _GROUP_MIN = 2
+_DRAWS = 100
 
 
-def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, group: int = 4, seed: int = 0) -> Lines:
-    """The odd bins of a band, of which one in every `group` neighbours, drawn at random, stays quiet.
+def odd_lines(
+    low_hz: float,
+    high_hz: float,
+    rate_hz: float,
+    window: int,
+    *,
+    group: int = 4,
+    seed: int = 0,
+    without: Collection[int] = (),
+) -> Lines:
+    """The odd bins of a band; one in every `group` neighbours, drawn at random, stays quiet, but neither end.
 
     With such lines and random phases, what appears at the even bins is even distortion of the machine, and what appears
     at the odd bins that were left quiet is odd distortion, each beside the noise (Pintelon, Schoukens, System
@@ -28,6 +42,8 @@ def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, gro
         Odd bins of which one stays quiet.
     seed
         Of the draw: the same seed, the same lines.
+    without
+        Bins that stay quiet in any case, such as those of the mains; the groups are formed of the others.
 
     Raises
     ------
@@ -37,25 +53,36 @@ def odd_lines(low_hz: float, high_hz: float, rate_hz: float, window: int, *, gro
     Examples
     --------
     >>> odd_lines(20, 140, rate_hz=4000, window=800, seed=1).bins
-    (5, 9, 11, 13, 15, 19, 21, 23, 25)
+    (5, 7, 11, 13, 15, 19, 21, 23, 27)
     """
     check_window(window, rate_hz)
     check_band(low_hz, high_hz, rate_hz)
     if group < _GROUP_MIN:
         raise GridError(f"{group=} leaves every line quiet; choose {_GROUP_MIN} or more, such as 4")
-    resolution_hz = rate_hz / window
-    first, last = int(np.ceil(low_hz / resolution_hz - 1e-9)), int(np.floor(high_hz / resolution_hz + 1e-9))
-    odd = np.arange(first + (first + 1) % 2, last + 1, 2)
-    odd = odd[2 * odd < window]
+    odd = odd_bins(low_hz, high_hz, rate_hz, window)
+    odd = odd[~np.isin(odd, list(without))]
     if odd.size < group:
         raise GridError(
-            f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {resolution_hz:g} Hz grid, less than one "
+            f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {rate_hz / window:g} Hz grid, less than one "
             f"group of {group}; take {wider(high_hz - low_hz, 2 * group, window, rate_hz)}"
         )
-    generator = np.random.default_rng(seed)
-    groups = [odd[i : i + group] for i in range(0, odd.size, group)]
-    silent = {int(generator.choice(g)) for g in groups if g.size == group}
-    return Lines.of_bins([int(k) for k in odd if int(k) not in silent], window, rate_hz)
+    generator, ends = np.random.default_rng(seed), odd[[0, -1]]
+    groups = [odd[i : i + group] for i in range(0, odd.size - group + 1, group)]
+    inner = [g[~np.isin(g, ends)] if odd.size > _GROUP_MIN else g for g in groups]
+    for _ in range(_DRAWS):
+        silent = {int(generator.choice(g)) for g in inner}
+        bins = [int(k) for k in odd if int(k) not in silent]
+        # With a factor in common they would repeat within the window, on a grid without quiet bins.
+        if gcd(window, *bins) == 1:
+            break
+    return Lines.of_bins(bins, window, rate_hz)
+
+
+def odd_bins(low_hz: float, high_hz: float, rate_hz: float, window: int) -> NDArray[np.int64]:
+    """The odd bins of a band, ends included, below the Nyquist frequency."""
+    first, last = int(np.ceil(low_hz * window / rate_hz - 1e-9)), int(np.floor(high_hz * window / rate_hz + 1e-9))
+    odd = np.arange(max(first, 1) + (max(first, 1) + 1) % 2, last + 1, 2)
+    return np.asarray(odd[2 * odd < window])
 
 
 def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:

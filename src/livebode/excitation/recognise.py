@@ -12,6 +12,7 @@ from livebode.excitation.crest import peak_and_rms
 from livebode.excitation.period import find_period
 from livebode.excitation.prepare import checked, clipped, filled
 from livebode.excitation.significance import FLOOR_DB, GAP_DB, Found, find_lines
+from livebode.excitation.slips import Slip, find_slips, realigned
 from livebode.excitation.snr import snr_db
 from livebode.excitation.transient import leading, unlike
 from livebode.nouns import InputError, Lines
@@ -46,6 +47,9 @@ class Excitation:
         Numbers of the other periods that differ: spikes, pauses.
     snr_db
         Per line at the output, power of the line against the noise of one period, shape (lines,); None without one.
+    slips
+        Leaps of the phase: samples that were dropped or repeated without a gap. All else is that of the realigned
+        excitation, whose numbers count what is missing.
     """
 
     lines: Lines
@@ -59,6 +63,7 @@ class Excitation:
     transient: tuple[int, ...]
     outlying: tuple[int, ...]
     snr_db: Floats | None = None
+    slips: tuple[Slip, ...] = ()
 
     @property
     def period(self) -> int:
@@ -119,6 +124,11 @@ def recognise(
     given, answer = _checked_together(excitation, rate_hz, output)
     x = filled(given)
     period, start, stop = find_period(x)
+    if slips := find_slips(x, period):
+        given = realigned(given, slips)
+        answer = None if answer is None else realigned(answer, slips)
+        x = filled(given)
+        period, start, stop = find_period(x)
     view = slice(start, stop)
     # Spikes are clipped where lines are first looked for, not where the periods with spikes are.
     roughly = find_lines(spectra(cut(clipped(x[view]), period)), floor_db, gap_db).excited
@@ -148,6 +158,7 @@ def recognise(
         stop=stop,
         transient=tuple(range(ahead)),
         outlying=tuple(m for m in _numbers(strange) if m >= ahead),
+        slips=slips,
         snr_db=None if replies is None else snr_db(spectra(replies[steady])[:, found.excited]),
     )
 

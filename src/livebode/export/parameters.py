@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.export.delimited import begin
 from livebode.export.matlab import VARIABLE
@@ -17,12 +16,13 @@ from livebode.nouns import InputError
 
 COLUMNS = ("time_s", "schedule", "name", "value", "sigma", "unit", "model", "status")
 _NUMBERS = ("time_s", "schedule", "value", "sigma")
-_ROWS = 1 << 16
 
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """The table of parameters of a run's directory, in parts of bounded size. Iterate over it as often as needed.
+    """The table of parameters of a run, in parts of bounded size. Iterate over it as often as needed.
+
+    `tables` gives its rows, as `livebode.records.Run.tables` does.
 
     Raises
     ------
@@ -31,23 +31,21 @@ class ParameterTable:
     """
 
     run: Path
+    tables: Callable[[], Iterable[pa.Table]]
 
     def __iter__(self) -> Iterator[pa.RecordBatch]:
-        name = self.run / "parameters.parquet"
-        if not name.is_file():
-            raise InputError(
-                f"the run {str(self.run)!r} has no parameters.parquet: no model was fitted to its responses"
-            )
-        try:
-            with pq.ParquetFile(name) as file:
-                missing = [column for column in COLUMNS if column not in file.schema_arrow.names]
-                if missing:
-                    raise InputError(f"{str(name)!r} has no column {missing[0]!r}; it is not the file that a run wrote")
-                schema = pa.schema([(c, pa.float64() if c in _NUMBERS else pa.string()) for c in COLUMNS])
-                for batch in file.iter_batches(_ROWS, columns=list(COLUMNS)):
-                    yield batch.select(list(COLUMNS)).cast(schema)
-        except (OSError, pa.ArrowException) as error:
-            raise InputError(f"{str(name)!r} cannot be read: {error}") from None
+        any_ = False
+        for table in self.tables():
+            any_ = True
+            missing = [column for column in COLUMNS if column not in table.column_names]
+            if missing:
+                raise InputError(
+                    f"the parameters of {str(self.run)!r} have no column {missing[0]!r}; they are not what a run wrote"
+                )
+            schema = pa.schema([(c, pa.float64() if c in _NUMBERS else pa.string()) for c in COLUMNS])
+            yield from table.select(list(COLUMNS)).cast(schema).to_batches()
+        if not any_:
+            raise InputError(f"the run {str(self.run)!r} has no parameters: no model was fitted to its responses")
 
 
 def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:

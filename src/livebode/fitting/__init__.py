@@ -4,7 +4,7 @@ from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import RunningMean, mean_response
 from livebode.fitting.models import MODELS, model_named
-from livebode.fitting.once import Fit, fit, fit_of
+from livebode.fitting.once import Fit, best_of, fit, fit_of
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel
 from livebode.fitting.rational import fit_rational
 from livebode.fitting.rational_model import Rational, rational_of
@@ -24,6 +24,7 @@ __all__ = [
     "ThreeMass",
     "TwoMass",
     "TwoMassGain",
+    "best_of",
     "fit",
     "fit_of",
     "fit_rational",

@@ -78,7 +78,7 @@ class Chain(PhysicalModel):
     def _motor(self) -> Parameter:
         return Parameter("Js", "kg m²", 1e-2, *_INERTIA)
 
-    def drag(self, values: Floats, grid: Grid) -> Floats:
+    def shown(self, values: Floats, grid: Grid) -> Floats:
         """Frictions that stop the motor's inertia in as long as ten of the lowest line's radians take."""
         dragged = np.array(values)
         for name in self.frictions:
@@ -89,7 +89,7 @@ class Chain(PhysicalModel):
     def _whole(self, found: Floats, grid: Grid) -> Floats:
         """Found values (..., some) with frictions and no delay behind them."""
         rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
-        return self.drag(np.concatenate([found, rest], axis=-1), grid)
+        return self.shown(np.concatenate([found, rest], axis=-1), grid)
 
 
 @dataclass(frozen=True, kw_only=True)

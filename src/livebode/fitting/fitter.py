@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
-from livebode.fitting.physical import Grid, Hold, PhysicalModel
+from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, Fitted, fit_rows
 from livebode.fitting.weighing import epsilon_for, squares
@@ -83,6 +84,7 @@ class Fitter:
         self._next: Floats | None = None
         self._epsilon: float | None = None
         self._rows: list[tuple[Floats, Floats, Floats]] = []
+        self._delay = DelayChoice()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -104,15 +106,15 @@ class Fitter:
         """
         if responses.quantity != "plant":
             raise InputError(f"a model is fitted to the plant, and these responses are of {responses.quantity!r}")
-        problem, use = self._prepare(responses.lines)
+        use = self._prepare(responses.lines)
         parts = []
         first = 0
         while first < len(responses):
             last = min(len(responses), first + _GROUP - self._seen % _GROUP)
-            parts.append(self._group(problem, responses[first:last], use))
+            parts.append(self._group(responses[first:last], use))
             first = last
         if not parts:
-            parts = [self._parameters(responses, fit_rows(problem, *measured_of(responses, use)))]
+            parts = [self._parameters(responses, fit_rows(self._delay.problem, *measured_of(responses, use)))]
         return Parameters.join(parts)
 
     def derived(self, parameters: Parameters) -> Parameters:
@@ -124,12 +126,32 @@ class Fitter:
         """Parameters that are not fitted, and their values."""
         return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
+    def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, Measured, Floats]:
+        """What one row was fitted with: the problem, the lines that count, and the degrees of freedom of its sigmas."""
+        measured, noise_dof = measured_of(responses, self._prepare(responses.lines))
+        late = DELAY in parameters.names and parameters.sigma[0, parameters.index(DELAY)] > 0
+        return self._delay.freed if late else self._delay.held, measured, noise_dof
+
+    @property
+    def problem(self) -> Problem:
+        """As the user specified it."""
+        return self._delay.held
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of what the user holds."""
+        return frozenset(self._fixed)
+
+    def may_take_delay(self) -> bool:
+        """Whether a delay is held that nobody asked to hold."""
+        return DELAY in self.held and DELAY not in self._fixed
+
     @property
     def grid(self) -> Grid:
         """The lines of the band; InputError before the first responses, which bring them."""
         if self._lines is None:
             raise InputError("the fitter has seen no responses, so that its lines are not known; process some first")
-        return self._prepared[0].grid
+        return self._delay.problem.grid
 
     def drain_events(self) -> list[Event]:
         """Events since the last call: where fits begin to fail ("fit-failed") and hold again ("fit-resumed")."""
@@ -143,6 +165,7 @@ class Fitter:
             "start": None if self._start is None else self._start.tolist(),
             "next": None if self._next is None else self._next.tolist(),
             "rows": [[part.tolist() for part in row] for row in self._rows],
+            "delay": self._delay.plain(),
         }  # fmt: skip
         return json.dumps(state).encode()
 
@@ -159,19 +182,22 @@ class Fitter:
             owner, seen = state["owner"], int(state["seen"])
             rows = [(np.array(a), np.array(b), np.array(c)) for a, b, c in state["rows"]]
             start, after = (None if state[k] is None else np.array(state[k], dtype=float) for k in ("start", "next"))
-            word, epsilon = str(state["word"]), state["epsilon"]
+            word, epsilon, delay = str(state["word"]), state["epsilon"], state["delay"]
+            delay = {"taken": delay["taken"], "gains": [float(x) for x in delay["gains"]]}
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"the snapshot of {len(snapshot)} bytes is damaged ({error}); start afresh") from None
         if owner != self._identity():
             raise InputError("the snapshot belongs to a fitter with other settings; restore it into one with the same")
         self._seen, self._rows, self._start, self._next = seen, rows, start, after
         self._word, self._epsilon = word, epsilon
+        self._delay.restore(delay)
 
     def _identity(self) -> str:
         parts = (self.model, sorted(self._fixed.items()), self._free, self._band, self._hold)
         return f"{type(self.model).__qualname__} {parts!r}"
 
-    def _prepare(self, lines: Lines) -> tuple[Problem, NDArray[np.bool_]]:
+    def _prepare(self, lines: Lines) -> NDArray[np.bool_]:
+        """Which lines are used."""
         if self._lines is None:
             grid = Grid.of(lines, self._hold)
             low, high = self._band or (0.0, np.inf)
@@ -183,16 +209,20 @@ class Fitter:
                     f"{band} {np.count_nonzero(use)} lines, too few for {problem.size} free parameters of "
                     f"{self.model.name!r}; take more lines, or hold parameters"
                 )
-            self._lines, self._prepared = lines, (problem, use)
+            self._lines, self._use = lines, use
+            self._delay.begin(problem, may_free=DELAY not in self._fixed)
         elif lines != self._lines:
             raise InputError("these responses are on other lines than those before; take a new Fitter")
-        return self._prepared
+        return self._use
 
-    def _group(self, problem: Problem, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
+    def _group(self, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
         """Rows of one group, or a part of it."""
         measured, noise_dof = measured_of(responses, use)
-        epsilon = None if self._epsilon is None else np.full(len(responses), self._epsilon)
-        found = fit_rows(problem, measured, noise_dof, self._start, epsilon)
+        problem, rows = self._delay.problem, len(responses)
+        epsilon = None if self._epsilon is None else np.full(rows, self._epsilon)
+        start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
+        found = fit_rows(problem, measured, noise_dof, start, epsilon)
+        found = self._delay.weigh(self._seen // _GROUP, measured, noise_dof, found)
         good = np.flatnonzero(found.status == OK)
         near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
         parts = squares(measured, found.response)
@@ -202,6 +232,7 @@ class Fitter:
         self._seen += len(responses)
         if self._seen % _GROUP == 0:
             self._finish_group(problem)
+            self._delay.decide()
         parameters = self._parameters(responses, found)
         self._notice(parameters)
         return parameters

@@ -30,10 +30,10 @@ def held_by_friction(problem: Problem, measured: Measured, without: Solution, do
     some = measured.rows(lacking)
     eps = own_epsilon(some, without.response[lacking], dof[lacking])
     for name in frictions:
-        wider = Problem(problem.model, problem.grid, {k: v for k, v in problem.held.items() if k != name}, (name,))
+        wider = problem.variant(free=(name,))
         at = wider.model.names.index(name)
         start = without.values[lacking]
-        start[:, at] = wider.model.drag(start, problem.grid)[:, at]
+        start[:, at] = wider.model.shown(start, problem.grid)[:, at]
         weight = weights(some.sigma, np.abs(some.value), eps / 2)
         solution, _ = wider.solve(some, weight, start, _ROUNDS)
         found[lacking] |= own_epsilon(some, solution.response, dof[lacking] - 1) < _EXPLAINED * eps

@@ -74,8 +74,12 @@ def minimise(
 def _stepped(
     now: Floats, gradient: Floats, matrix: Floats, damping: Floats, low: Floats | float, high: Floats | float
 ) -> tuple[Floats, Floats]:
-    """Where a step leads, within the bounds, and the step."""
+    """Where a step leads, within the bounds, and the step. One that only a bound keeps from moving is left out."""
     n = gradient.shape[-1]
+    kept = ((now <= low) & (gradient > 0)) | ((now >= high) & (gradient < 0))
+    if kept.any():
+        gradient = np.where(kept, 0.0, gradient)
+        matrix = np.where(kept[:, :, np.newaxis] | kept[:, np.newaxis], np.eye(n), matrix)
     diagonal = np.einsum("...ii->...i", matrix)
     floor = 1e-12 * np.max(diagonal, axis=-1, keepdims=True) + 1e-300
     damped = matrix + (damping[:, np.newaxis] * diagonal + floor)[..., np.newaxis] * np.eye(n)

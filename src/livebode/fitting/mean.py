@@ -10,22 +10,37 @@ from numpy.typing import NDArray
 from livebode.nouns import InputError, Responses
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_DISTORTION_DOF = 4.0  # of detection lines behind a distortion: four, if they are all on one side of a line
 
 
 def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
-    """Mean of the valid responses at each line, all alike, as a batch of one.
+    """Mean of the valid responses at each line as a batch of one: the ratio of the averages.
+
+    A response Gᵢ = Yᵢ/Uᵢ carries the noise of Uᵢ, and a mean of quotients is biased by it: with ρ = |U|²/σ_u² by
+    e^(−ρ)·(G − G'), where G' = −1/F is what feedback alone shows. So each counts with its `weight` wᵢ = Uᵢ/Wᵢ,
+
+        Ĝ = Σ Gᵢ·wᵢ / Σ wᵢ = Σ Yᵢ/Wᵢ / Σ Uᵢ/Wᵢ,
+
+    which is eq. (2) of Nevaranta 2016 over all windows, with eᵢ = (Gᵢ − Ĝ)·wᵢ / mean(w) the error of one. Responses
+    without a weight (runs of earlier versions, other quantities than the plant) count alike, with that bias.
 
     Windows that overlap share noise. Of two windows of N samples that start d apart the errors of white noise correlate
     as ρ = max(0, 1 − d/N), so that n responses are worth m = n² / Σᵢⱼ ρᵢⱼ windows side by side, and
 
-        sigma² = Σᵢ |Ĝᵢ − mean|² / n / (m − 1),
+        sigma² = Σᵢ |eᵢ|² / n / (m − 1),
 
     without bias, however the noise grows or fades. It has m − 1 degrees of freedom, a careful choice: the scatter of
     windows that overlap tells a little more. With fewer than two such windows sigma is the least known one of the
     responses.
 
-    All count alike: the sigmas of single responses scatter and lag, so that weights of 1/sigma² would trust windows
-    that have just become noisy. For the same reason no bound of the mean is made from them.
+    The sigmas of single responses scatter and lag, so that weights of 1/sigma² would trust windows that have just
+    become noisy. For the same reason no bound of the mean is made from them. What repeats does not average out: the
+    newest known `distortion` of each line is added to sigma² as it is.
+
+    A line that was valid at first only, for fewer responses than it was invalid while others were valid, and for two
+    windows at least, has a reason against it that was found later; it is not valid in the mean.
 
     Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
     and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
@@ -40,8 +55,8 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     Returns
     -------
     Responses
-        `coherence`, `time_s` and `schedule` are means over the responses that went in, `first` and `sample` their
-        extent, `dof` the least over the lines.
+        `coherence`, `input_coherence`, `time_s` and `schedule` are means over the responses that went in, `first` and
+        `sample` their extent, `dof` the least over the lines.
 
     Raises
     ------
@@ -71,10 +86,12 @@ class RunningMean:
 
     def _begin(self, like: Responses) -> None:
         n = len(like.lines)
-        self._count, self._mean, self._apart = np.zeros(n), np.zeros(n, dtype=np.complex128), np.zeros(n)
+        self._pair = _Pair(n)
         self._overlap = _Overlap(like.lines.window, n)
         self._least, self._dof = np.full(n, np.inf), 0.0
-        self._coherent, self._coherence = np.zeros(n), np.zeros(n)
+        self._coherence, self._input_coherence = _Mean(n), _Mean(n)
+        self._distortion = np.full(n, np.nan)
+        self._since, self._last = np.zeros((2, n), dtype=np.int64)
         self._moment, self._schedule, self._scheduled = 0.0, 0.0, 0
         self._first = np.iinfo(np.int64).max
 
@@ -89,14 +106,15 @@ class RunningMean:
             self._begin(part)
         self._newest = part[-1:]
         self.averages |= bool(np.any(part.sample - part.first >= part.lines.window))
-        self._add_values(used, part.value)
+        weight = np.where(np.isfinite(part.weight), part.weight, 1.0)
+        self._pair.add(used, part.value * weight, weight)
         self._overlap.add(part.sample + 1, used.astype(np.float64))
         known = used & np.isfinite(part.sigma)
+        self._follow_newest(used, part)
         self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
         self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
-        coherent = used & np.isfinite(part.coherence)
-        self._coherent += coherent.sum(axis=0)
-        self._coherence += np.where(coherent, part.coherence, 0.0).sum(axis=0)
+        self._coherence.add(used, part.coherence)
+        self._input_coherence.add(used, part.input_coherence)
         self.rows += len(part)
         self._moment += part.time_s.sum()
         placed = np.isfinite(part.schedule)
@@ -104,14 +122,14 @@ class RunningMean:
         self._scheduled += int(placed.sum())
         self._first = min(self._first, int(part.first[0]))
 
-    def _add_values(self, used: NDArray[np.bool_], value: NDArray[np.complex128]) -> None:
-        count = used.sum(axis=0)
-        mean = np.where(used, value, 0).sum(axis=0) / np.maximum(count, 1)
-        apart = (np.abs(np.where(used, value - mean, 0)) ** 2).sum(axis=0)
-        share = count / np.maximum(self._count + count, 1)
-        self._apart += apart + np.abs(mean - self._mean) ** 2 * self._count * share
-        self._mean += (mean - self._mean) * share
-        self._count += count
+    def _follow_newest(self, used: NDArray[np.bool_], part: Responses) -> None:
+        """At each line the newest distortion, the newest valid sample, and how many responses came since."""
+        after, known = np.argmax(used[::-1], axis=0), used.any(axis=0)
+        self._since = np.where(known, after, self._since + len(used))
+        self._last = np.where(known, part.sample[len(used) - 1 - after], self._last)
+        finite = used & np.isfinite(part.distortion)
+        newest = np.take_along_axis(part.distortion, len(used) - 1 - np.argmax(finite[::-1], axis=0)[np.newaxis], 0)[0]
+        self._distortion = np.where(finite.any(axis=0), newest, self._distortion)
 
     def response(self) -> Responses:
         """The mean so far; InputError where no line was ever valid."""
@@ -121,20 +139,31 @@ class RunningMean:
         return newest if self.averages else self._mean_of_all(newest)
 
     def _mean_of_all(self, newest: Responses) -> Responses:
-        valid = self._count > 0
-        count = np.where(valid, self._count, np.nan)
+        pair = self._pair
+        lost = (self._since > pair.count) & (newest.sample[0] - self._last >= 2 * newest.lines.window)
+        valid = (pair.count > 0) & ~lost
+        if not valid.any():
+            raise InputError("none of the responses is valid at any line at the end; the run's events say why")
+        count = np.where(valid, pair.count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             windows = count**2 / self._overlap.total()
-            scatter = np.sqrt(self._apart / count / (windows - 1))
-            coherence = self._coherence / self._coherent
+            scatter = np.sqrt(pair.unexplained() / count / (windows - 1)) / np.abs(pair.denominator)
+            value = pair.numerator / pair.denominator
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
+        added = np.where(np.isfinite(self._distortion) & valid, self._distortion, 0.0)
+        together = np.hypot(scatter, added)
+        dof = windows[several].min() - 1 if several.any() else self._dof or np.nan
+        if several.any() and added.any():
+            with np.errstate(invalid="ignore", divide="ignore"):
+                of_line = together**4 / (scatter**4 / dof + added**4 / _DISTORTION_DOF)
+            dof = min(dof, float(np.min(of_line, where=several & np.isfinite(of_line), initial=np.inf)))
         return Responses(
             lines=newest.lines,
-            value=np.where(valid, self._mean, complex(np.nan, np.nan))[np.newaxis],
-            sigma=np.where(several, scatter, single)[np.newaxis],
-            dof=np.array([windows[several].min() - 1 if several.any() else self._dof or np.nan]),
-            coherence=coherence[np.newaxis],
+            value=np.where(valid, value, complex(np.nan, np.nan))[np.newaxis],
+            sigma=np.where(several, together, single)[np.newaxis],
+            dof=np.array([dof]),
+            coherence=self._coherence.value[np.newaxis],
             valid=valid[np.newaxis],
             first=np.array([self._first]),
             sample=newest.sample,
@@ -142,7 +171,55 @@ class RunningMean:
             schedule=np.array([self._schedule / self._scheduled if self._scheduled else np.nan]),
             quantity=newest.quantity,
             unit=newest.unit,
+            input_coherence=self._input_coherence.value[np.newaxis],
+            distortion=np.where(valid, self._distortion, np.nan)[np.newaxis],
         )
+
+
+class _Mean:
+    """Mean of what is known at each line."""
+
+    def __init__(self, lines: int) -> None:
+        self._count, self._sum = np.zeros(lines), np.zeros(lines)
+
+    def add(self, used: NDArray[np.bool_], values: Floats) -> None:
+        known = used & np.isfinite(values)
+        self._count += known.sum(axis=0)
+        self._sum += np.where(known, values, 0.0).sum(axis=0)
+
+    @property
+    def value(self) -> Floats:
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self._sum / self._count)
+
+
+class _Pair:
+    """Means of numerator and denominator at each line, and how they scatter about them (as `PeriodMoments`)."""
+
+    def __init__(self, lines: int) -> None:
+        self.count = np.zeros(lines)
+        self.numerator, self.denominator, self._product = np.zeros((3, lines), dtype=np.complex128)
+        self._scatter = np.zeros((2, lines))
+
+    def add(self, used: NDArray[np.bool_], numerator: Complex, denominator: Complex) -> None:
+        count = used.sum(axis=0)
+        several = np.maximum(count, 1)
+        mean = [np.where(used, x, 0).sum(axis=0) / several for x in (numerator, denominator)]
+        apart = [np.where(used, x - m, 0) for x, m in zip((numerator, denominator), mean)]
+        step = [m - before for m, before in zip(mean, (self.numerator, self.denominator))]
+        share = count / np.maximum(self.count + count, 1)
+        moved = self.count * share
+        for i in (0, 1):
+            self._scatter[i] += (np.abs(apart[i]) ** 2).sum(axis=0) + np.abs(step[i]) ** 2 * moved
+        self._product += (apart[0] * apart[1].conj()).sum(axis=0) + step[0] * step[1].conj() * moved
+        self.numerator, self.denominator = self.numerator + step[0] * share, self.denominator + step[1] * share
+        self.count += count
+
+    def unexplained(self) -> Floats:
+        """Σ|δnum − Ĝ·δden|²."""
+        ratio = self.numerator / self.denominator
+        shared = 2 * (ratio.conj() * self._product).real
+        return np.asarray(np.maximum(self._scatter[0] - shared + np.abs(ratio) ** 2 * self._scatter[1], 0.0))
 
 
 class _Overlap:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
+from livebode.fitting.extended import WORDS
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.hold import to_discrete
 from livebode.fitting.mean import mean_response
+from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
-from livebode.fitting.rows import SENTENCES
+from livebode.fitting.problem import Measured
+from livebode.fitting.rows import SENTENCES, fit_rows
 from livebode.nouns import InputError, Parameters, Response, Responses
 
 
@@ -33,6 +37,15 @@ class Fit:
         Lowest and highest line that was used, and how many.
     rate_hz, hold
         How the input was held.
+    measured
+        What it was fitted to, one row; None for a fit that was restored from a snapshot.
+    asked
+        The model that was asked for.
+    taken
+        What `model` has beside it, because the lines show it: "delay", "B", "BL", "lag", "further mode", "residual
+        compliance". Values, bounds, response and margins are with it.
+    correlation
+        Of the residuals of neighbouring lines, where they follow a pattern that no model tried explains; else None.
     """
 
     model: PhysicalModel
@@ -43,6 +56,10 @@ class Fit:
     lines: int
     rate_hz: float
     hold: Hold = field(default="zero-order")
+    measured: Responses | None = None
+    asked: PhysicalModel | None = None
+    taken: tuple[str, ...] = ()
+    correlation: float | None = None
 
     @property
     def status(self) -> str:
@@ -53,6 +70,29 @@ class Fit:
     def sentence(self) -> str:
         """The status for people."""
         return SENTENCES[self.status]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the bounds are 95 % bounds: the residuals are noise, as far as they show."""
+        return self.correlation is None
+
+    @property
+    def about_bounds(self) -> str:
+        """What the bounds hold, and what the model that was asked for lacks, for people."""
+        words = []
+        if self.taken:
+            asked = self.model if self.asked is None else self.asked
+            lacking = " and ".join(dict.fromkeys(WORDS.get(name, name) for name in self.taken))
+            words.append(f"the {asked.name} model alone is incomplete: the lines show {lacking}, fitted with it")
+        if self.correlation is None:
+            words.append("± covers 95 %")
+        else:
+            words.append(
+                "model incomplete: what it lacks follows a pattern over the lines (correlation of neighbours "
+                f"{self.correlation:.2f}), and no competing model explains it; ± holds it as far as the lines show it, "
+                "and is no 95 % bound"
+            )
+        return "; ".join(words)
 
     @property
     def epsilon(self) -> float:
@@ -73,6 +113,13 @@ class Fit:
         """Half-width of its interval; see `Parameters.bound`."""
         part = self.parameters if name in self.parameters.names else self.derived
         return float(part.bound(probability)[0, part.index(name)])
+
+    def at_most(self, name: str) -> float | None:
+        """Upper limit of a parameter that may be zero (a friction) and whose 95 % bound reaches there; else None."""
+        one_sided = {p.name for p in self.model.parameters if p.one_sided}
+        if name not in one_sided or name in self.held or self[name] > self.bound(name):
+            return None
+        return self[name] + self.bound(name)
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """The fitted model's response, behind hold and delay.
@@ -159,19 +206,59 @@ def fit(
     """
     one = mean_response(measured) if isinstance(measured, Responses) else Responses.of(measured)
     fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
-    return fit_of(fitter, fitter.process(one))
+    return best_of(fitter, fitter.process(one), one)
 
 
-def fit_of(fitter: Fitter, parameters: Parameters) -> Fit:
+def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
+    """One row that a Fitter gave, after a competition with models that have something beside it (docs/fits.md)."""
+    found = fit_of(fitter, parameters, measured)
+    if found.status != "ok":
+        return found
+    problem, rows, noise_dof = fitter.start_of(measured, parameters)
+    fitted = fit_rows(problem, rows, noise_dof, parameters.value)
+    if fitted.status[0] != "ok":
+        return found
+    allowed = Allowed(fitter.fixed, fitter.may_take_delay(), found.band_hz[1])
+    late = (DELAY,) if problem is not fitter.problem else ()
+    every = compete(competitor(problem, rows, noise_dof, fitted, late), rows, noise_dof, allowed)
+    return _chosen(found, every, rows, noise_dof)
+
+
+def _chosen(found: Fit, every: list[Competitor], rows: Measured, noise_dof: NDArray[np.float64]) -> Fit:
+    """The best competitor as a Fit, with bounds that hold the choice and what even it lacks."""
+    pattern = None
+    if follows_pattern(rows, every[0].fitted, noise_dof):
+        # Nothing explains it: the model that was asked for is as good as any, and the others say how wrong it may be.
+        every = sorted(every, key=lambda c: len(c.taken))
+        pattern = correlation(rows, every[0].fitted)
+    problem, fitted, model = every[0].problem, every[0].fitted, every[0].problem.model
+    whole = mixed(every)
+    if pattern is not None:
+        whole = whole + positive(covariance(problem, rows, fitted) - fitted.covariance[0])
+    parameters = replace(
+        found.parameters, model=model.name, names=model.names, units=model.units, value=fitted.values,
+        covariance=whole[np.newaxis], status=fitted.status, epsilon=fitted.epsilon, chi2=fitted.chi2, dof=fitted.dof,
+    )  # fmt: skip
+    derived = parameters.derived(model.derived_names, model.derived_units, model.derived)
+    return replace(
+        found, model=model, parameters=parameters, derived=derived, held=problem.held, taken=every[0].taken,
+        correlation=pattern,
+    )  # fmt: skip
+
+
+def fit_of(fitter: Fitter, parameters: Parameters, measured: Responses | None = None) -> Fit:
     """One row that a Fitter gave, with what it was fitted to."""
     grid = fitter.grid
+    moving = parameters.sigma[0] > 0  # a delay that the phase shows is fitted, whatever holds it at first
     return Fit(
         model=fitter.model,
         parameters=parameters,
         derived=fitter.derived(parameters),
-        held=fitter.held,
+        held={name: value for name, value in fitter.held.items() if not moving[parameters.index(name)]},
         band_hz=(float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])),
         lines=grid.frequency_hz.size,
         rate_hz=grid.rate_hz,
         hold=grid.hold,
+        measured=measured,
+        asked=fitter.model,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -44,7 +44,8 @@ class Parameter:
     start
         Where a search begins, if the model knows no better.
     low, high
-        Bounds. A positive `low` makes the fit move the logarithm. A fit that ends at a bound has failed.
+        Bounds. A positive `low` makes the fit move the logarithm. A fit that ends at a bound has failed, except at a
+        `low` of zero: what cannot be negative may well be nothing, and the fit then gives its upper limit.
     held
         The value at which it is held unless it is freed; None for one that is fitted.
     """
@@ -63,6 +64,16 @@ class Parameter:
     @property
     def logarithmic(self) -> bool:
         return self.low > 0
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether it may be zero, but not negative."""
+        return self.low == 0
+
+    @property
+    def unsized(self) -> bool:
+        """Whether neither its bounds nor its start say what a step is: `PhysicalModel.shown` does."""
+        return self.one_sided or self.low == -inf
 
     @property
     def scale(self) -> float:
@@ -131,8 +142,8 @@ class PhysicalModel:
                     tried.append(other)
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
 
-    def drag(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
-        """The same values (..., parameters) with frictions that the lines would just show."""
+    def shown(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
+        """The same values (..., parameters), frictions that may be zero as large as lines would just show."""
         return values
 
     @cached_property
@@ -208,7 +219,7 @@ def delay(held: float | None = 0.0) -> Parameter:
 
 def free_friction(name: str, unit: str) -> Parameter:
     """A viscous friction, held at zero unless freed."""
-    return Parameter(name, unit, start=1e-3, low=1e-15, high=1e12, held=0.0)
+    return Parameter(name, unit, start=1e-3, low=0.0, high=1e12, held=0.0)
 
 
 def _paired(roots: Complex) -> Complex:

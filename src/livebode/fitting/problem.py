@@ -75,9 +75,19 @@ class Problem:
                 raise InputError(f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}")
         self._log = np.array([p.logarithmic for p in chosen])
         self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            low, high = (np.array([getattr(p, end) for p in chosen]) for end in ("low", "high"))
-            self._low, self._high = (np.where(self._log, np.log(x), x / self._scale) for x in (low, high))
+        self._unsized = np.array([p.unsized for p in chosen])
+        self._ends = tuple(np.array([getattr(p, end) for p in chosen]) for end in ("low", "high"))
+
+    def variant(
+        self,
+        model: PhysicalModel | None = None,
+        free: Sequence[str] = (),
+        held: Mapping[str, float] | None = None,
+    ) -> Problem:
+        """The same with another model, some parameters freed, and some held."""
+        model = model or self.model
+        rest = {name: value for name, value in self.held.items() if name not in free} | dict(held or {})
+        return Problem(model, self.grid, rest, [name for name in model.names if name not in rest])
 
     @property
     def size(self) -> int:
@@ -103,9 +113,10 @@ class Problem:
         """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,)."""
         value = np.where(measured.use, measured.value, 0.0)
         weight = np.where(measured.use, weight, 0.0)
+        scale = self._scales(start)
 
         def normal(x: Floats) -> tuple[Floats, Floats, Floats, Complex, Complex]:
-            response, slope = self._slopes(x, start)
+            response, slope = self._slopes(x, start, scale)
             # One matrix of slopes and, behind them, the residual: its square holds all that is needed.
             both = np.concatenate([slope, (response - value)[..., np.newaxis]], axis=-1) * weight[..., np.newaxis]
             square = (both.conj().swapaxes(1, 2) @ both).real
@@ -116,17 +127,21 @@ class Problem:
             return square[:, -1, -1], square[:, :-1, -1], square[:, :-1, :-1], response, slope
 
         with np.errstate(all="ignore"):
+            low, high = self._bounds(scale)
             found: Minimum = minimise(
-                normal, self._inward(start), rounds, 1e-10, enough=_ENOUGH, low=self._low, high=self._high
+                normal, self._inward(start, scale), rounds, 1e-10, enough=_ENOUGH, low=low, high=high
             )
-        values = self._outward(found.parameters, start)
+        values = self._outward(found.parameters, start, scale)
         response, slope = found.known
+        if self._unsized.any():
+            slope = slope * (self._scale / scale)[:, np.newaxis]
         return Solution(values, response, slope, found.settled), found.cost
 
     def at_bound(self, values: Floats) -> NDArray[np.bool_]:
-        """Rows of which a free parameter lies at one of its bounds."""
-        x = self._inward(values)
-        return np.asarray(((x - self._low < _AT_BOUND) | (self._high - x < _AT_BOUND)).any(axis=1))
+        """Rows of which a free parameter lies at one of its bounds, unless at a zero that it cannot pass."""
+        x = self._inward(values, self._scale)
+        low, high = self._bounds(self._scale)
+        return np.asarray((((x - low < _AT_BOUND) & ~self._unsized) | (high - x < _AT_BOUND)).any(axis=1))
 
     def outward_slopes(self, values: Floats) -> Floats:
         """Derivatives of the free parameters by their coordinates, (rows, free)."""
@@ -136,24 +151,37 @@ class Problem:
         """Which free parameters move as logarithms."""
         return self._log
 
-    def _inward(self, values: Floats) -> Floats:
+    def _scales(self, start: Floats) -> Floats:
+        """What counts as a step of each free parameter, (free,), or (rows, free) where one may be zero: its own size
+        says nothing then, and what the lines would show of it does."""
+        if not self._unsized.any():
+            return self._scale
+        shown = self.model.shown(start, self.grid)[:, self.free]
+        return np.where(self._unsized & (shown > 0) & np.isfinite(shown), shown, self._scale)
+
+    def _bounds(self, scale: Floats) -> tuple[Floats, Floats]:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            low, high = (np.where(self._log, np.log(x), x / scale) for x in self._ends)
+        return low, high
+
+    def _inward(self, values: Floats, scale: Floats) -> Floats:
         free = values[..., self.free]
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(self._log, np.log(np.abs(free)), free / self._scale)
+            return np.where(self._log, np.log(np.abs(free)), free / scale)
 
-    def _outward(self, x: Floats, start: Floats) -> Floats:
+    def _outward(self, x: Floats, start: Floats, scale: Floats) -> Floats:
         values = np.array(start)
         with np.errstate(over="ignore"):
-            values[..., self.free] = np.where(self._log, np.exp(x), x * self._scale)
+            values[..., self.free] = np.where(self._log, np.exp(x), x * scale)
         return values
 
-    def _slopes(self, x: Floats, start: Floats) -> tuple[Complex, Complex]:
+    def _slopes(self, x: Floats, start: Floats, scale: Floats) -> tuple[Complex, Complex]:
         """Response (rows, lines) and its derivatives by the coordinates (rows, lines, free), by forward differences."""
         n = x.shape[-1]
         moved = np.empty((n + 1, *x.shape))
         moved[:] = x
         moved[np.arange(1, n + 1), :, np.arange(n)] += _STEP
-        every = self.model.at(self._outward(moved, np.broadcast_to(start, (n + 1, *start.shape))), self.grid)
+        every = self.model.at(self._outward(moved, np.broadcast_to(start, (n + 1, *start.shape)), scale), self.grid)
         return every[0], np.moveaxis((every[1:] - every[0]) / _STEP, 0, -1)
 
 

@@ -68,7 +68,7 @@ def fit_rows(
     start: Floats | None = None,
     epsilon: Floats | None = None,
 ) -> Fitted:
-    """Fit each row, from `start` (parameters,) where there is one; where there is none or it fails, from a scan.
+    """Fit each row, from `start` (rows, parameters) where there is one; where there is none or it fails, from a scan.
 
     `epsilon` (rows,) is held where it is given; else each row's own is found, such that its reduced chi² is 1.
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
@@ -79,8 +79,8 @@ def fit_rows(
     some = np.flatnonzero(dof > 0)
     whole = _none(problem, measured, dof)
     if some.size:
-        eps = None if epsilon is None else epsilon[some]
-        found = _fitted(problem, measured.rows(some), noise_dof[some], start, eps, dof[some])
+        begin, eps = (None if x is None else x[some] for x in (start, epsilon))
+        found = _fitted(problem, measured.rows(some), noise_dof[some], begin, eps, dof[some])
         for kept, other in zip(whole, found):
             kept[some] = other
     return whole
@@ -127,7 +127,7 @@ def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats |
     """From the start, and for rows that it does not suit the best fit of a scan."""
     if start is None:
         return _scanned(problem, measured, weight)
-    found, cost = problem.solve(measured, weight, np.repeat(start[np.newaxis], len(dof), axis=0), _WARM_ROUNDS)
+    found, cost = problem.solve(measured, weight, start, _WARM_ROUNDS)
     lost = ~found.settled | (cost > _SUSPICIOUS * dof)
     if lost.any():
         again = _scanned(problem, measured.rows(lost), weight[lost])

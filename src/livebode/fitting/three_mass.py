@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from livebode.fitting.chains import Chain
 from livebode.fitting.modal import chain_of, scan
 from livebode.fitting.physical import Grid, Parameter, delay
+from livebode.fitting.polynomials import plus, times
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -40,11 +41,11 @@ class ThreeMass(Chain):
         # The load's side of the first spring, over s²: N/D of what it takes to move it.
         below = [j3, b2, k2]
         above = [j2 * j3, (j2 + j3) * b2, (j2 + j3) * k2]
-        joined = _sum(_times(above, [1.0, 0.0, 0.0]), _times([b1, k1], below))
-        denominator = _sum(_times([js], joined), _times([b1, k1], above))
+        joined = plus(times(above, [1.0, 0.0, 0.0]), times([b1, k1], below))
+        denominator = plus(times([js], joined), times([b1, k1], above))
         numerator = joined
         if self.side == "load":
-            numerator = [self.lever * x for x in _times([b1, k1], [b2, k2])]
+            numerator = [self.lever * x for x in times([b1, k1], [b2, k2])]
         return numerator, denominator + [0.0] * self.integrators
 
     def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:
@@ -52,18 +53,3 @@ class ThreeMass(Chain):
         inertia, spring, damper = chain_of(weights, omega)
         found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
         return self._whole(np.concatenate(found, axis=-1), grid)
-
-
-def _times(first: list[Any], second: list[Any]) -> list[Any]:
-    """Product of two polynomials by their coefficients."""
-    product: list[Any] = [0.0] * (len(first) + len(second) - 1)
-    for i, a in enumerate(first):
-        for j, b in enumerate(second):
-            product[i + j] = product[i + j] + a * b
-    return product
-
-
-def _sum(first: list[Any], second: list[Any]) -> list[Any]:
-    short, long = sorted((first, second), key=len)
-    offset = len(long) - len(short)
-    return [x + (short[i - offset] if i >= offset else 0.0) for i, x in enumerate(long)]

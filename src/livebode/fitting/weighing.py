@@ -11,6 +11,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _STEPS, _CLOSE = 30, 1e-6
+_MANY = 1e9  # degrees of freedom of a sigma that is known
 
 
 def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
@@ -56,6 +57,21 @@ def squares(measured: Measured, response: Complex) -> tuple[Floats, Floats, Floa
 def own_epsilon(measured: Measured, response: Complex, dof: Floats) -> Floats:
     """Each row's ε by its own residuals, (rows,)."""
     return epsilon_for(*squares(measured, response), dof)
+
+
+def misfit(measured: Measured, response: Complex, dof: Floats, noise_dof: Floats) -> Floats:
+    """−2·ln(likelihood) up to a constant, each row with its own ε, (rows,).
+
+    Σ 2·|residual|²/v + 2·ln v with v = sigma² + (ε|G|)². A sigma of d degrees of freedom makes it Student's:
+    Σ 2·(n + 1)·ln(1 + |residual|²/(n·v)) + 2·ln v, n = d/(share of noise in v)².
+    """
+    rest, noise, size = squares(measured, response)
+    variance = noise + epsilon_for(rest, noise, size, dof)[:, np.newaxis] ** 2 * size
+    with np.errstate(all="ignore"):
+        n = np.minimum(noise_dof[:, np.newaxis] / (noise / variance) ** 2, _MANY)
+        n = np.where(np.isfinite(n), n, _MANY)
+        each = 2 * (n + 1) * np.log1p(rest / (n * variance)) + 2 * np.log(variance)
+        return np.asarray(np.sum(np.where(measured.use, each, 0.0), axis=-1))
 
 
 def lacks_more_than(epsilon: float, measured: Measured, response: Complex, dof: Floats) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 VARIANTS: Final = ("modulated", "plain", "damped", "hann", "hamming", "blackman")
 WINDOW_MAX: Final = 2**24
 CHANNELS_MAX: Final = 1024
+HOP_MAX: Final = 2**63 - 1
 
 Array = npt.NDArray[Any]
 
@@ -86,6 +87,8 @@ def as_hop(hop: object) -> int:
     step = _integer(hop)
     if step is None or step < 1:
         raise ValueError(f"{hop=} is not an integer ≥ 1")
+    if step > HOP_MAX:
+        raise ValueError(f"hop is larger than {HOP_MAX} samples; give a smaller one")
     return step
 
 

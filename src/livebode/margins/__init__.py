@@ -1,5 +1,6 @@
 """Margins of the loop around a fitted plant, with bounds, and filters that would widen them."""
 
+from livebode.margins.against_lines import against_lines
 from livebode.margins.at_lines import peak_sensitivity_at_lines
 from livebode.margins.filters import Biquad, low_pass, notch
 from livebode.margins.margins import Margins
@@ -13,6 +14,7 @@ __all__ = [
     "OpenLoop",
     "Proposal",
     "Tuning",
+    "against_lines",
     "low_pass",
     "margins",
     "notch",

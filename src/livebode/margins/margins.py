@@ -24,6 +24,7 @@ NAMES = (
 )
 UNITS = ("dB", "dB", "deg", "ms", "", "Hz")
 UNSTABLE = "unstable by the fit"
+CONTRADICTED = "contradicted by the lines"
 NONE, INTERPOLATED, EXTRAPOLATED = "none", "interpolated", "extrapolated"
 
 PER_ROW = ("value", "sigma", "frequency_hz", "frequency_sigma_hz", "place", "status", "sample", "time_s", "schedule")
@@ -48,7 +49,8 @@ class Margins:
     place
         ``interpolated`` by the fitted model within the band of the lines, ``extrapolated`` by it beyond, or ``none``.
     status
-        Shape (rows,): "ok", the fit's reason, or that the fitted plant would make the loop unstable.
+        Shape (rows,): "ok", the fit's reason, that the fitted plant would make the loop unstable, or that the lines
+        show a larger Ms than the fit (`against_lines`).
     sample, time_s, schedule
         Those of the fit.
     """

@@ -88,11 +88,9 @@ class OpenLoop:
 
     def _peaks(self, values: Floats) -> list[tuple[Floats, Floats]]:
         """Frequency, Hz, and damping ratio of each mode and each pair of zeros, over the rows."""
-        names = self.plant.derived_names
-        if not names:
-            return []
-        derived = self.plant.derived(values)
-        column = {name: derived[..., i] for i, name in enumerate(names)}
+        names = (*self.plant.names, *self.plant.derived_names)
+        every = np.concatenate([values, self.plant.derived(values)], axis=-1) if self.plant.derived_names else values
+        column = {name: every[..., i] for i, name in enumerate(names)}
         pairs = [(column[n], np.abs(column[f"{n}_damping"])) for n in names if f"{n}_damping" in column]
         return [(f[kept], z[kept]) for f, z in pairs if (kept := np.isfinite(f) & np.isfinite(z) & (f > 0)).any()]
 

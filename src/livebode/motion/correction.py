@@ -118,7 +118,8 @@ class MotionCorrection:
         self._identity = repr((settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines))
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
-        self._tracker = Tracker(settings)
+        # The sigma comes from what the model leaves, in which there is no motion.
+        self._tracker = Tracker(replace(settings, noise="periods") if settings.noise == "auto" else settings)
         self._recorded = Recorded(self._names, lines)
         self._waiting = Waiting(lines)
         self._learner = Learner(settings, radius_m, splines, passes)
@@ -283,7 +284,7 @@ class MotionCorrection:
         names = [name for name in rows if name]
         channels = tuple(map(Channel, names))
         block = Block(np.array([rows[n] for n in names]), channels, s.lines.rate_hz, start=chunk.start)
-        seen = Tracker(replace(s, schedule=None, spikes=())).process(block)
+        seen = Tracker(replace(s, schedule=None, spikes=()), repeating=False).process(block)
         return _rows_of(seen, tracked).value
 
 

@@ -45,11 +45,11 @@ class Scatter:
 
     def once(self, velocity: Floats, chunk: Chunk) -> Responses:
         """Responses R/U of this residual; remembers nothing."""
-        return Tracker(self._settings).process(self._block(velocity, chunk))
+        return Tracker(self._settings, repeating=False).process(self._block(velocity, chunk))
 
     def then(self, velocity: Floats, chunk: Chunk) -> tuple[Responses, bytes]:
         """The same with the sigma that goes with it, and the memory that `keep` takes."""
-        tracker, block = Tracker(self._settings), self._block(velocity, chunk)
+        tracker, block = Tracker(self._settings, repeating=False), self._block(velocity, chunk)
         if self._memory:
             tracker.restore(self._memory)
         until = chunk.stop - self._settings.lines.window + 1 - block.start

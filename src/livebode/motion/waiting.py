@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Lines, Responses
+from livebode.nouns import PER_LINE, PER_RESPONSE, Lines, Responses
 
-_ARRAYS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
+_ARRAYS = PER_LINE + PER_RESPONSE
 
 
 class Waiting:

@@ -7,3 +7,7 @@ class InputError(ValueError):
 
 class GridError(InputError):
     """A frequency is not a line of the grid, or two things on different grids were to be combined."""
+
+
+class DamageWarning(UserWarning):
+    """A file of a run is damaged; what it held is left out, and the rest is read."""

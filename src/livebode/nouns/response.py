@@ -62,6 +62,14 @@ class Response:
         The scheduling signal (position, say) at that moment; NaN without one.
     quantity, unit
         What it is the response of: plant G, open loop L, closed loop T or sensitivity S.
+    input_coherence
+        γ² between excitation and input, where `coherence` is that between excitation and output; NaN where not known.
+    weight
+        Of this response in a mean that is to be a ratio of averages: plant input over excitation in the window, U/W,
+        or |U|² for the direct estimator; NaN where not known.
+    distortion
+        What repeats with the excitation without being a linear response (friction, backlash, steps of an encoder) may
+        have done to the value, unit of `value`. It is contained in `sigma`; NaN where it cannot be measured.
     """
 
     lines: Lines
@@ -76,6 +84,12 @@ class Response:
     schedule: float = float("nan")
     quantity: Quantity = "plant"
     unit: str = ""
+    input_coherence: Floats = None  # type: ignore[assignment]
+    weight: NDArray[np.complex128] = None  # type: ignore[assignment]
+    distortion: Floats = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        _fill_unknown(self)
 
     def bound(self, c: float = 2.0) -> Floats:
         """Radius that holds the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
@@ -109,10 +123,26 @@ class Response:
             import control
         except ImportError:
             raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
-        return control.frd(self.value[self.valid], 2 * np.pi * self.lines.frequency_hz[self.valid])
+        omega = 2 * np.pi * self.lines.frequency_hz[self.valid]
+        # `control.bode_plot` draws no system without a name.
+        return control.frd(self.value[self.valid], omega, name=self.quantity)
 
 
-_PER_ROW = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
+PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
+"""What a response has for each of its lines."""
+
+PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule")
+"""What it has once."""
+
+_PER_ROW = PER_LINE + PER_RESPONSE
+
+
+def _fill_unknown(of: Response | Responses) -> None:
+    """NaN, in the shape of the value, for what a source of responses does not know."""
+    for name in ("input_coherence", "weight", "distortion"):
+        if getattr(of, name) is None:
+            kind = np.complex128 if name == "weight" else np.float64
+            object.__setattr__(of, name, np.full(np.shape(of.value), np.nan, dtype=kind))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +165,12 @@ class Responses(Sequence[Response]):
     schedule: Floats
     quantity: Quantity = "plant"
     unit: str = ""
+    input_coherence: Floats = None  # type: ignore[assignment]
+    weight: NDArray[np.complex128] = None  # type: ignore[assignment]
+    distortion: Floats = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        _fill_unknown(self)
 
     def __len__(self) -> int:
         return len(self.sample)
@@ -147,7 +183,7 @@ class Responses(Sequence[Response]):
         rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         if isinstance(at, slice | np.ndarray):
             return replace(self, **rows)
-        for name in ("dof", "first", "sample", "time_s", "schedule"):
+        for name in PER_RESPONSE:
             rows[name] = rows[name].item()
         return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
 

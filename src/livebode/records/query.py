@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
+from pyarrow.fs import LocalFileSystem
 
 from livebode.nouns import InputError
 from livebode.records.plain_json import to_json
-from livebode.records.run import Run
+from livebode.records.run import Files, Run
 
 _TABLES = ("responses", "parameters", "samples")
 _EVENTS = pa.schema(
@@ -63,33 +65,64 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
     except ImportError:
         raise InputError("DuckDB is not installed; pip install 'livebode[query]'") from None
     with duckdb.connect(":memory:") as database:
-        known = _show(run, database)
+        try:
+            asked = {str(name).lower() for name in database.get_table_names(sql)}
+        except duckdb.Error:
+            asked = set(_TABLES)  # it is no SELECT, and will be refused below
+        _show(run, database, asked)
         for setting in _CONFINED:
             database.execute(setting)
         try:
-            answer = database.execute(sql)
-            rows = answer.fetchmany(rows_max + 1)
+            found = _answered(database, sql, rows_max)
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
-            raise InputError(f"the query cannot be run: {sentence} (this run has {', '.join(known)})") from None
-        columns = tuple(column[0] for column in answer.description or ())
-    return Found(columns, rows[:rows_max], len(rows) > rows_max)
+            raise InputError(f"the query cannot be run: {sentence} (this run has {_known(run)})") from None
+    if found is None:
+        raise InputError(f"the query is empty; write SQL on {_known(run)}")
+    return found
 
 
-def _show(run: Run, database: Any) -> list[str]:
-    """Make the tables of the run known to the database; their names."""
-    known = ["events"]
-    events = [asdict(event) | {"details": to_json(event.details)} for event in run.events()]
-    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
-    for table in _TABLES:
-        files, rows = run.parts(table)
-        if not files and not rows:
-            continue
-        parts = [ds.dataset(files, format="parquet")] if files else []
-        for number, part in enumerate([*parts, *rows]):
+def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
+    """The answer; None where the SQL is empty. Ctrl-C ends the query."""
+
+    def ask() -> Found | None:
+        answer = database.execute(sql)
+        if answer is None:
+            return None
+        columns, rows = tuple(column[0] for column in answer.description or ()), answer.fetchmany(rows_max + 1)
+        return Found(columns, rows[:rows_max], len(rows) > rows_max)
+
+    # In another thread, since DuckDB looks for signals now and then only.
+    with ThreadPoolExecutor(1) as worker:
+        running = worker.submit(ask)
+        try:
+            return running.result()
+        except KeyboardInterrupt:
+            database.interrupt()
+            raise
+
+
+def _known(run: Run) -> str:
+    return ", ".join(["events", *run.files(_TABLES)])
+
+
+def _show(run: Run, database: Any, asked: set[str]) -> None:
+    """Make the tables of the run that are asked for known to the database, and its events."""
+    found = run.files([table for table in _TABLES if table in asked])
+    for table, files in found.items():
+        parts = ([_dataset(files)] if files.paths else []) + [pa.Table.from_batches([rows]) for rows in files.rows]
+        for number, part in enumerate(parts):
             database.register(f"_{table}_{number}", part)
-        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts) + len(rows)))
+        united = " UNION ALL ".join(f"FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
-        known.append(table)
-    return known
+    events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
+    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
+
+
+def _dataset(files: Files) -> ds.Dataset:
+    if files.groups is None:
+        return ds.dataset(files.paths, format="parquet")
+    parquet = ds.ParquetFileFormat()
+    fragment = parquet.make_fragment(str(files.paths[0]), LocalFileSystem(), row_groups=files.groups)
+    return ds.FileSystemDataset([fragment], fragment.physical_schema, parquet, LocalFileSystem())

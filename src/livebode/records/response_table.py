@@ -22,10 +22,18 @@ SCHEMA = pa.schema(
         ("dof", pa.float64()),
         ("coherence", pa.float64()),
         ("valid", pa.bool_()),
+        ("input_coherence", pa.float64()),
+        ("weight_re", pa.float64()),
+        ("weight_im", pa.float64()),
+        ("distortion", pa.float64()),
     ]
 )
 """Columns: oldest and newest sample that went in, time of the centre (s), scheduling signal there, line (Hz), complex
-response, sigma with its degrees of freedom, coherence, validity. NaN where there is no value."""
+response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
+input, weight in a mean, distortion. NaN where there is no value."""
+
+ADDED = SCHEMA.names[SCHEMA.get_field_index("valid") + 1 :]
+"""Columns that runs of earlier versions do not have."""
 
 RESPONSES = Table(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
@@ -45,5 +53,9 @@ def as_batch(responses: Responses) -> pa.RecordBatch:
         np.repeat(responses.dof, lines),
         responses.coherence.ravel(),
         responses.valid.ravel(),
+        responses.input_coherence.ravel(),
+        responses.weight.real.ravel(),
+        responses.weight.imag.ravel(),
+        responses.distortion.ravel(),
     ]
     return pa.record_batch([from_numpy(c) for c in columns], schema=SCHEMA)

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import os
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from livebode.arrow import to_numpy
-from livebode.nouns import Event, InputError, Lines, Responses
-from livebode.records.response_table import SCHEMA
-from livebode.records.segments import json_lines, reading
+from livebode.nouns import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
+from livebode.records import event_lines
+from livebode.records.piece import Piece
+from livebode.records.response_table import ADDED, SCHEMA
+from livebode.records.segments import reading
+from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
+from livebode.records.summary_file import RUN, read_summary
+from livebode.records.summary_shape import what_is_wrong
 
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where the rows of a table are: Parquet files, of a single one perhaps only some row groups, and batches."""
+
+    paths: list[Path]
+    groups: list[int] | None
+    rows: list[pa.RecordBatch]
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
@@ -38,13 +52,19 @@ class Run:
         Where it stands.
     summary
         run.json as it is.
+    damages
+        What was found damaged so far, as events of kind "record-damaged"; the rest is read.
+    told
+        Called with each of them, once; a `DamageWarning` by default.
     """
 
     path: Path
     summary: dict[str, Any]
+    damages: list[Event] = field(default_factory=list, compare=False)
+    told: Callable[[Event], None] | None = field(default=None, compare=False)
 
     @classmethod
-    def open(cls, path: Path) -> Run:
+    def open(cls, path: Path, told: Callable[[Event], None] | None = None) -> Run:
         """The run in this directory.
 
         Raises
@@ -52,15 +72,23 @@ class Run:
         InputError
             If no run left it, or run.json or the responses cannot be read.
         """
-        try:
-            summary = json.loads((path / "run.json").read_text("utf-8"))
-        except (FileNotFoundError, NotADirectoryError):
-            raise InputError(f"{str(path)!r} is not the directory of a run: it has no run.json") from None
-        except (OSError, ValueError) as error:
-            raise InputError(f"{str(path / 'run.json')!r} cannot be read: {error}") from None
-        if not isinstance(summary, dict) or "bins" not in summary.get("found", {}):
-            raise InputError(f"{str(path / 'run.json')!r} does not name its lines; run the recording again")
-        return cls(path, summary)
+        summary, damaged = read_summary(path)
+        run = cls(path, summary, told=told)
+        if wrong := what_is_wrong(summary):
+            raise InputError(f"{str(path / RUN)!r} is not what a run writes ({wrong}); run the recording again")
+        len(run.lines)  # or InputError
+        if damaged:
+            run.tell(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
+        return run
+
+    def tell(self, damage: Event) -> None:
+        """Note what was found damaged."""
+        if damage not in self.damages:
+            self.damages.append(damage)
+            if self.told is not None:
+                self.told(damage)
+                return
+            warnings.warn(f"{self.path}: {damage.message}", DamageWarning, stacklevel=2)
 
     @property
     def found(self) -> dict[str, Any]:
@@ -82,7 +110,7 @@ class Run:
         return Responses.join(list(self.batches()) or [self._responses(SCHEMA.empty_table(), self.lines)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
-        """All responses in order, in parts of bounded size; or the newest, from files of no more than this."""
+        """All that can be read in order, in parts of bounded size; or the newest, from files of no more than this."""
         return self._in_parts(self.tables("responses", size_bytes_max))
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
@@ -95,7 +123,7 @@ class Run:
         lines = self.lines
         rest: pa.Table | None = None
         for part in tables:
-            if part.schema.names != SCHEMA.names:
+            if part.schema.names not in (SCHEMA.names, [name for name in SCHEMA.names if name not in ADDED]):
                 raise InputError(f"the responses in {str(self.path)!r} have other columns than a run writes")
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
@@ -117,56 +145,63 @@ class Run:
         Raises
         ------
         InputError
-            While iterating, if a part cannot be read or is not what was written.
+            While iterating, if nothing can be read, or it holds what a run does not write. A part that is damaged is
+            left out and noted in `damages`.
         """
         file = self.path / name
         try:
             if reading.in_segments(self.path):
-                yield from reading.tables(self.path, name, size_bytes_max, span_s, finished=self.finished)
-            elif (file := file.with_suffix(".parquet")).exists() or name == "responses":
-                # Else what was read ahead of a long run stays in memory until its end.
-                with pq.ParquetFile(file, pre_buffer=False) as parquet:
-                    yield from (pa.Table.from_batches([batch]) for batch in parquet.iter_batches(_ROWS))
+                yield from reading.tables(self.path, name, self.tell, size_bytes_max, span_s, finished=self.finished)
+            elif (piece := self._piece(name)) is not None:
+                yield from (pa.Table.from_batches([batch]) for batch in piece.batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None
+
+    def _piece(self, name: str) -> Piece | None:
+        """A table that is in one file; None where it was not recorded, or the file is gone, which is told."""
+        file, parts = f"{name}.parquet", self.summary.get("files", {})
+        if os.path.lexists(self.path / file):
+            return Piece(self.path, file, parts.get(file), self.tell)
+        if name == "responses" or file in parts:
+            self.tell(Event(KIND, 0, 0.0, f"{file} is damaged: it is gone", {"file": file}))
+        return None
 
     @property
     def segments(self) -> list[Segment]:
         """The closed segments that stand, by age; none where the run is not kept in segments."""
         return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
 
-    def parts(self, name: str) -> tuple[list[Path], list[pa.Table]]:
-        """The Parquet files of a table, and the rows that are in none yet."""
+    def files(self, tables: Collection[str]) -> dict[str, Files]:
+        """Of these tables, those that were recorded: the Parquet files that are whole, and the rows in none yet."""
         try:
             if not reading.in_segments(self.path):
-                file = self.path / f"{name}.parquet"
-                return ([file] if file.exists() else []), []
-            segments, rows = reading.parts(self.path, name, finished=self.finished)
+                groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
+                whole = {name: found for name, found in groups.items() if found != []}
+                return {name: Files([self.path / f"{name}.parquet"], found, []) for name, found in whole.items()}
+            segments, rows = reading.parts(self.path, self.tell, finished=self.finished)
+            found = {name: Files([], None, rows.get(name, [])) for name in tables}
+            for segment in segments:
+                if segment.table in found and reading.whole(self.path, segment, self.tell) is not None:
+                    found[segment.table].paths.append(self.path / segment.name)
         except (OSError, pa.ArrowException) as error:
-            raise InputError(f"the {name} of {str(self.path)!r} cannot be read: {error}") from None
-        return [self.path / segment.name for segment in segments], rows
+            raise InputError(f"the record in {str(self.path)!r} cannot be read: {error}") from None
+        return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
-        """What is in events.jsonl; of a run that is not finished, up to the first line that is not whole."""
+        """What is in events.jsonl, with an event of kind "record-damaged" in the place of each damaged line."""
         return list(self.each_event())
 
     def each_event(self) -> Iterator[Event]:
         """The same one by one, however many they are."""
-        name = self.path / "events.jsonl"
         try:
-            with name.open("rb") as file:
-                for line in file:
-                    try:
-                        event = json_lines.from_line(line)
-                        if not line.endswith(b"\n"):
-                            raise ValueError("its last line is not whole")
-                    except ValueError:
-                        if self.finished:
-                            raise
-                        return
-                    yield Event(**event)
-        except (OSError, ValueError, TypeError) as error:
-            raise InputError(f"{str(name)!r} cannot be read: {error}") from None
+            yield from event_lines.events(self.path, self.tell, finished=self.finished)
+        except OSError as error:
+            raise InputError(f"{str(self.path / event_lines.NAME)!r} cannot be read: {error}") from None
+
+    def each_event_and_damage(self) -> Iterator[Event]:
+        """The same, and behind them what else was found damaged in what was read so far."""
+        yield from self.each_event()
+        yield from (damage for damage in self.damages if damage.details.get("file") != event_lines.NAME)
 
     def _responses(self, table: pa.Table, lines: Lines) -> Responses:
         shape = table.num_rows // len(lines), len(lines)
@@ -175,7 +210,10 @@ class Run:
         }
         value = np.empty(shape, dtype=np.complex128)
         value.real, value.imag = column["re"], column["im"]
-        per_line = {name: column[name] for name in ("sigma", "coherence", "valid")}
-        per_row = {name: column[name][:, 0] for name in ("dof", "first", "sample", "time_s", "schedule")}
+        per_line = {name: column[name] for name in PER_LINE if name in column}
+        if ADDED[0] in column:
+            per_line["weight"] = np.empty(shape, dtype=np.complex128)
+            per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
+        per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
         named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
         return Responses(lines=lines, value=value, **per_line, **per_row, **named)

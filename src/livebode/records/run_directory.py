@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import shutil
@@ -14,8 +15,11 @@ from typing import Any
 
 from livebode.nouns import Event, InputError, Parameters, Responses
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
-from livebode.records.plain_json import to_json
+from livebode.records.piece import parts_of
+from livebode.records.removal import check_removable, remove
 from livebode.records.response_table import RESPONSES, as_batch
+from livebode.records.segments.json_lines import to_line
+from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import TableFile
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
@@ -52,7 +56,7 @@ class RunDirectory:
             self.partial = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.partial-", dir=self.path.parent))
             try:
                 self.partial.chmod(0o755)
-                self._events = (self.partial / "events.jsonl").open("w", encoding="utf-8")
+                self._events = (self.partial / "events.jsonl").open("wb")
                 self._responses = TableFile(self.partial / "responses.parquet", RESPONSES)
                 self._parameters: TableFile | None = None
             except BaseException:
@@ -63,10 +67,7 @@ class RunDirectory:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         try:
             with _disk_errors(self.path):
-                self._responses.close()
-                if self._parameters is not None:
-                    self._parameters.close()
-                self._events.close()
+                self._close()
                 if kind is None:
                     self._check_free()
                     self._put_in_place()
@@ -91,13 +92,22 @@ class RunDirectory:
     def write_event(self, event: Event) -> None:
         """Append an event."""
         with _disk_errors(self.path):
-            self._events.write(to_json(asdict(event)) + "\n")
+            self._events.write(to_line(asdict(event)))
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
-        """Write run.json, and let `draw` add pictures to the directory it is called with."""
+        """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
         with _disk_errors(self.path):
-            (self.partial / "run.json").write_text(to_json(summary, indent=2) + "\n", encoding="utf-8")
+            self._close()
+            files = {path.name: parts_of(path) for path in sorted(self.partial.glob("*.parquet"))}
+            data = to_document(summary | {"files": files})
+            for name in (RUN, COPY):
+                (self.partial / name).write_bytes(data)
             draw(self.partial)
+
+    def _close(self) -> None:
+        for file in (self._responses, self._parameters, self._events):
+            if file is not None:
+                file.close()
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():
@@ -107,10 +117,7 @@ class RunDirectory:
             raise InputError(f"{str(self.path)!r} is kept in segments; --continue goes on with it, --force replaces it")
         if not self._force:
             raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
-        if not (self.path / "run.json").is_file() and (not self.path.is_dir() or any(self.path.iterdir())):
-            raise InputError(
-                f"{str(self.path)!r} is not the directory of a run, so --force leaves it; take another --out"
-            )
+        check_removable(self.path)
         if segments:
             from livebode.records.segments.lock import Lock  # needs a POSIX system, as what left them did
 
@@ -129,7 +136,10 @@ class RunDirectory:
             raise
         finally:
             if old is not None:
-                shutil.rmtree(old, ignore_errors=True)
+                with contextlib.suppress(OSError):
+                    remove(old / "run")
+                with contextlib.suppress(OSError):
+                    old.rmdir()
 
 
 def _disk_sentence(path: Path, error: OSError) -> InputError:

@@ -35,5 +35,6 @@ class TableFile:
 
     def _flush(self) -> None:
         if self._waiting:
-            self._file.write_table(pa.Table.from_batches(self._waiting, self._schema), row_group_size=_GROUP_ROWS)
+            # One group, so that it ends with a whole response: a damaged one is then left out without cutting the next.
+            self._file.write_table(pa.Table.from_batches(self._waiting, self._schema), row_group_size=self._rows)
         self._waiting, self._rows = [], 0

@@ -44,6 +44,7 @@ def save_pictures(
 
 def save(figure: Figure, path: Path, look: Style) -> Path:
     """Write a figure; the same figure gives the same bytes."""
+    path.unlink(missing_ok=True)  # a link in a run that came from anybody would name another file
     with drawing(look), quiet_about_letters():
         figure.savefig(path, format="png", metadata={"Software": None})
     return path

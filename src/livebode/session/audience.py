@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.nouns import Block, Event, Parameters, Responses
 from livebode.records import RunDirectory
+from livebode.session.event_groups import EventGroups
+from livebode.session.overview import Overview
 from livebode.sources.live import Health
 
 if TYPE_CHECKING:
@@ -20,6 +22,9 @@ class Audience:
     It is called in the thread that tracks, after the record has taken the same, so every method must return at once and
     may not raise. What it needs time for it does elsewhere, on what it kept; all that it is given is immutable.
     """
+
+    def share(self, overview: Overview) -> None:
+        """The thinned copy of the run that begins next, which grows with it: there need not be another one."""
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time.
@@ -53,6 +58,9 @@ class Relay(Audience):
     def __init__(self, audience: Audience) -> None:
         self._audience = audience
 
+    def share(self, overview: Overview) -> None:
+        self._audience.share(overview)
+
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         self._audience.begin(directory, summary, health)
 
@@ -76,10 +84,13 @@ class Relay(Audience):
 
 
 class Outlet:
-    """Where a run puts what comes of its samples: into the record first, then before the audience."""
+    """Where a run puts what comes of its samples: into the record first, then before the audience.
 
-    def __init__(self, record: RunDirectory | SegmentedRun, audience: Audience) -> None:
-        self._record, self._audience = record, audience
+    Events go through `groups`.
+    """
+
+    def __init__(self, record: RunDirectory | SegmentedRun, audience: Audience, groups: EventGroups) -> None:
+        self._record, self._audience, self._groups = record, audience, groups
 
     def write(self, responses: Responses) -> None:
         if len(responses):
@@ -91,8 +102,20 @@ class Outlet:
         self._audience.write_parameters(*parts)
 
     def write_event(self, event: Event) -> None:
-        self._record.write_event(event)
-        self._audience.write_event(event)
+        self._report(self._groups.take(event))
+
+    def report_groups(self, time_s: float) -> None:
+        """Publish the events that have waited long enough at `time_s` of the machine."""
+        self._report(self._groups.due(time_s))
+
+    def finish_groups(self) -> None:
+        """Publish all events that wait: nothing more will come."""
+        self._report(self._groups.finish())
+
+    def _report(self, events: list[Event]) -> None:
+        for event in events:
+            self._record.write_event(event)
+            self._audience.write_event(event)
 
     def drain_events(self) -> list[Event]:
         """What the audience wants recorded."""

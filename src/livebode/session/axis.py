@@ -45,18 +45,20 @@ class LinesSection(_Section):
 
 
 class TrackingSection(_Section):
-    """[tracking]: the options of `livebode.estimation.Settings`."""
+    """[tracking]: the options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
     quantity: Quantity = "plant"
     hop: Annotated[int, Field(ge=1)] | None = None
     average: bool = False
     forgetting: Annotated[float, Field(gt=0, le=1)] = 0.8
-    noise: Literal["periods", "quiet"] = "periods"
+    noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: list[str] = []
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
+    accept_roles: bool = False
+    all_periods: bool = False
 
 
 class MotionSection(_Section):

@@ -11,7 +11,7 @@ from livebode.nouns import NOT_WHOLE, Block, InputError, Spectra, rms
 from livebode.session.follower import Follower
 
 # A DFT leaves 1e-30 of a signal's power at a line where there is none.
-_POWERLESS_SHARE = 1e-20
+POWERLESS_SHARE = 1e-20
 # Excitation this far below the strongest line is rounding or distortion, and no one's design.
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
@@ -101,7 +101,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
     power = tracker.excitation_power()
     if np.isnan(power).all():
         return
-    if 2 * power.max() <= _POWERLESS_SHARE * variance * settings.lines.window**2:
+    if 2 * power.max() <= POWERLESS_SHARE * variance * settings.lines.window**2:
         raise InputError(
             f"{name!r} has no power at {f[0]:g} Hz or any other of these lines; take --lines auto, or "
             "`livebode inspect` to see what it holds"

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from livebode.nouns import Block, Event, Spectra
+from livebode.nouns import Block, InputError
+from livebode.sources.live import LiveBlock, Position
+from livebode.sources.live.computer_clock import ClockReading
+
+SOURCE = "source"
+"""The name of a live source's position among the parts of a run's state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,40 +43,53 @@ def in_pieces(blocks: Iterable[Block], samples: int) -> Iterator[Block]:
             yield block.cut(first, first + samples)
 
 
-class Numbering:
-    """Numbers a source on that cannot go back and numbers anew: its samples go on behind a gap.
+class StreamPosition:
+    """Where a live source continues, as a part of the run's state.
 
     One for as long as the source is open, over all runs that it is recorded in.
+
+    Parameters
+    ----------
+    state
+        What the record to be continued says; empty for a new one.
     """
 
-    def __init__(self) -> None:
-        self._behind: tuple[int, float, float] | None = None
-        self._shift = 0
-        self._origin_s: float | None = None
+    def __init__(self, state: bytes = b"") -> None:
+        self._state = state
+        self._newest: LiveBlock | None = None
 
-    def go_on(self, sample: int, origin_s: float, away_s: float) -> None:
-        """Give the next sample the number `sample` and what `away_s` comes to, with sample 0 at `origin_s`.
+    @property
+    def left_at(self) -> Position | None:
+        """Where the record to be continued ended; None for a new one, or one without samples."""
+        if not self._state:
+            return None
+        said = json.loads(self._state)
+        return Position(**said | {"arrived": ClockReading(**said["arrived"])})
 
-        How many samples are missing is known no better than the two computer clocks that `away_s` comes from.
-        """
-        self._behind = sample, origin_s, away_s
+    def take(self, block: Block) -> None:
+        """The next sample is the one behind this block."""
+        if isinstance(block, LiveBlock):
+            self._newest = block
 
-    def over(self, blocks: Iterable[Block]) -> Iterator[Block]:
-        """The same samples, numbered on."""
-        for block in blocks:
-            if self._behind is not None:
-                sample, self._origin_s, away_s = self._behind
-                # Spectra keep to their grid of hops.
-                step = block.layout.hop if isinstance(block, Spectra) else 1
-                self._shift = sample + step * max(1, round(away_s * block.rate_hz / step)) - block.start
-                self._behind, block = None, replace(block, gap=True)
-            if self._origin_s is not None:
-                block = replace(block, start=block.start + self._shift, origin_s=self._origin_s)
-            yield block
+    def snapshot(self) -> bytes:
+        """All of it as bytes; see `restore`."""
+        block = self._newest
+        if block is None or block.origin is None:
+            return self._state
+        origin = block.origin
+        arrived = ClockReading.at(block.arrived_s)
+        place = Position(block.stop, origin.epoch, block.stop + origin.offset, block.rate_hz, arrived, origin.mark)
+        return json.dumps(asdict(place)).encode()
 
-    def said(self, event: Event, rate_hz: float) -> Event:
-        """An event of the source in the same numbers."""
-        if self._origin_s is None:
-            return event
-        sample = event.sample + self._shift
-        return replace(event, sample=sample, time_s=self._origin_s + sample / rate_hz)
+    def restore(self, snapshot: bytes) -> None:
+        """Check that the source continues where the record does."""
+        if snapshot != self._state:
+            raise InputError("the record changed while its source was opened; run the same command again")
+
+
+def stream_position(run: Path) -> StreamPosition:
+    """Where the source of this run continues, from its newest commit; of a new run where there is none to continue."""
+    from livebode.records.segments.last_commit import last_commit  # needs a POSIX system
+
+    commit = last_commit(run)
+    return StreamPosition(b"" if commit is None else commit.states.get(SOURCE, b""))

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from livebode.fitting import Fit, Fitter, PhysicalModel, fit, fit_of, model_named
+from livebode.fitting import Fit, Fitter, PhysicalModel, best_of, fit, fit_of, model_named
 from livebode.nouns import Event, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
@@ -41,6 +41,7 @@ class Fits:
         self._fitter: Fitter | None = None
         self._counts: dict[str, int] = {}
         self._newest: Parameters | None = None
+        self._newest_response: Responses | None = None
         self._epsilons: list[float] = []
 
     @classmethod
@@ -52,7 +53,7 @@ class Fits:
         """Fit a batch, and write its parameters and events."""
         fitter = self._fitter or self._begin(responses.unit)
         found = fitter.process(responses)
-        around = () if self.loop is None else live_margins(found, fitter, self.loop)
+        around = () if self.loop is None else live_margins(found, responses, fitter, self.loop)
         out.write_parameters(found, fitter.derived(found), *around)
         for event in fitter.drain_events():
             out.write_event(event)
@@ -64,7 +65,8 @@ class Fits:
             self._epsilons = [*self._epsilons, *epsilon.tolist()][-_REMEMBERED:]
             usual = good[epsilon <= max(_UNUSUAL * np.median(self._epsilons), _EPSILON_MIN)]
             if usual.size or self._newest is None:
-                self._newest = found[(usual if usual.size else good)[-1:]]
+                at = (usual if usual.size else good)[-1:]
+                self._newest, self._newest_response = found[at], responses[at]
         return found
 
     def snapshot(self) -> bytes:
@@ -94,14 +96,18 @@ class Fits:
         return self._fitter
 
     def newest(self) -> Fit | None:
-        """The newest fit that holds, and whose ε is no more than three times the usual one."""
+        """The newest fit that is valid, and whose ε is no more than three times the usual one.
+
+        Competing models are tried for this one alone, not for each response of a run.
+        """
         if self._fitter is None or self._newest is None:
             return None
-        return fit_of(self._fitter, self._newest)
+        if self._newest_response is None:
+            return fit_of(self._fitter, self._newest)
+        return best_of(self._fitter, self._newest, self._newest_response)
 
-    def summary(self) -> dict[str, Any]:
-        """For run.json: the model, how often each status was, and the newest fit that holds."""
-        newest = self.newest()
+    def summary(self, newest: Fit | None) -> dict[str, Any]:
+        """For run.json: the model, how often each status was, and the newest fit that is valid."""
         return {
             "model": self._fitter.model.name if self._fitter else None,
             "statuses": self._counts,
@@ -166,11 +172,19 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
 
 def plain_fit(found: Fit) -> dict[str, Any]:
     """One fit as plain data."""
-    quantities = {name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()}
+    quantities: dict[str, dict[str, Any]] = {
+        name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()
+    }
+    for name, quantity in quantities.items():
+        if (limit := found.at_most(name)) is not None:
+            quantity["at_most"] = limit
     return {
-        "model": found.model.name,
+        "model": found.asked.name if found.asked is not None else found.model.name,
         "status": found.status,
         "message": found.sentence,
+        "taken": list(found.taken),
+        "complete": found.complete,
+        "about_bounds": found.about_bounds,
         "time_s": float(found.parameters.time_s[0]),
         "schedule": float(found.parameters.schedule[0]),
         "band_hz": list(found.band_hz),

@@ -13,17 +13,20 @@ import numpy as np
 
 from livebode.estimation import response_unit
 from livebode.fitting import Fit
-from livebode.nouns import Block, Channel, Event, InputError, Responses
+from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import RunDirectory
 from livebode.session import summary
+from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
-from livebode.session.continuing import Before, Numbering
+from livebode.session.continuing import Before, StreamPosition
 from livebode.session.destination import Destination
+from livebode.session.fits import Fits
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.overview import Overview
 from livebode.session.pipeline import Pipeline
+from livebode.session.shedding import LoadShedding
 from livebode.session.tally import Tally
 from livebode.sources.live import Health, LiveSource
 
@@ -71,13 +74,13 @@ class Tracking:
     kept
         How it is kept in segments; None for a run in one piece.
     again
-        Whether the source begins with the same samples each time.
+        Whether the source begins with the same samples each time; else it numbers them on.
     started
         `time.perf_counter()` when opening the source began, where that is to count in the speed.
     orders
         What it is told meanwhile.
-    numbering
-        Of a source that cannot go back.
+    position
+        Where a live source continues.
     before
         The run that it goes on from.
     delivery
@@ -95,18 +98,22 @@ class Tracking:
         again: bool = True,
         started: float | None = None,
         orders: Orders | None = None,
-        numbering: Numbering | None = None,
+        position: StreamPosition | None = None,
         before: Before | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
         self.source, self.pipeline, self.to, self._kept = source, pipeline, to, kept
-        self._orders, self._numbering = orders or Orders(), numbering or Numbering()
+        self._orders, self._position = orders or Orders(), position
+        self._shedding: LoadShedding | None = None
+        if isinstance(source, LiveSource):
+            self._shedding = LoadShedding(source, lambda: self._orders.ended)
         self._follower, settings = pipeline.follower, pipeline.follower.settings
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
+        self._announcing = Announcing()
         self._label = _schedule_label(source, settings.schedule)
         about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._about = about
@@ -116,7 +123,7 @@ class Tracking:
         self._newest: Fit | None = None
         self._origin_s = 0.0
         self.recorder = self._recorder(again, before)
-        self._out = Outlet(self.recorder, to.audience)
+        self._out = Outlet(self.recorder, to.audience, self._tally.groups)
 
     def _recorder(self, again: bool, before: Before | None) -> RunDirectory | SegmentedRun:
         if self._kept is None:
@@ -135,7 +142,7 @@ class Tracking:
             again=again,
             ends=self.source.samples is not None,
             tell=self._said,
-            numbering=self._numbering,
+            position=self._position,
             before=before,
         )
 
@@ -167,6 +174,7 @@ class Tracking:
         """Every Block through the pipeline into the record; InputError where there is none."""
         fits, watching = self.pipeline.fits, self.pipeline.watching
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
+        self.to.audience.share(self._overview)
         self.to.audience.begin(self.to.directory, begun, _health(self.source))
         blocks = self._blocks
         if not isinstance(self.recorder, RunDirectory):
@@ -177,7 +185,8 @@ class Tracking:
                     fits.take(responses[0:0], self._out)  # which tells it the lines
             blocks = self.recorder.feed(blocks)
         if watching is not None:
-            blocks = watching.over(blocks, self._out.write_event)
+            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
+            blocks = watching.over(blocks, self._out.write_event, has_time)
         for block in _told(blocks, self.to.audience):
             if self._orders.ended and not isinstance(self.source, LiveSource):
                 raise StoppedError("ended before the end of the recording")
@@ -197,8 +206,15 @@ class Tracking:
             self._tally.take(responses, time.perf_counter() - before)
             self._publish(responses)
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
+        if self._shedding is not None:
+            shed = self._shedding.drain_events(*self.position)
+            for event in shed:
+                if event.kind != "thinned":
+                    self.to.tell(event)
+            events += shed
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
+        self._out.report_groups(self.position[1])
         if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
             self.recorder.keep(kept)
 
@@ -206,16 +222,24 @@ class Tracking:
         fits, watching = self.pipeline.fits, self.pipeline.watching
         self._overview.add(responses)
         self._out.write(responses)
-        parameters = None if fits is None else fits.take(responses, self._out)
-        if watching is not None:
+        parameters = None if fits is None else self._fitted(fits, responses)
+        if watching is not None and (self._shedding is None or self._shedding.to_monitor(responses)):
             watching.follow(responses, parameters, self._out.write_event)
+
+    def _fitted(self, fits: Fits, responses: Responses) -> Parameters:
+        if self._shedding is None:
+            return fits.take(responses, self._out)
+        with self._shedding.fitting(responses) as chosen:
+            return fits.take(chosen, self._out)
 
     def _drained(self) -> list[Event]:
         """What a live source has to say; a recording says it all at once."""
         if not isinstance(self.source, LiveSource):
             return []
-        rate_hz = self._follower.settings.lines.rate_hz
-        return [self._numbering.said(event, rate_hz) for event in self.source.drain_events()]
+        events = self.source.drain_events()
+        for event in self._announcing.of(events):
+            self.to.tell(event)
+        return events
 
     def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
         """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.
@@ -232,7 +256,8 @@ class Tracking:
                 raise
             # What was recorded stays, and says what is wrong with it.
             self._out.write_event(Event("doubtful", *self.position, str(error)))
-        for event in self._drained() + self._orders.drain_events(*self.position):
+        left = [] if self._shedding is None else self._shedding.finish(*self.position)
+        for event in self._drained() + self._orders.drain_events(*self.position) + left:
             self._out.write_event(event)
         fits, watching = self.pipeline.fits, self.pipeline.watching
         self._done = summary.begun(self._about, self._follower, self._begun["found"]["unit"])
@@ -241,6 +266,7 @@ class Tracking:
         self._done |= summary.of_source(self.source) | summary.fitted(fits, self._newest, self._overview.responses())
         if watching is not None:
             self._done["monitoring"] = watching.finish(self._out.write_event)
+        self._out.finish_groups()
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

@@ -73,6 +73,7 @@ class Inspection:
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
                 "transient_periods": list(found.transient),
                 "outlying_periods": list(found.outlying),
+                "phase_slips": [[slip.sample, slip.missing] for slip in found.slips],
             }
         return plain
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from livebode.nouns import Event, InputError
 from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
-from livebode.session.continuing import Before, Numbering
+from livebode.session.continuing import Before, StreamPosition, stream_position
 from livebode.session.destination import Destination
 from livebode.session.following import Outcome, Tracking
 from livebode.session.orders import Orders
@@ -22,28 +24,48 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
     """Track a machine while it works and leave a run directory in segments.
 
     Ends where the source ends, and whole, with what has come, when `orders` end it. The same axis in the same directory
-    goes on with the run, behind a gap. A change by `orders` finishes the run, and another one beside it, NAME-2 and so
-    on, goes on with the very next sample of the same source; the outcome is that of the last.
+    continues the run with the sender's next sample; what is missing is a gap of the length that its numbers tell. A
+    change by `orders` finishes the run, and another one beside it, NAME-2 and so on, goes on with the very next sample
+    of the same source; the outcome is that of the last.
+
+    It waits for a machine that is not switched on yet, and reports that after `timeout_s`.
 
     Raises
     ------
     InputError
-        Where the configuration cannot be, or no samples come.
+        Where the configuration cannot be, the machine refuses, or the run was ended before samples came.
     """
     orders = orders or Orders()
     source = make_source(axis.source)
     orders.of(source)
-    with source.open(), contextlib.ExitStack() as finishing:
+    position = StreamPosition() if to.force else stream_position(successors.newest(to.directory))
+    if position.left_at is not None:
+        source.resume(position.left_at)
+    with source.open(partial(_late, to)), contextlib.ExitStack() as finishing:
         pipeline = Pipeline.live(axis, source)
-        return _Succession(source, to, orders, finishing).run(pipeline)
+        return _Succession(source, position, to, orders, finishing).run(pipeline)
+
+
+def _late(to: Destination, why: str) -> None:
+    """Report that a machine has not sent yet; there is no run yet, so the time is that of this computer."""
+    event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
+    to.tell(event)
+    to.audience.write_event(event)
 
 
 class _Succession:
     """The runs of one open source, each going on with the next sample of the one before."""
 
-    def __init__(self, source: LiveSource, to: Destination, orders: Orders, finishing: contextlib.ExitStack) -> None:
-        self._source, self._to, self._orders, self._finishing = source, to, orders, finishing
-        self._numbering = Numbering()
+    def __init__(
+        self,
+        source: LiveSource,
+        position: StreamPosition,
+        to: Destination,
+        orders: Orders,
+        finishing: contextlib.ExitStack,
+    ) -> None:
+        self._source, self._position, self._to = source, position, to
+        self._orders, self._finishing = orders, finishing
 
     def run(self, pipeline: Pipeline) -> Outcome:
         from livebode.session.segmented import make_way  # needs a POSIX system
@@ -89,7 +111,7 @@ class _Succession:
             kept=axis.record or RecordSection(),
             again=False,
             orders=self._orders,
-            numbering=self._numbering,
+            position=self._position,
             before=before,
             until=self._orders.changing,
         )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from livebode.fitting import Fitter
-from livebode.margins import OpenLoop, margins
-from livebode.nouns import Loop, Parameters
+from livebode.margins import OpenLoop, against_lines, margins
+from livebode.nouns import Loop, Parameters, Responses
 
 
-def live_margins(fits: Parameters, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:
-    """Rows for parameters.parquet: each margin at each fit."""
+def live_margins(fits: Parameters, responses: Responses, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:
+    """Rows for parameters.parquet: each margin at each fit, of which the lines of its response show nothing else."""
     grid = fitter.grid
     band_hz = float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])
-    return margins(fits, OpenLoop(fitter.model, loop, grid.rate_hz, grid.hold), band_hz).parameters()
+    found = margins(fits, OpenLoop(fitter.model, loop, grid.rate_hz, grid.hold), band_hz)
+    return against_lines(found, responses, loop).parameters()

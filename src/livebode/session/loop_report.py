@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 
 from livebode.fitting import Fit, Fitter, mean_response
-from livebode.margins import Margins, OpenLoop, Tuning, margins, peak_sensitivity_at_lines, tuning, worst
+from livebode.margins import (
+    Margins,
+    OpenLoop,
+    Tuning,
+    against_lines,
+    margins,
+    peak_sensitivity_at_lines,
+    tuning,
+    worst,
+)
+from livebode.margins.margins import CONTRADICTED
 from livebode.nouns import InputError, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection, LoopSection
@@ -50,6 +60,19 @@ class LoopReport:
     tuning: Tuning
     responses: Responses
 
+    @property
+    def message(self) -> str:
+        """Why there are no margins; empty where there are."""
+        status = str(self.margins.status[0])
+        if status == CONTRADICTED:
+            size, _, at_hz = self.at_lines
+            return (
+                f"the {self.fit.model.name} model contradicts the lines: they alone show Ms of at least {size:.3g} at "
+                f"{at_hz:g} Hz, more than the model allows; free what it lacks (a delay: --free delay), choose another "
+                "model, or correct the description of the controllers under [loop]"
+            )
+        return "" if self.margins.ok[0] else f"{status}; check the loop's description and the fit"
+
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         bound = self.margins.bound()[0]
@@ -68,6 +91,7 @@ class LoopReport:
             "fitted_to": self.of,
             "model": self.fit.model.name,
             "status": str(self.margins.status[0]),
+            "message": self.message,
             "margins": found,
             "peak_sensitivity_at_lines": {"at_least": size, "bound": around, "frequency_hz": at_hz},
             "places": len(self.places),
@@ -93,37 +117,45 @@ def loop_of_run(
         own = axis.fit if axis is not None else None
         section = own or FitSection.model_validate(own_words.get("fit", {}))
     found, words = fit_run(directory, section)
-    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), section, peak_sensitivity)
+    return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
 
 
-def loop_report(
-    fit: Fit, words: str, responses: Responses, loop: Loop, section: FitSection, peak_sensitivity: float = 2.0
-) -> LoopReport:
+def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
     """The report of a fit, and of the responses that it is of."""
     if fit.status != "ok":
         raise InputError(f"margins need a fit, and there is none: {fit.sentence}")
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
-    fits = fit.parameters
-    mean = mean_response(responses)
+    fits, mean = fit.parameters, mean_response(responses)
+    fitted_to = fit.measured if fit.measured is not None else mean
+    measured = fitted_to
     if len(places := _by_place(responses)) > 1:
-        over = Fitter(fit.model, fixed=section.fixed, free=section.free, band_hz=fit.band_hz, hold=fit.hold).process(
-            places
-        )
+        free = [name for name in fit.model.names if name not in fit.held]
+        over = Fitter(fit.model, fixed=fit.held, free=free, band_hz=fit.band_hz, hold=fit.hold).process(places)
         # The fit may be of one moment, and no better than the least of them.
-        fits = Parameters.join([over, fits]) if over.ok.sum() > len(places) // 2 else fits
-    controller_rate_hz = getattr(getattr(loop.feedback, "velocity", loop.feedback), "rate_hz", None)
+        if over.ok.sum() > len(places) // 2:
+            fits, measured = Parameters.join([over, fits]), Responses.join([places, fitted_to])
+    every = against_lines(margins(fits, around, fit.band_hz), measured, loop)
     return LoopReport(
         fit=fit,
         of=words,
         loop=around,
-        margins=margins(fit.parameters, around, fit.band_hz),
-        at_lines=tuple(float(x[0]) for x in peak_sensitivity_at_lines(mean, loop)),  # type: ignore[arg-type]
-        places=margins(fits, around, fit.band_hz),
-        tuning=tuning(
-            fits, around, fit.band_hz, controller_rate_hz=controller_rate_hz, peak_sensitivity=peak_sensitivity
-        ),
+        margins=every[-1:],
+        at_lines=tuple(float(x[0]) for x in peak_sensitivity_at_lines(fitted_to, loop)),  # type: ignore[arg-type]
+        places=every,
+        tuning=_tuned(fits, every, around, fit.band_hz, peak_sensitivity),
         responses=mean,
     )
+
+
+def _tuned(
+    fits: Parameters, read: Margins, loop: OpenLoop, band_hz: tuple[float, float], peak_sensitivity: float
+) -> Tuning:
+    """A filter by the fits; none where the lines contradict one of them."""
+    if wrong := int(np.count_nonzero(read.status == CONTRADICTED)):
+        sentence = f"the lines contradict {wrong} of {len(read)} fits: by such a model no filter can be judged"
+        return Tuning("refused", sentence, read)
+    rate_hz = getattr(getattr(loop.loop.feedback, "velocity", loop.loop.feedback), "rate_hz", None)
+    return tuning(fits, loop, band_hz, controller_rate_hz=rate_hz, peak_sensitivity=peak_sensitivity)
 
 
 def _by_place(responses: Responses) -> Responses:

@@ -33,6 +33,7 @@ class MeasuredSection(BaseModel):
     output: Output | None = None
     radius_m: Number = 1.0
     noise: Number = 0.0
+    encoder_counts_per_turn: Annotated[int, Field(strict=True, ge=0)] = 0
     stroke_s: Number | None = None
     torque_n_m: tuple[Number, Number] | None = None
     speed_m_per_s: tuple[Number, Number] | None = None
@@ -67,7 +68,7 @@ class MeasuredAxis:
         return measured_machine(
             MeasuredResponse.of(mean_response(self._run.responses())), self._loop.build(rate_hz), rate_hz,
             output=self._output(), radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
-            notes=self._notes(),
+            notes=self._notes(), encoder_counts_per_turn=told.encoder_counts_per_turn,
         )  # fmt: skip
 
     def loop_tables(self) -> dict[str, Any]:

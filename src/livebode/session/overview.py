@@ -2,34 +2,51 @@
 
 from __future__ import annotations
 
+import threading
+
 from livebode.nouns import Responses
 
 _ROWS_MAX = 2048
+_PARTS_MAX = 64
 
 
 class Overview:
-    """Keeps every n-th response, evenly over the run, with n doubled whenever there are too many."""
+    """Every n-th response, evenly over the run, with n doubled whenever there are too many.
+
+    It holds at most 2,048 rows in at most 64 parts, whatever the size of the batches. The thread that tracks adds;
+    any other may read meanwhile.
+    """
 
     def __init__(self) -> None:
         self._parts: list[Responses] = []
         self._stride = 1
         self._seen = 0
-        self._kept = 0
+        self._rows = 0
+        self._lock = threading.Lock()
 
     def add(self, responses: Responses) -> None:
-        self._keep(responses[-self._seen % self._stride :: self._stride])
-        self._seen += len(responses)
-        while self._kept > _ROWS_MAX:
-            whole = self.responses()
-            self._parts, self._kept = [], 0
-            self._keep(whole[::2])
-            self._stride *= 2
-
-    def _keep(self, responses: Responses) -> None:
-        # Joining copies, so that the rows that are not kept do not stay in memory behind views.
-        self._parts.append(Responses.join([responses]))
-        self._kept += len(responses)
+        with self._lock:
+            self._add(responses)
 
     def responses(self) -> Responses:
-        """What was kept."""
-        return Responses.join(self._parts)
+        """The rows, oldest first."""
+        with self._lock:
+            return Responses.join(self._parts)
+
+    def _add(self, responses: Responses) -> None:
+        self._append(responses[-self._seen % self._stride :: self._stride])
+        self._seen += len(responses)
+        while self._rows > _ROWS_MAX:
+            thinned = Responses.join(self._parts)[::2]
+            self._parts, self._rows = [], 0
+            self._append(thinned)
+            self._stride *= 2
+
+    def _append(self, responses: Responses) -> None:
+        if self._parts and not len(responses):
+            return  # one empty part is enough to name the lines
+        # Joining copies: a view would hold the rows that are left out in memory.
+        self._parts.append(Responses.join([responses]))
+        self._rows += len(responses)
+        if len(self._parts) > _PARTS_MAX:
+            self._parts = [Responses.join(self._parts)]

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
 import numpy as np
 
 from livebode.estimation import Settings, SpectraTracker, Tracker
-from livebode.nouns import InputError, Lines, SpectraLayout
+from livebode.estimation.settings import nearest_hop
+from livebode.nouns import Block, InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.session.follower import Follower
+from livebode.session.roles import ROLES, check_distinct, check_roles
 from livebode.session.spectra_plan import check_spectra
 from livebode.sources import Log
 
+LIVE_RESPONSES_PER_S = 20.0
+"""Default of a live source: what a person sees, at a tenth of the work of a hop of a twentieth of the window."""
 _LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
+_ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # that the roles are judged by, whichever is longer
+
+
+class Recorded(Protocol):
+    """What has Blocks to begin with."""
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
 
 
 def make_follower(axis: Axis, log: Log) -> Follower:
@@ -31,7 +45,9 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
             "lines or window are 'auto', which needs a recording to look at first; give lines.frequencies and "
             "lines.window for a live source"
         )
-    return _follower(axis, _settings(axis, rate_hz, Lines.parse(frequencies, rate_hz, window)))
+    lines = Lines.parse(frequencies, rate_hz, window)
+    hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
+    return _follower(axis, _settings(axis, rate_hz, lines, hop))
 
 
 def _follower(axis: Axis, settings: Settings) -> Follower:
@@ -61,7 +77,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
 
 def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
     signals, tracking = axis.signals, axis.tracking
-    return Settings(
+    settings = Settings(
         lines=lines,
         output=signals.output,
         input=signals.input,
@@ -79,6 +95,9 @@ def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) 
         spikes=tuple(tracking.spikes),
         dtype=tracking.dtype,
     )
+    if not tracking.accept_roles:
+        check_distinct(settings)
+    return settings
 
 
 def _lines(axis: Axis, log: Log) -> Lines:
@@ -111,12 +130,27 @@ def _lines(axis: Axis, log: Log) -> Lines:
 
 def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
     """The first samples of a channel, with NaN where some are missing."""
+    return np.asarray(beginnings(log, [channel], samples)[0])
+
+
+def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarray:
+    """The same of several channels, shape (channels, samples)."""
     parts: list[np.ndarray] = []
     size = 0
-    for block in log.blocks([channel]):
+    for block in log.blocks(list(channels)):
         missing = block.start - size
-        parts += [np.full(missing, np.nan), block[channel]]
+        parts += [np.full((len(channels), missing), np.nan), np.array([block[name] for name in channels])]
         size = block.stop
         if size >= samples:
             break
-    return np.concatenate(parts)[:samples] if parts else np.zeros(0)
+    return np.concatenate(parts, axis=1)[:, :samples] if parts else np.zeros((len(channels), 0))
+
+
+def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
+    """What speaks against the roles of the channels, in sentences; InputError where it is certain and not accepted."""
+    names = {role: name for role in ROLES if (name := settings.channel(role))}
+    samples = min(_LOOKED_AT, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
+    channels = list(dict.fromkeys(names.values()))
+    rows = dict(zip(channels, beginnings(log, channels, samples)))
+    signals = {role: rows[name] for role, name in names.items()}
+    return check_roles(signals, settings, accepted=axis.tracking.accept_roles)

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
+from livebode.estimation import Tracker
+from livebode.nouns import Event
+from livebode.session.aligned import AlignedLog, slip_event, slips_of
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
+from livebode.session.early_spikes import early_spikes
 from livebode.session.following import Outcome, Tracking
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline
-from livebode.session.plan import make_follower
+from livebode.session.plan import make_follower, roles_in_doubt
 from livebode.session.tracking import whole
+from livebode.session.transients import leading_transient, transient_event
 from livebode.sources import open_log
 
 
@@ -29,6 +35,24 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
     assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     pipeline = Pipeline.of(axis, make_follower(axis, log))
-    found = {"format": log.format, "rate_from": log.rate_origin}
+    settings = pipeline.follower.settings
+    noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
+    slips = slips_of(log, settings)
+    if slips:
+        noticed.append(slip_event(slips, settings))
+    source = AlignedLog(log, slips)
+    if not axis.tracking.all_periods and axis.motion is None and (transient := leading_transient(source, settings)):
+        source = replace(source, first=transient * settings.lines.window)
+        noticed.append(transient_event(transient, settings))
+    if isinstance(pipeline.follower, Tracker):
+        pipeline.follower.know_spikes(early_spikes(source, settings))
+    orders = orders or Orders()
+    for event in noticed:
+        orders.say(event.kind, event.message, **event.details)
+    found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
+    found["left_out_samples"] = source.first
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
-    return whole(Tracking(log, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))
+    outcome = whole(Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))
+    for event in noticed:
+        to.tell(event)
+    return outcome

@@ -4,14 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
+from livebode.nouns import InputError
+from livebode.session.axis import FitSection, LoopSection
+
+_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}
+
 
 def said(summary: dict[str, Any]) -> dict[str, Any]:
     """The configuration without what was left open: JSON has no infinity and writes it, as it writes none, as null.
 
-    >>> said({"configuration": {"loop": {"velocity": {"gain": 1.0, "integral_time_s": None}}, "fit": None}})
-    {'loop': {'velocity': {'gain': 1.0}}}
+    >>> said({"configuration": {"tracking": {"hop": 5, "spikes": None}, "fit": None}})
+    {'tracking': {'hop': 5}}
+
+    Raises
+    ------
+    InputError
+        If a section that is used again is not what a run writes.
     """
-    return dict(_kept(summary.get("configuration", {})))
+    found = dict(_kept(summary.get("configuration", {})))
+    for name, section in _SECTIONS.items():
+        try:
+            section.model_validate(found.get(name, {}))
+        except ValidationError as error:
+            wrong = error.errors()[0]
+            place = ".".join(map(str, (name, *wrong["loc"])))
+            raise InputError(
+                f"the configuration in run.json is not what a run writes ({place}: {wrong['msg']})"
+            ) from None
+    return found
 
 
 def _kept(values: dict[str, Any]) -> dict[str, Any]:

@@ -6,20 +6,21 @@ import contextlib
 import json
 import os
 import shutil
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
+from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
 from livebode.session.axis import RecordSection
-from livebode.session.continuing import Before, Numbering, in_pieces, offered_again
+from livebode.session.continuing import SOURCE, Before, StreamPosition, in_pieces, offered_again
 from livebode.session.orders import StoppedError
 from livebode.session.stateful import Stateful
 
@@ -49,13 +50,13 @@ class SegmentedRun:
     force
         Replace a run there instead of going on with it.
     again
-        Whether the source begins with the same samples again each time.
+        Whether the source begins with the same samples again each time; else it numbers them on.
     ends
         Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
     tell
         Called with what the record itself has to say, at once.
-    numbering
-        Of the source, where it is one that cannot go back.
+    position
+        Of a live source, which is stored with every commit.
     before
         The run that this one goes on from with the next sample.
     """
@@ -73,14 +74,15 @@ class SegmentedRun:
         again: bool,
         ends: bool,
         tell: Callable[[Event], None],
-        numbering: Numbering,
+        position: StreamPosition | None = None,
         before: Before | None = None,
     ) -> None:
         self.path = path
-        self._numbering = numbering
+        self._position = position
         self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
         self._continues = None if before is None else before.name
-        self._summary, self._rate_hz, self._parts = dict(summary), rate_hz, parts
+        self._summary, self._rate_hz = dict(summary), rate_hz
+        self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._tell = force, again, ends, tell
         self._samples = samples_of(channels) if kept.samples else None
         tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
@@ -131,7 +133,7 @@ class SegmentedRun:
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
         if self._continued or self._continues:
-            run = Run.open(self.path)
+            run = Run.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # none are told from no run by their lines
             yield from newest
@@ -145,9 +147,11 @@ class SegmentedRun:
             At the end, if the disk does not take the last ones.
         """
         block: Block | None = None
-        for block in in_pieces(self._numbered(blocks), max(1, round(_PIECE_S * self._rate_hz))):
+        for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
             if self._samples:
                 self._store.write("samples", as_rows(block, self._samples))
+            if self._position is not None:
+                self._position.take(block)
             yield block
             if self._store.due(block.stop):
                 self._commit(block)
@@ -186,15 +190,13 @@ class SegmentedRun:
         # What was held back at the end was written since the last commit, and belongs to the states as they are now.
         self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(self._named(summary), finished=self._ends or ends)
+        self._hear()
 
-    def _numbered(self, blocks: Iterable[Block]) -> Iterator[Block]:
+    def _still_due(self, blocks: Iterable[Block]) -> Iterator[Block]:
         last = self._store.last
         if last is not None and self._continued and self._again:
             return offered_again(blocks, last.sample)
-        if last is not None and self._continued:
-            away_s = max(0.0, time.time() - last.unix_s)
-            self._numbering.go_on(last.sample, last.time_s - last.sample / self._rate_hz, away_s)
-        return self._numbering.over(blocks)
+        return iter(blocks)
 
     def _commit(self, block: Block) -> None:
         self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states())
@@ -204,11 +206,15 @@ class SegmentedRun:
         for event in self._store.drain_events():
             self._tell(event)
 
+    def _found_damaged(self, damage: Event) -> None:
+        if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # of journals the store tells
+            self._tell(damage)
+
     def _states(self) -> dict[str, bytes]:
         return {name: part.snapshot() for name, part in self._parts.items()}
 
     def _restore(self, states: Mapping[str, bytes]) -> None:
-        before = Run.open(self.path).summary
+        before = Run.open(self.path, self._found_damaged).summary
         now = json.loads(to_json(self._summary))
         if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
             raise InputError(
@@ -227,19 +233,20 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
     # How the record is cut may change on the way; what is recorded may not.
     configuration = dict(summary["configuration"])
     kept = configuration.pop("record", None) or {}
-    found = {key: value for key, value in summary["found"].items() if key != "motion"}  # what the model has learnt
+    found = {
+        key: value for key, value in summary["found"].items() if key not in ("motion", "judged")
+    }  # what was learnt
     return [configuration, found, kept.get("samples")]
 
 
 def make_way(path: Path) -> None:
     """Remove the run that stands there; InputError where something else stands there."""
-    if not path.exists():
+    if not os.path.lexists(path):
         return
-    if not (path / "run.json").is_file() and (not path.is_dir() or any(path.iterdir())):
-        raise InputError(f"{str(path)!r} is not the directory of a run, so --force leaves it; take another --out")
+    check_removable(path)
     lock = Lock(path)
     try:
-        shutil.rmtree(path)
+        remove(path)
     except OSError as error:
         raise InputError(f"the run in {str(path)!r} cannot be removed: {why(error)}") from None
     finally:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
+
+from livebode.nouns import InputError
+from livebode.records.summary_file import read_summary
 
 
 def newest(directory: Path) -> Path:
@@ -52,7 +54,6 @@ def _number(path: Path, first: Path) -> int:
 
 def _summary(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads((path / "run.json").read_text("utf-8"))
-    except (OSError, ValueError):
+        return read_summary(path)[0]
+    except InputError:
         return {}
-    return found if isinstance(found, dict) else {}

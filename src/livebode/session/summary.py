@@ -58,8 +58,8 @@ def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[
     """What the fits came to, and the margins of a known loop around them."""
     if fits is None:
         return {}
-    summary = {"fit": fits.summary()}
+    summary = {"fit": fits.summary(newest)}
     if newest is not None and fits.loop is not None:
         words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
-        summary["loop"] = loop_report(newest, words, responses, fits.loop, fits.section).plain()
+        summary["loop"] = loop_report(newest, words, responses, fits.loop).plain()
     return summary

@@ -11,6 +11,7 @@ import numpy as np
 from livebode.nouns import Responses
 from livebode.session.checks import ChannelCheck
 from livebode.session.continuing import Before
+from livebode.session.event_groups import EventGroups
 
 
 class Tally:
@@ -29,12 +30,14 @@ class Tally:
     ----------
     stop
         Number of the sample behind the last one that was followed.
+    groups
+        The events of each cause.
     handed_out
         The `stop` at which what was held back had been handed out.
     """
 
     def __init__(self, check: ChannelCheck, started: float, before: Before | None = None) -> None:
-        self.check = check
+        self.check, self.groups = check, EventGroups()
         self._before = {} if before is None else before.counts
         self.responses = self.invalid = self.valid_lines = 0
         self.stop = self.handed_out = 0 if before is None else before.sample
@@ -61,7 +64,8 @@ class Tally:
     def snapshot(self) -> bytes:
         """All of it as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
-        return json.dumps(numbers | {"run_s": self.run_s, "before": self._before, "check": self.check.state()}).encode()
+        parts = {"before": self._before, "check": self.check.state(), "groups": self.groups.state()}
+        return json.dumps(numbers | {"run_s": self.run_s} | parts).encode()
 
     def restore(self, snapshot: bytes) -> None:
         """Go on from a snapshot."""
@@ -71,3 +75,4 @@ class Tally:
         self._started -= state["run_s"]
         self._before = state["before"]
         self.check.load(state["check"])
+        self.groups.load(state.get("groups", {}))  # a record from before there were groups has none

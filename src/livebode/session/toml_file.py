@@ -10,7 +10,7 @@ from livebode.nouns import InputError
 
 FILE_BYTES_MAX = 1 << 20
 _SHOWN = 120
-_TEXT_MAX, _LINES_MAX, _DEPTH_MAX = 500, 20_000, 12
+_TEXT_MAX, _LINES_MAX, _DEPTH_MAX, _INTEGER_MAX = 500, 20_000, 12, 1 << 63
 
 
 def read_table(path: Path) -> dict[str, Any]:
@@ -78,6 +78,8 @@ def _check_texts(value: Any, place: str, origin: str, depth: int) -> None:
             _check_texts(inner, place, origin, depth + 1)
     elif isinstance(value, str):
         _check_text(value, place, origin)
+    elif isinstance(value, int) and abs(value) >= _INTEGER_MAX:  # TOML's own limit; Python cannot even print some
+        raise InputError(f"{origin}: {place} is a whole number of {value.bit_length()} bits, more than 63; correct it")
 
 
 def _check_text(text: str, place: str, origin: str) -> None:

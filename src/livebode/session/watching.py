@@ -30,10 +30,12 @@ class Watching:
         self._monitor, self._baseline, self._remark = monitor, baseline, remark
         self._alarms: list[str] = []
 
-    def over(self, blocks: Iterator[Block], write: Write) -> Iterator[Block]:
-        """The same blocks, each looked at before it goes on."""
+    def over(
+        self, blocks: Iterator[Block], write: Write, has_time: Callable[[], bool] = lambda: True
+    ) -> Iterator[Block]:
+        """The same blocks, each looked at beforehand; those that there is no time for are a gap to the Monitor."""
         for block in blocks:
-            if self._monitor is not None:
+            if self._monitor is not None and has_time():
                 self._publish(self._monitor.process_samples(block), write)
             yield block
 

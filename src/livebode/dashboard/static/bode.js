@@ -18,8 +18,7 @@ export class Bode {
 
   // Begin anew on these lines.
   begin(facts, unit, symbol) {
-    for (const made of this.charts) made.destroy();
-    this.curves = {};
+    this.clear();
     this.lines = facts.frequency_hz;
     this.grid = facts.grid_hz;
     this.at = this.lines.map((f) =>
@@ -35,6 +34,13 @@ export class Bode {
       this.panel(1, "phase in °", { range: () => this.limits(1) }, false, { splits: degreeTicks }),
       this.panel(2, "coherence", { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
     ];
+  }
+
+  // Nothing is shown until the next beginning.
+  clear() {
+    for (const made of this.charts) made.destroy();
+    this.charts = [];
+    this.curves = {};
   }
 
   panel(index, label, y, last, more = {}) {
@@ -189,6 +195,7 @@ export class Bode {
 
   // The next or the previous line under the cursor.
   step(by) {
+    if (!this.charts.length) return;
     this.line = Math.min(this.lines.length - 1, Math.max(0, this.line + by));
     this.tell();
     this.ring();

@@ -1,9 +1,9 @@
 // Buttons, tabs, downloads and keys: what the person can press.
+import { moment } from "./clock.js";
 import { Menu, numbers, picture } from "./download.js";
 import { keys } from "./keys.js";
 import { choose, element, segments } from "./make.js";
 import { nextTheme } from "./theme.js";
-import { moment } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = [
@@ -17,7 +17,7 @@ const SPANS = [
   ["whole", "whole"],
 ];
 
-export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain }) {
+export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain }) {
   function tab(name) {
     page.tab = name;
     for (const [value] of TABS) $(`pane-${value}`).hidden = value !== name;
@@ -108,6 +108,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     const [from, to] = whole ? [tracking.fromS, tracking.toS] : [at, at];
     return { axis: page.axis, quantity: page.quantity, format, from, to };
   };
+  const ready = (act) => () => (page.facts.begun ? act() : complain("the run has not begun"));
   const get = (format, whole) =>
     numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) =>
       complain(error.message),
@@ -115,31 +116,33 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   const menu = new Menu($("download"), $("download-menu"), [
     [
       "Bode plot as PNG",
-      () =>
+      ready(() =>
         picture(
           `${stem()}.png`,
           `${page.facts.name}: ${page.quantity}`,
-          `at ${moment(bode.curves.measured?.frame.timeS[0])}, bands are ±3σ`,
+          `at ${moment(bode.curves.measured?.frame.timeS[0], true)}, bands are ±3σ`,
           bode.charts,
         ),
+      ),
     ],
-    ["this response as CSV", () => get("csv", false)],
-    ["this response as .mat", () => get("mat", false)],
-    ["every response in the tracking's span as CSV", () => get("csv", true)],
-    ["every response in the tracking's span as .mat", () => get("mat", true)],
+    ["this response as CSV", ready(() => get("csv", false))],
+    ["this response as .mat", ready(() => get("mat", false))],
+    ["every response in the tracking's span as CSV", ready(() => get("csv", true))],
+    ["every response in the tracking's span as .mat", ready(() => get("mat", true))],
   ]);
   $("axis").addEventListener("change", () => {
     page.axis = page.wanted = Number($("axis").value);
     page.quantity = null;
     if (page.frozen) freeze();
     timeline.atS = null;
+    clear();
     say();
   });
   $("freeze").addEventListener("click", freeze);
   $("theme").addEventListener("click", nextTheme);
   $("help").addEventListener("click", () => $("keys").showModal());
   const nth = (i) => () => {
-    const q = page.facts?.quantities[i];
+    const q = page.facts?.quantities?.[i];
     if (q) watch(q.name, q.why_not);
   };
   keys(

@@ -1,7 +1,7 @@
-// Events, newest first; those that a person should act on can be acknowledged.
+// Events, one row for each cause, newest first; those that a person should act on can be acknowledged.
 import { element } from "./make.js";
 import { post } from "./link.js";
-import { moment } from "./words.js";
+import { moment } from "./clock.js";
 
 const ALARMS = new Set([
   "change",
@@ -13,8 +13,10 @@ const ALARMS = new Set([
   "overflow",
   "disconnected",
   "refused",
+  "waiting",
   "restart",
   "record-paused",
+  "backlog",
   "wrong-rate",
   "clock-jump",
   "layout-changed",
@@ -24,7 +26,7 @@ const SHOWN_MAX = 300;
 
 export class Events {
   constructor(host, only, count, onError) {
-    Object.assign(this, { host, only, count, onError, all: new Map(), waiting: new Set() });
+    Object.assign(this, { host, only, count, onError, all: new Map(), waiting: new Set(), open: 0 });
     only.addEventListener("change", () => this.draw());
     count.addEventListener("click", () => {
       only.checked = true;
@@ -43,16 +45,18 @@ export class Events {
 
   take(list) {
     for (const notice of list) {
-      this.all.set(notice.id, notice);
-      if (notice.acknowledged) this.waiting.delete(notice.id);
+      this.all.delete(notice.cause); // the newest goes to the end
+      this.all.set(notice.cause, notice);
+      if (notice.seen >= notice.count) this.waiting.delete(notice.cause);
     }
     this.draw();
   }
 
   draw() {
-    const list = [...this.all.values()].reverse(),
+    const list = [...this.all.values()].sort((a, b) => b.last_s - a.last_s),
       alarm = (n) => ALARMS.has(n.kind);
-    const open = list.filter((n) => alarm(n) && !n.acknowledged).length;
+    const open = list.filter((n) => alarm(n) && n.seen < n.count).length;
+    this.open = open;
     this.count.hidden = !open;
     this.count.textContent = `⚠ ${open} ${open === 1 ? "alarm" : "alarms"}`;
     const shown = list.filter((n) => !this.only.checked || alarm(n)).slice(0, SHOWN_MAX);
@@ -66,37 +70,46 @@ export class Events {
   }
 
   item(notice, alarm) {
-    const { id, kind, time_s: timeS, message, acknowledged } = notice;
-    let act = element("span", {}, acknowledged ? "✓ seen" : "");
-    if (!acknowledged && this.may && alarm) {
+    const { id, cause, kind, first_s: firstS, last_s: lastS, message, count, seen } = notice;
+    const open = seen < count;
+    let act = element("span", {}, open ? "" : "✓ seen");
+    if (open && this.may && alarm) {
       act = element(
         "button",
         {
           type: "button",
-          "data-event": id,
-          "aria-label": `Acknowledge: ${message}`,
-          disabled: this.waiting.has(id),
-          onclick: () => this.acknowledge(id),
+          "data-event": cause,
+          "aria-label": `Acknowledge${count > 1 ? ` all ${count}` : ""}: ${message}`,
+          disabled: this.waiting.has(cause),
+          onclick: () => this.acknowledge(cause, id),
         },
-        "Acknowledge",
+        count - seen > 1 ? `Acknowledge ${count - seen}` : "Acknowledge",
       );
     }
+    const often = element("span", { class: "often" }, `${count} times since ${moment(firstS)}`);
     return element(
       "li",
-      { class: `${alarm && !acknowledged ? "alarm" : ""}${acknowledged ? " seen" : ""}`, "data-id": id },
-      element("time", {}, moment(timeS)),
-      element("p", {}, element("span", { class: "kind" }, `${alarm ? "⚠ " : ""}${kind}`), message),
+      { class: `${alarm && open ? "alarm" : ""}${open ? "" : " seen"}`, "data-cause": cause },
+      element("time", {}, moment(lastS)),
+      element(
+        "p",
+        {},
+        element("span", { class: "kind" }, `${alarm ? "⚠ " : ""}${kind}`),
+        message,
+        ...(count > 1 ? [often] : []),
+      ),
       act,
     );
   }
 
-  async acknowledge(event) {
-    this.waiting.add(event);
+  // All of a cause up to the event that is shown.
+  async acknowledge(cause, event) {
+    this.waiting.add(cause);
     this.draw();
     try {
       await post("/api/acknowledge", { axis: this.axis, event });
     } catch (error) {
-      this.waiting.delete(event);
+      this.waiting.delete(cause);
       this.onError(error.message);
       this.draw();
     }

@@ -30,12 +30,14 @@ export function health(host, found, facts, span) {
       tile(
         "silent",
         source.silent_s === null ? "–" : ms(1000 * source.silent_s),
-        source.silent_s > 2,
+        found.stale,
         "since the last batch came",
       );
       if (source.latency_s !== null)
         tile("on the way", ms(1000 * source.latency_s), false, "this computer's clock less the sender's");
       tile("waiting", `${plain(source.waiting_bytes / 1024, 3)} KiB`, source.waiting_bytes > 1 << 20);
+      if (source.waiting_s !== undefined)
+        tile("backlog", `${source.waiting_s.toFixed(1)} s`, source.waiting_s > 2, "received and not tracked yet");
     }
   }
   if (found.behind_ms !== undefined)

@@ -1,5 +1,6 @@
 // The page: what comes from the server goes to the panels, what the person does goes to the server.
 import { Bode } from "./bode.js";
+import { setClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
 import { REFERENCE_GONE, freezing } from "./freezing.js";
@@ -15,6 +16,7 @@ import { applyTheme } from "./theme.js";
 import { Timeline } from "./timeline.js";
 import { Tracking } from "./tracking.js";
 import { Trends } from "./trends.js";
+import { lamp, verdict } from "./verdict.js";
 import { named } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
@@ -65,12 +67,11 @@ const link = new Link({
   onNews: (news) => {
     if (news.facts && overtaken(news)) return;
     if (news.error) complain(news.error);
+    if (news.span && setClock(news.span.clock_s)) newClock();
     if (news.facts) begin(news);
-    if (news.span) {
-      timeline.take(news.span);
-      status();
-    }
+    if (news.span) timeline.take(news.span);
     if (news.health && page.facts?.begun) {
+      page.health = news.health;
       health($("health"), news.health, page.facts, timeline.span);
       margins.lines = news.health.ms_at_lines;
       page.dirty.add("trends");
@@ -83,6 +84,7 @@ const link = new Link({
       }
       page.dirty.add("trends");
     }
+    if (page.facts) status();
   },
   onFrame: (frame) => {
     if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
@@ -107,7 +109,10 @@ function begin({ facts, axes, trends }) {
   if ($("axis").children.length !== axes.length)
     $("axis").replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
   if (!facts.begun) {
-    $("status-text").textContent = `${facts.name}: waiting for the first samples`;
+    page.axis = facts.axis;
+    document.title = `${facts.name} · livebode`;
+    clear();
+    events.begin(facts.axis, false);
     return;
   }
   const measured = JSON.stringify([facts.frequency_hz, facts.quantity]);
@@ -147,6 +152,27 @@ function begin({ facts, axes, trends }) {
   if (facts.watched !== page.quantity) say();
 }
 
+// What is shown is of no axis any more: another one was chosen, whose machine has perhaps never sent.
+function clear() {
+  Object.assign(page, { key: null, measured: null, past: null, seen: null, read: null, health: null });
+  if (page.facts) page.facts = { ...page.facts, begun: false, name: $("axis").selectedOptions[0]?.text ?? page.facts.name };
+  page.rows?.clear();
+  for (const panel of [bode, tracking, map]) panel.clear();
+  for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
+  parameters.begin([]);
+  margins.lines = null;
+  margins.begin([], "No samples have come yet.");
+  events.begin(page.axis, false);
+  timeline.take({ first_s: null, last_s: null, live: false, growing: false });
+  status();
+}
+
+// Whatever shows a time shows it by another clock.
+function newClock() {
+  events.draw();
+  for (const what of ["bode", "rows", "trends"]) page.dirty.add(what);
+}
+
 const whyNoMargins = (facts) =>
   facts.quantities.find((q) => q.name === "open loop").why_not
     ? "Margins need the loop: describe its controllers under [loop]."
@@ -167,11 +193,11 @@ function watch(quantity, why) {
 }
 
 function status() {
-  const { live, growing } = timeline.span,
-    paused = timeline.atS !== null;
-  const word = !page.up ? "no connection" : paused ? "paused" : live ? "live" : growing ? "being recorded" : "recorded";
-  $("lamp").className = `lamp ${!page.up ? "lost" : paused ? "paused" : live ? "live" : ""}`;
-  $("status-text").textContent = `${page.facts?.name ?? ""} · ${word}`;
+  const [word, look] = lamp(page, timeline.span, timeline.atS !== null);
+  $("lamp").className = `lamp ${look}`;
+  $("status-text").textContent = `${page.facts.name} · ${word}`;
+  const [judged, tone, why] = verdict(page, events.open, look);
+  Object.assign($("verdict"), { textContent: judged, className: `verdict ${tone}`, title: why, hidden: false });
 }
 
 function legend() {
@@ -220,8 +246,7 @@ function draw(now) {
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) map.draw(...page.seen);
   if (due("trends", 250)) {
     if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN);
-    margins.live = timeline.atS === null;
-    if (page.tab === "margins") margins.draw();
+    if (page.tab === "margins") margins.draw(timeline.atS ?? NaN);
   }
 }
 
@@ -231,6 +256,6 @@ const { fill, showMoment, goLive, drawRows } = past(
   { complain, status },
 );
 const { freeze, letGo } = freezing(page, { bode, link }, $("freeze"), legend);
-controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, complain });
-window.livebode = { page, bode, tracking, map, parameters, margins, timeline };
+controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain });
+window.livebode = { page, bode, tracking, map, parameters, margins, events, timeline };
 requestAnimationFrame(draw);

@@ -1,6 +1,7 @@
 // Position × frequency (time × frequency where nothing moves): the level, or its change against the median of the place.
+import { moment, ticks, timeLabel } from "./clock.js";
 import { onTheme, colour } from "./theme.js";
-import { hertz, moment, originOf, signed } from "./words.js";
+import { hertz, signed } from "./words.js";
 
 const CELLS = 56;
 // Cividis (Nuñez, Anderton, Renslow 2018), made to read the same with any colour vision; blue to orange for a change.
@@ -63,6 +64,12 @@ export class LineMap {
     this.schedule = schedule;
     this.cells = null;
     this.paint();
+  }
+
+  // Nothing is shown until the next beginning.
+  clear() {
+    this.begin({ frequency_hz: [] }, this.schedule);
+    this.hover.textContent = "";
   }
 
   // Sort the rows into cells.
@@ -191,15 +198,14 @@ export class LineMap {
     ctx.restore();
     ctx.textAlign = "center";
     ctx.textBaseline = "top";
-    const origin = cells.moving ? 0 : originOf(cells.low),
-      reach = cells.step * cells.columns,
-      places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4))));
-    for (let i = 0; i <= 4; i++) {
-      const value = cells.low + (reach * i) / 4 - origin;
-      ctx.fillText(Number(value.toFixed(places)).toString(), left + ((right - left) * i) / 4, bottom + 4);
-    }
+    const reach = cells.step * cells.columns,
+      places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4)))),
+      values = Array.from({ length: 5 }, (_, i) => Number((cells.low + (reach * i) / 4).toFixed(places)));
+    (cells.moving ? values.map(String) : ticks(values, reach / 4)).forEach((text, i) => {
+      ctx.fillText(text, left + ((right - left) * i) / 4, bottom + 4);
+    });
     const unit = this.schedule.unit ? ` in ${this.schedule.unit}` : "";
-    ctx.fillText(cells.moving ? `${this.schedule.name || "schedule"}${unit}` : "time in s", (left + right) / 2, h - 15);
+    ctx.fillText(cells.moving ? `${this.schedule.name || "schedule"}${unit}` : timeLabel(cells.low), (left + right) / 2, h - 15);
     for (let i = 0; i < 60; i++) {
       ctx.fillStyle = shade(stops, i / 59);
       ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6);
@@ -234,7 +240,7 @@ export class LineMap {
     const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)),
       i = Math.floor(((x - left) / (right - left)) * cells.columns);
     const place = cells.low + (i + 0.5) * cells.step;
-    this.hover.textContent = `${cells.moving ? `${place.toFixed(3)} ${this.schedule.unit}` : moment(place)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
+    this.hover.textContent = `${cells.moving ? `${place.toFixed(3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
   }
 }
 

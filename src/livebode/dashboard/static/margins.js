@@ -1,5 +1,6 @@
 // The margins of the loop with their bounds, and which of them are small.
 import { element } from "./make.js";
+import { Series } from "./series.js";
 import { bounded } from "./trends.js";
 import { hertz, plain } from "./words.js";
 
@@ -15,11 +16,11 @@ const ROWS = [
 
 export class Margins {
   constructor(host, whyNot) {
-    Object.assign(this, { host, whyNot, newest: new Map(), lines: null, live: true });
+    Object.assign(this, { host, whyNot, items: new Map(), lines: null });
   }
 
   begin(list, why) {
-    this.newest.clear();
+    this.items.clear();
     this.why = why;
     for (const trend of list) this.take(trend);
     this.draw();
@@ -27,23 +28,22 @@ export class Margins {
 
   take(trend) {
     if (trend.model !== "margins") return;
-    this.newest.set(trend.name, {
-      value: trend.value.at(-1),
-      sigma: trend.sigma.at(-1),
-      unit: trend.unit,
-      status: trend.status.at(-1),
-    });
+    if (!this.items.has(trend.name)) this.items.set(trend.name, new Series(trend));
+    this.items.get(trend.name).take(trend);
   }
 
-  draw() {
-    const { lines, live } = this,
+  // As they were at a moment, or as they are.
+  draw(atS = NaN) {
+    const { lines, items } = this,
       rows = [];
     for (const [name, words, small] of ROWS) {
-      const found = this.newest.get(name);
-      if (!found) continue;
-      const at = this.newest.get(`${name}_frequency`)?.value,
-        value = found.value ?? NaN;
-      const none = found.status === "none",
+      const found = items.get(name);
+      if (!found?.t.length) continue;
+      const row = found.at(atS),
+        beside = items.get(`${name}_frequency`);
+      const at = beside?.v[beside.at(atS)],
+        value = found.v[row];
+      const none = found.status[row] === "none",
         mark = !none && small(value);
       rows.push(
         element(
@@ -53,15 +53,15 @@ export class Margins {
           element(
             "td",
             { class: mark ? "small" : "" },
-            none ? "no limit" : `${bounded(value, found.sigma, found.unit)}${mark ? " ⚠ small" : ""}`,
+            none ? "no limit" : `${bounded(value, found.s[row], found.unit)}${mark ? " ⚠ small" : ""}`,
           ),
           element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""),
-          element("td", {}, none ? "no crossing" : found.status),
+          element("td", {}, none ? "no crossing" : found.status[row]),
         ),
       );
     }
     // It is of the newest response, so not of a moment of the past.
-    if (lines && live)
+    if (lines && !Number.isFinite(atS))
       rows.push(
         element(
           "tr",

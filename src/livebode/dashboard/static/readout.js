@@ -1,7 +1,8 @@
 // What stands at the cursor: Hz, dB, degrees, their bounds, coherence, and the distance from the reference.
+import { moment } from "./clock.js";
 import { halfDeg, highDb, holds, lowDb } from "./frames.js";
 import { element } from "./make.js";
-import { hertz, moment, signed } from "./words.js";
+import { hertz, signed } from "./words.js";
 
 const WORDS = { measured: "measured", reference: "reference", baseline: "baseline", model: "fitted model" };
 
@@ -28,7 +29,7 @@ export function readout(host, hz, found, schedule) {
   });
   const frame = found.measured?.frame;
   const words = frame
-    ? `at ${moment(frame.timeS[0])}${Number.isFinite(frame.schedule[0]) ? `, ${schedule.name || "schedule"} ${frame.schedule[0].toFixed(3)} ${schedule.unit}` : ""}` +
+    ? `at ${moment(frame.timeS[0], true)}${Number.isFinite(frame.schedule[0]) ? `, ${schedule.name || "schedule"} ${frame.schedule[0].toFixed(3)} ${schedule.unit}` : ""}` +
       `; bands are ±3σ${Number.isFinite(frame.dof[0]) || frame.dof[0] === Infinity ? ` and hold the truth with ${(100 * holds(frame.dof[0])).toFixed(2)} %` : ""}`
     : "no response yet";
   host.replaceChildren(

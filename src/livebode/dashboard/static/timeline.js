@@ -1,5 +1,5 @@
 // The moment that is shown: the newest one, or one of the record.
-import { moment } from "./words.js";
+import { moment } from "./clock.js";
 
 export class Timeline {
   constructor({ slider, pause, from, to, now }, { onMoment, onLive }) {
@@ -52,7 +52,7 @@ export class Timeline {
     this.slider.setAttribute("aria-valuetext", moment(paused ? this.atS : last));
     this.from.textContent = moment(first);
     this.to.textContent = moment(last);
-    this.now.textContent = paused ? `shown: ${moment(this.atS)}` : live ? "the newest" : "the end";
+    this.now.textContent = !Number.isFinite(first) ? "" : paused ? `shown: ${moment(this.atS, true)}` : live ? "the newest" : "the end";
     this.pause.textContent = paused ? (live ? "Live" : "The end") : "Pause";
     this.pause.classList.toggle("primary", paused);
   }

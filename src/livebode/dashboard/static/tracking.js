@@ -1,10 +1,12 @@
 // Chosen lines over time or over the position, with their bands.
 import { axis, chart, steady } from "./chart.js";
+import { moment, ticks, timeLabel } from "./clock.js";
 import { halfDeg, highDb, lowDb } from "./frames.js";
 import { element } from "./make.js";
 import { colour } from "./theme.js";
-import { hertz, moment, originOf } from "./words.js";
+import { hertz } from "./words.js";
 
+const number = (v) => Number(v.toFixed(6)).toString().replace("-", "−");
 const COLOURS = 10,
   LINES_MAX = 10,
   AT_FIRST = 6,
@@ -12,16 +14,28 @@ const COLOURS = 10,
 
 export class Tracking {
   constructor(host, chips, onMoment) {
-    Object.assign(this, { host, chips, onMoment, what: "magnitude", over: "time", chosen: [], marked: NaN });
+    Object.assign(this, { host, chips, onMoment, what: "magnitude", over: "time", chosen: [], choices: new Map(), marked: NaN });
   }
 
   begin(facts, schedule) {
+    Object.assign(this, { fromS: NaN, toS: NaN });
     this.lines = facts.frequency_hz;
     this.schedule = schedule;
-    const n = Math.min(AT_FIRST, this.lines.length);
-    const inside = this.chosen.length && this.chosen.every((i) => i < this.lines.length);
-    if (!inside)
+    this.rows = null;
+    // Each axis keeps its choice, whatever lines others have.
+    const key = JSON.stringify([facts.axis, this.lines]),
+      n = Math.min(AT_FIRST, this.lines.length);
+    this.chosen = this.choices.get(key);
+    if (!this.chosen)
       this.chosen = Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
+    this.choices.set(key, this.chosen);
+    this.drawChips();
+    this.build();
+  }
+
+  // Nothing is shown until the next beginning.
+  clear() {
+    Object.assign(this, { lines: [], chosen: [], rows: null, fromS: NaN, toS: NaN, marked: NaN });
     this.drawChips();
     this.build();
   }
@@ -51,7 +65,8 @@ export class Tracking {
   toggle(i) {
     const place = this.chosen.indexOf(i);
     if (place >= 0) this.chosen.splice(place, 1);
-    else this.chosen = [...this.chosen, i].slice(-LINES_MAX);
+    else this.chosen.push(i);
+    if (this.chosen.length > LINES_MAX) this.chosen.shift();
     this.drawChips();
     this.chips.querySelector(`[data-line="${i}"]`)?.focus();
     this.build();
@@ -76,9 +91,7 @@ export class Tracking {
         series.push({ label: edge, stroke: () => "transparent", width: 0, points: { show: false } });
       bands.push({ series: [first + 1, first + 2], fill: () => `${ink()}2e` });
     });
-    const label = byPlace
-      ? `${this.schedule.name}${this.schedule.unit ? ` in ${this.schedule.unit}` : ""}`
-      : "time in s";
+    const place = `${this.schedule.name}${this.schedule.unit ? ` in ${this.schedule.unit}` : ""}`;
     this.made = chart(
       this.host,
       {
@@ -87,10 +100,14 @@ export class Tracking {
           y: { range: () => range(...this.reach()) },
         },
         axes: [
-          axis(label, { size: 28, values: (_u, s) => s.map((v) => Number(v.toFixed(6)).toString().replace("-", "−")) }),
+          axis(() => (byPlace ? place : timeLabel(this.fromS)), {
+            size: 28,
+            space: byPlace ? 50 : 74,
+            values: (_u, splits, _i, _space, step) => (byPlace ? splits.map(number) : ticks(splits, step)),
+          }),
           axis(deg ? "phase in °" : "magnitude in dB", {
             size: 46,
-            values: (_u, s) => s.map((v) => String(v).replace("-", "−")),
+            values: (_u, s) => s.map(number),
           }),
         ],
         series,
@@ -110,7 +127,7 @@ export class Tracking {
           ? [low - 0.02 * (high - low), high + 0.02 * (high - low)]
           : [low - 1, high + 1];
     return Number.isFinite(this.fromS) && this.toS > this.fromS
-      ? [this.fromS - this.origin, this.toS - this.origin]
+      ? [this.fromS, this.toS]
       : [0, 1];
   }
 
@@ -129,7 +146,7 @@ export class Tracking {
 
   // The rows between two times; `rows` is a ring or a frame of history.
   draw(rows, fromS, toS) {
-    Object.assign(this, { rows, fromS, toS, origin: originOf(fromS) });
+    Object.assign(this, { rows, fromS, toS });
     const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter(
       (r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS,
     );
@@ -145,10 +162,10 @@ export class Tracking {
       order.forEach((r, i) => {
         // A break in the record is a break in the curve.
         if (i && rows.timeS[r] - rows.timeS[order[i - 1]] > Math.max(GAP_S, 5 * usual)) {
-          x.push(rows.timeS[r] - this.origin - 1e-3);
+          x.push(rows.timeS[r] - 1e-3);
           at.push(-1);
         }
-        x.push(rows.timeS[r] - this.origin);
+        x.push(rows.timeS[r]);
         at.push(r);
       });
     }
@@ -173,7 +190,7 @@ export class Tracking {
 
   mark(u) {
     if (this.over === "position" || !Number.isFinite(this.marked)) return;
-    const x = u.valToPos(this.marked - this.origin, "x", true),
+    const x = u.valToPos(this.marked, "x", true),
       { ctx, bbox } = u;
     if (x < bbox.left || x > bbox.left + bbox.width) return;
     ctx.save();
@@ -187,14 +204,14 @@ export class Tracking {
     ctx.textAlign = "left";
     ctx.font = `${11 * devicePixelRatio}px system-ui`;
     ctx.fillText(
-      moment(this.marked),
-      Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 60 * devicePixelRatio),
+      moment(this.marked, true),
+      Math.min(x + 5 * devicePixelRatio, bbox.left + bbox.width - 110 * devicePixelRatio),
       bbox.top + 12 * devicePixelRatio,
     );
     ctx.restore();
   }
 
   click(u) {
-    if (this.over === "time" && u.cursor.left >= 0) this.onMoment(u.posToVal(u.cursor.left, "x") + this.origin);
+    if (this.over === "time" && u.cursor.left >= 0) this.onMoment(u.posToVal(u.cursor.left, "x"));
   }
 }

@@ -1,18 +1,17 @@
 // Parameters over time with the bound that holds 95 %: a small chart for each.
 import { axis, chart } from "./chart.js";
+import { ticks } from "./clock.js";
 import { element } from "./make.js";
 import { colour } from "./theme.js";
-import { originOf, plain } from "./words.js";
+import { Series } from "./series.js";
+import { plain } from "./words.js";
 
-const BOUND = 1.959964,
-  POINTS_MAX = 1500;
+const BOUND = 1.959964;
 
 export const bounded = (value, sigma, unit) =>
   Number.isFinite(value)
     ? `${plain(value)}${Number.isFinite(sigma) && sigma > 0 ? ` ± ${plain(BOUND * sigma, 2)}` : ""}${unit ? ` ${unit}` : ""}`
     : "–";
-
-const number = (v) => (v === null ? NaN : v);
 
 export class Trends {
   // `wanted` says which parameters are shown here.
@@ -32,18 +31,9 @@ export class Trends {
   take(trend) {
     if (!this.wanted(trend)) return;
     const key = `${trend.model}\0${trend.name}`;
-    if (!this.items.has(key)) this.items.set(key, { ...trend, t: [], v: [], s: [] });
+    if (!this.items.has(key)) this.items.set(key, new Series(trend));
     const item = this.items.get(key);
-    trend.time_s.forEach((t, i) => {
-      if (item.t.length && t <= item.t.at(-1)) return;
-      item.t.push(t);
-      item.v.push(number(trend.value[i]));
-      item.s.push(number(trend.sigma[i]));
-    });
-    if (item.t.length > POINTS_MAX)
-      for (const name of ["t", "v", "s"])
-        item[name] = item[name].filter((_, i) => i % 2 === 0 || i === item[name].length - 1);
-    item.status = trend.status.at(-1);
+    item.take(trend);
     item.dirty = true;
   }
 
@@ -73,7 +63,7 @@ export class Trends {
         cursor: { show: false },
         scales: { x: { time: false }, y: { range: (_u) => reach(item) } },
         axes: [
-          axis("", { size: 18, space: 60 }),
+          axis("", { size: 18, space: 70, values: (_u, splits, _i, _space, step) => ticks(splits, step) }),
           axis("", { size: 56, space: 24, values: (_u, s) => s.map((v) => plain(v, 4)) }),
         ],
         series: [
@@ -93,29 +83,16 @@ export class Trends {
     for (const item of this.items.values()) {
       if (item.s.every((s) => s === 0 || Number.isNaN(s)) && item.s.some((s) => s === 0)) continue; // it is held at a value
       if (!item.made) this.build(item);
-      const at = nearest(item, atS);
+      const at = item.known(atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
-      item.words.textContent = Number.isFinite(item.v[at]) ? words : item.status;
+      item.words.textContent = Number.isFinite(item.v[at]) ? words : item.status[at];
       if (!item.dirty) continue;
       item.dirty = false;
-      const origin = originOf(item.t[0] ?? 0),
-        known = (v) => (Number.isFinite(v) ? v : null);
+      const known = (v) => (Number.isFinite(v) ? v : null);
       const edge = (sign) => item.v.map((v, i) => known(v + sign * BOUND * item.s[i]));
-      item.made.setData([item.t.map((t) => t - origin), item.v.map(known), edge(1), edge(-1)]);
+      item.made.setData([item.t, item.v.map(known), edge(1), edge(-1)]);
     }
   }
-}
-
-function nearest({ t, v }, atS) {
-  let best = -1;
-  if (!Number.isFinite(atS)) {
-    for (best = t.length - 1; best > 0 && !Number.isFinite(v[best]); best--);
-    return best;
-  }
-  t.forEach((time, i) => {
-    if (best < 0 || Math.abs(time - atS) < Math.abs(t[best] - atS)) best = i;
-  });
-  return best;
 }
 
 // What nine tenths of the values span, and their bounds: one odd fit does not hide the rest.

@@ -17,21 +17,6 @@ export function hertz(f) {
   return Number(f.toPrecision(5)).toString();
 }
 
-// Times since 1970 are no ticks for an axis: what to subtract from them.
-export const originOf = (firstS) => (Math.abs(firstS) >= 1e5 ? Math.floor(firstS) : 0);
-
-export function moment(timeS) {
-  if (!Number.isFinite(timeS)) return "–";
-  if (Math.abs(timeS) > 1e8) return new Date(timeS * 1000).toISOString().slice(0, 19).replace("T", " ");
-  const sign = timeS < 0 ? "−" : "",
-    size = Math.abs(timeS);
-  if (size < 120) return `${sign}${size.toFixed(2)} s`;
-  const whole = Math.floor(size),
-    hours = Math.floor(whole / 3600),
-    minutes = Math.floor(whole / 60) % 60;
-  return `${sign}${hours ? `${hours} h ` : ""}${minutes} min ${whole % 60} s`;
-}
-
 // "x in m" → name and unit.
 export function named(label) {
   const cut = label.lastIndexOf(" in ");

@@ -7,6 +7,9 @@ import errno
 import os
 from pathlib import Path
 
+from livebode.records.inside import check_own
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _WORDS = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
@@ -28,8 +31,10 @@ def why(error: OSError) -> str:
 def put_whole(path: Path, data: bytes | memoryview) -> None:
     """A file that holds all of `data` or is as it was before, also after a power cut; OSError where it is not put."""
     partial = path.with_name(f".{path.name}.partial")
+    with contextlib.suppress(FileNotFoundError):
+        os.unlink(partial)  # what a kill left; were it a link, another file would be written
     try:
-        file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+        file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         try:
             _write_all(file, data)
             os.fsync(file)
@@ -57,14 +62,20 @@ class AppendFile:
 
     Parameters
     ----------
-    path
-        Made where it is not there.
+    run, name
+        Its place in the directory of a run. Made where it is not there.
     length
         Bytes that it is cut to, when it is longer; None keeps them all.
+
+    Raises
+    ------
+    InputError
+        If it is a link or no regular file.
     """
 
-    def __init__(self, path: Path, length: int | None = None) -> None:
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    def __init__(self, run: Path, name: str, length: int | None = None) -> None:
+        check_own(run, name)
+        self._file = os.open(run / name, os.O_WRONLY | os.O_CREAT | os.O_APPEND | _NO_LINK, 0o644)
         size = os.fstat(self._file).st_size
         self.length = size if length is None else min(size, length)
         self._torn = size > self.length

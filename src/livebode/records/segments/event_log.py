@@ -29,7 +29,10 @@ class EventLog:
 
     def say(self, kind: str, sample: int, time_s: float, message: str, **details: Any) -> Event:
         """Append an event of the record itself, and keep it for `drain`."""
-        event = Event(kind, sample, time_s, message, details)
+        return self.say_event(Event(kind, sample, time_s, message, details))
+
+    def say_event(self, event: Event) -> Event:
+        """The same with an event that is there already."""
         self._said.append(event)
         self.add(event)
         return event

@@ -1,13 +1,14 @@
-"""Frames: how the journal keeps pieces apart. A frame is whole or it ends the journal."""
+"""Frames: how the journal keeps pieces apart, and finds the next whole piece behind a damaged one."""
 
 from __future__ import annotations
 
 import struct
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 
-SCHEMA, ROWS, COMMIT = 1, 2, 3
-"""A table's name and Arrow schema; an Arrow record batch of it; a moment up to which the record is complete."""
+ROWS, COMMIT, TABLE = 2, 3, 4
+"""An Arrow record batch of a table; a moment up to which the record is complete; a table's name and Arrow schema."""
 
 _HEADER = struct.Struct("<2sBBII")
 _CHECK = struct.Struct("<I")
@@ -15,10 +16,21 @@ _MAGIC = b"LB"
 _SIZE = _HEADER.size + _CHECK.size
 
 
+@dataclass(frozen=True)
+class Frame:
+    """A piece of the journal from byte `start` to `end`; `payload` is None where these bytes are damaged."""
+
+    kind: int
+    table: int
+    payload: memoryview | None
+    start: int
+    end: int
+
+
 def to_frame(kind: int, *payload: bytes | memoryview, table: int = 0) -> bytes:
     """Header (magic, kind, table, length, CRC-32 of the payload, CRC-32 of the header) and payload.
 
-    >>> [(kind, bytes(payload)) for kind, _, payload, _ in whole_frames(to_frame(COMMIT, b"a", b"b") + b"LB")]
+    >>> [(frame.kind, bytes(frame.payload)) for frame in frames(to_frame(COMMIT, b"a", b"b") + b"LB")]
     [(3, b'ab')]
     """
     check = 0
@@ -28,16 +40,47 @@ def to_frame(kind: int, *payload: bytes | memoryview, table: int = 0) -> bytes:
     return b"".join([header, _CHECK.pack(zlib.crc32(header)), *payload])
 
 
-def whole_frames(data: bytes) -> Iterator[tuple[int, int, memoryview, int]]:
-    """Kind, table, payload and end of each frame, up to the first that is damaged or cut off."""
+def frames(data: bytes) -> Iterator[Frame]:
+    """Each frame, and in its place a Frame without payload for each damaged piece, up to the end or a torn frame.
+
+    A frame whose writing was interrupted is torn: the beginning of one, at the very end. Anything else is damaged.
+    """
     view, at = memoryview(data), 0
-    while at + _SIZE <= len(view):
-        header = view[at : at + _HEADER.size]
-        magic, kind, table, length, check = _HEADER.unpack(header)
-        payload = view[at + _SIZE : at + _SIZE + length]
-        if magic != _MAGIC or _CHECK.unpack_from(view, at + _HEADER.size)[0] != zlib.crc32(header):
+    while at < len(view):
+        kind, table, length, check = _header(view, at) or (0, 0, 0, 0)
+        end = at + _SIZE + length
+        if not kind:
+            end = _next_header(data, at + 1)
+            if end == len(view) and _may_be_torn(view[at:]):
+                return
+            yield Frame(0, 0, None, at, end)
+        elif end > len(view):
             return
-        if len(payload) < length or zlib.crc32(payload) != check:
-            return
-        at += _SIZE + length
-        yield kind, table, payload, at
+        else:
+            payload = view[at + _SIZE : end]
+            yield Frame(kind, table, payload if zlib.crc32(payload) == check else None, at, end)
+        at = end
+
+
+def _header(view: memoryview, at: int) -> tuple[int, int, int, int] | None:
+    """Kind, table, length and checksum of the frame that begins here; None where no whole header does."""
+    if at + _SIZE > len(view):
+        return None
+    header = view[at : at + _HEADER.size]
+    magic, kind, table, length, check = _HEADER.unpack(header)
+    if magic != _MAGIC or not kind or _CHECK.unpack_from(view, at + _HEADER.size)[0] != zlib.crc32(header):
+        return None
+    return kind, table, length, check
+
+
+def _next_header(data: bytes, at: int) -> int:
+    view = memoryview(data)
+    while (at := data.find(_MAGIC, at)) >= 0:
+        if _header(view, at):
+            return at
+        at += 1
+    return len(data)
+
+
+def _may_be_torn(rest: memoryview) -> bool:
+    return len(rest) < _SIZE and bytes(rest[: len(_MAGIC)]) == _MAGIC[: len(rest)]

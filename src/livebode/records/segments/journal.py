@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
+import os
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pyarrow as pa
 
-from livebode.records.segments.frames import COMMIT, ROWS, SCHEMA, to_frame, whole_frames
+from livebode.nouns import InputError
+from livebode.records.inside import check_folder, read_bytes
+from livebode.records.segments.damage import Damage
+from livebode.records.segments.disk import sync_directory
+from livebode.records.segments.frames import COMMIT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.table import Table
 
-FOLDER = "open"
+FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
 
 
@@ -31,6 +38,8 @@ class Commit:
         Length of events.jsonl then.
     states
         What goes on from there, as named bytes.
+    rows
+        How many rows of each table were recorded since the run began.
     """
 
     sample: int
@@ -38,6 +47,7 @@ class Commit:
     unix_s: float
     events_bytes: int
     states: Mapping[str, bytes]
+    rows: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def position(self) -> tuple[int, int]:
@@ -45,14 +55,18 @@ class Commit:
         return self.sample, self.events_bytes
 
     def to_frame(self) -> bytes:
-        head = {"sample": self.sample, "time_s": self.time_s, "unix_s": self.unix_s, "events_bytes": self.events_bytes}
+        head = {name: getattr(self, name) for name in ("sample", "time_s", "unix_s", "events_bytes", "rows")}
         text = json.dumps(head | {"states": {name: len(state) for name, state in self.states.items()}}).encode()
         return to_frame(COMMIT, _LENGTH.pack(len(text)), text, *self.states.values())
 
     @classmethod
     def of(cls, payload: memoryview) -> Commit:
+        """The commit in this frame; ValueError, TypeError or KeyError where a run does not write such a one."""
         at = _LENGTH.size + _LENGTH.unpack_from(payload)[0]
         head = json.loads(bytes(payload[_LENGTH.size : at]))
+        whole = [head["sample"], head["events_bytes"], *head.get("rows", {}).values()]
+        if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
+            raise ValueError("a commit that a run does not write")
         states = {}
         for name, length in head.pop("states").items():
             states[name] = bytes(payload[at : at + length])
@@ -68,51 +82,134 @@ class Journal:
     ----------
     rows
         Record batches of each table.
-    commit
-        The last one, up to whose end the journal counts.
+    first, commit
+        The first and the last one; the journal counts up to the end of the last.
     length
         Bytes up to there; what is behind them was being written when it ended.
+    damages
+        Places in which it is damaged.
     """
 
     rows: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
+    first: Commit | None = None
     commit: Commit | None = None
     length: int = 0
+    damages: list[Damage] = field(default_factory=list)
+    _behind: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
+    _broken_bytes: int = 0
 
     @classmethod
-    def read(cls, path: Path) -> Journal:
-        """The journal in this file; OSError where it cannot be read."""
-        data = path.read_bytes()
-        found, names, schemas, last = cls(), [], [], None
-        waiting: list[tuple[int, memoryview]] = []
-        for kind, table, payload, end in whole_frames(data):
-            if kind == SCHEMA:
-                name, _, schema = bytes(payload).partition(b"\0")
-                names.append(name.decode())
-                schemas.append(pa.ipc.read_schema(pa.py_buffer(schema)))
-            elif kind == ROWS:
-                waiting.append((table, payload))
-            elif kind == COMMIT:
-                last, found.length = payload, end
-                for at, message in waiting:
-                    batch = pa.ipc.read_record_batch(pa.py_buffer(message), schemas[at])
-                    found.rows.setdefault(names[at], []).append(batch)
-                waiting.clear()
-        if last is not None:
-            found.commit = Commit.of(last)
-        return found
+    def read(cls, run: Path, number: int, after: Callable[[], Commit | None] = lambda: None) -> Journal:
+        """A journal of a run.
+
+        Parameters
+        ----------
+        run
+            Directory of the run.
+        number
+            Of the journal.
+        after
+            Called where the end is damaged: the commit with which the next journal begins, if there is one. It tells
+            what the damaged end held.
+
+        Raises
+        ------
+        InputError
+            If its frames are whole, and what they hold is not what a run writes.
+        OSError
+            If it cannot be read.
+        """
+        data = read_bytes(run, name_of(number))
+        try:
+            return cls()._over(frames(data), after)
+        except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
+            raise InputError(f"{str(run / name_of(number))!r} does not hold what a run writes; move it away") from None
+
+    def _over(self, found: Iterator[Frame], after: Callable[[], Commit | None]) -> Journal:
+        tables: dict[int, tuple[str, pa.Schema]] = {}
+        for frame in found:
+            if frame.payload is None or (frame.kind == ROWS and frame.table not in tables):
+                self._broken_bytes += frame.end - frame.start
+            elif frame.kind == TABLE:
+                named, _, layout = bytes(frame.payload).partition(b"\0")
+                tables[frame.table] = named.decode(), pa.ipc.read_schema(pa.py_buffer(layout))
+            elif frame.kind == ROWS:
+                name, schema = tables[frame.table]
+                batch = pa.ipc.read_record_batch(pa.py_buffer(frame.payload), schema)
+                self._behind.setdefault(name, []).append(batch)
+            elif frame.kind == COMMIT:
+                self._reach(Commit.of(frame.payload), frame.end)
+        if self._broken_bytes:
+            self._end(after())
+        return self
+
+    def _reach(self, commit: Commit, end: int) -> None:
+        if self._broken_bytes:
+            self._damaged(commit)
+        for name, batches in self._behind.items():
+            self.rows.setdefault(name, []).extend(batches)
+        self._behind.clear()
+        self.first, self.commit, self.length = self.first or commit, commit, end
+
+    def _end(self, after: Commit | None) -> None:
+        if after is not None and (self.commit is None or after.position > self.commit.position):
+            self._reach(after, self.length)
+        else:
+            self._damaged(None)
+
+    def _damaged(self, upto: Commit | None) -> None:
+        since, rows = self.commit, dict[str, int]()
+        if since is not None and upto is not None:
+            whole = {name: sum(batch.num_rows for batch in batches) for name, batches in self._behind.items()}
+            lost = {name: n - since.rows.get(name, 0) - whole.get(name, 0) for name, n in upto.rows.items()}
+            rows = {name: n for name, n in lost.items() if n > 0}
+        begin, end = (None if commit is None else (commit.sample, commit.time_s) for commit in (since, upto))
+        self.damages.append(Damage(self._broken_bytes, begin, end, rows))
+        self._broken_bytes = 0
 
 
-def head(tables: Mapping[str, Table]) -> bytes:
-    """How a journal begins: the names and schemas of its tables."""
-    return b"".join(
-        to_frame(SCHEMA, name.encode() + b"\0", table.schema.serialize().to_pybytes()) for name, table in tables.items()
-    )
+def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
+    """How a journal begins: the names and schemas of its tables, and the commit from which it goes on.
+
+    Twice, since nothing behind a damaged schema could be read.
+    """
+    schemas = [
+        to_frame(TABLE, name.encode() + b"\0", table.schema.serialize().to_pybytes(), table=number)
+        for number, (name, table) in enumerate(tables.items())
+    ]
+    return b"".join([*schemas, commit.to_frame()] * 2)
 
 
-def path_of(run: Path, number: int) -> Path:
-    return run / FOLDER / f"{number:06d}.journal"
+def read_sealed(run: Path, number: int) -> Journal:
+    """A complete journal; where its end is damaged, the next one tells what it held."""
+
+    def after() -> Commit | None:
+        return Journal.read(run, number + 1).first if number + 1 in numbers(run) else None
+
+    return Journal.read(run, number, after)
+
+
+def set_aside(run: Path, number: int) -> None:
+    """Retain a damaged journal outside of the folder in which journals are looked for."""
+    check_folder(run, set_aside_name(number))
+    with contextlib.suppress(FileExistsError):
+        os.mkdir(run / ASIDE)
+    os.replace(run / name_of(number), run / set_aside_name(number))
+    sync_directory(run / ASIDE)
+
+
+def name_of(number: int) -> str:
+    """Of a journal, in the run's directory."""
+    return f"{FOLDER}/{number:06d}.journal"
+
+
+def set_aside_name(number: int) -> str:
+    return f"{ASIDE}/{number:06d}.journal"
 
 
 def numbers(run: Path) -> list[int]:
     """Of the journals that are there, ascending."""
-    return sorted(int(path.stem) for path in (run / FOLDER).glob("*.journal") if path.stem.isdecimal())
+    check_folder(run, name_of(1))
+    names = {path.name for path in (run / FOLDER).glob("*.journal") if path.stem.isdecimal() and path.stem.isascii()}
+    found = sorted(int(name.removesuffix(".journal")) for name in names if len(name) < 20)
+    return [number for number in found if Path(name_of(number)).name in names]

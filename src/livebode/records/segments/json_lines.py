@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import zlib
+from collections.abc import Iterator
 from typing import Any
 
 from livebode.records.plain_json import to_json
 
 _KEY = ', "crc32": "'
+_END = re.compile(rb', "crc32": "[0-9a-f]{8}"\}')
 
 
 def to_line(value: dict[str, Any]) -> bytes:
@@ -37,24 +40,44 @@ def from_line(line: bytes) -> dict[str, Any]:
         text += "}"
         if rest != f'{_checksum(text)}"}}':
             raise ValueError(f"the checksum of {text[:80]!r} is wrong")
-    value = json.loads(text)
+    try:
+        value = json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
     if not isinstance(value, dict):
         raise ValueError(f"{text[:80]!r} is not an object")
     return value
 
 
-def whole_lines(data: bytes) -> tuple[list[dict[str, Any]], int]:
-    """The objects up to the first damaged line, and the bytes that they take."""
-    found, end = [], 0
-    for line in data.splitlines(keepends=True):
-        if not line.endswith(b"\n"):
-            break
+def in_line(line: bytes) -> Iterator[dict[str, Any] | bytes]:
+    """What a line holds: one object; of a damaged one the objects that are whole, and the damaged bytes between them.
+
+    Two objects share a line where the line end between them is damaged.
+
+    >>> list(in_line(b'{"kind": "gap", "crc32": "edb2896b"}*{"kind": "gap", "crc32": "edb2896b"}'))
+    [{'kind': 'gap'}, b'*', {'kind': 'gap'}]
+    """
+    try:
+        yield from_line(line)
+        return
+    except ValueError:
+        rest, at = line.rstrip(b"\n"), 0
+    for end in dict.fromkeys([*(match.end() for match in _END.finditer(rest)), len(rest)]):
+        yield from _pieces(rest[at:end])
+        at = end
+
+
+def _pieces(piece: bytes) -> Iterator[dict[str, Any] | bytes]:
+    for skipped in (0, 1):  # 1: behind what was the end of a line
         try:
-            found.append(from_line(line))
+            found = from_line(piece[skipped:])
         except ValueError:
-            break
-        end += len(line)
-    return found, end
+            continue
+        if skipped:
+            yield piece[:skipped]
+        yield found
+        return
+    yield piece
 
 
 def _checksum(text: str) -> str:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Sequence
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from livebode.nouns import InputError
-from livebode.records.segments.json_lines import to_line, whole_lines
+from livebode.nouns import Event, InputError
+from livebode.records.inside import read_bytes
+from livebode.records.segments import journal
+from livebode.records.segments.damage import Damage, event_of
+from livebode.records.segments.journal import Journal
+from livebode.records.segments.json_lines import in_line, to_line
 
 NAME = "manifest.jsonl"
+TABLES = ("responses", "parameters", "samples")
+_SHA256 = re.compile("[0-9a-f]{64}")
+_COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
 
 
 @dataclass(frozen=True)
@@ -33,61 +40,134 @@ class Segment:
     size_bytes: int
     sha256: str
 
-    def read(self, run: Path) -> pa.Table:
-        """Its rows; InputError where the file is not what the manifest says, FileNotFoundError where it is gone."""
-        path = run / self.name
-        data = path.read_bytes()
-        if len(data) != self.size_bytes or hashlib.sha256(data).hexdigest() != self.sha256:
-            raise InputError(f"{str(path)!r} is damaged: its checksum is not that of the manifest")
-        # Without Arrow's threads, which a short process may not outlive in peace.
-        return pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
+    @classmethod
+    def of(cls, number: int, values: Mapping[str, Any]) -> Segment:
+        """The segment that a line names; ValueError where a run does not write such a one."""
+        found = cls(**values)
+        numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
+        sound = (
+            found.table in TABLES
+            and found.name == name_of(found.table, number)
+            and all(type(value) is int for value in numbers[:4])
+            and all(type(value) in (int, float) and math.isfinite(value) for value in numbers)
+            and _SHA256.fullmatch(found.sha256)
+        )
+        if not sound or found.rows < 1 or found.size_bytes < 1:
+            raise ValueError("a segment that a run does not write")
+        return found
+
+
+@dataclass(frozen=True)
+class Retained:
+    """A damaged journal that was closed: its number, its size, and its damaged places."""
+
+    number: int
+    size_bytes: int
+    damages: tuple[Damage, ...]
+
+    @classmethod
+    def of(cls, number: int, values: Mapping[str, Any]) -> Retained:
+        return cls(number, int(values["size_bytes"]), tuple(Damage.of(place) for place in values["places"]))
+
+    @classmethod
+    def of_journal(cls, run: Path, number: int, read: Journal) -> Retained | None:
+        """None where it is whole."""
+        if not read.damages:
+            return None
+        return cls(number, (run / journal.name_of(number)).stat().st_size, tuple(read.damages))
+
+    @property
+    def event(self) -> Event:
+        """What is to be said of it."""
+        return event_of(journal.name_of(self.number), self.damages, journal.set_aside_name(self.number))
 
 
 @dataclass
 class Manifest:
     """What manifest.jsonl says.
 
-    `segments` are those that stand, by age, `closed` the numbers of the journals that they came from; `length` is that
-    of its whole lines, and `torn` what is behind them.
+    `segments` are those that are recorded, by age, `gone` those that made room, `closed` the numbers of the journals
+    that they came from, `retained` the damaged ones among them. `length` is that of its complete lines, `torn` what is
+    behind them, and `broken` the damaged lines, by the number of the line.
     """
 
     segments: list[Segment] = field(default_factory=list)
+    gone: list[Segment] = field(default_factory=list)
     closed: set[int] = field(default_factory=set)
+    retained: list[Retained] = field(default_factory=list)
     length: int = 0
     torn: bytes = b""
+    broken: list[int] = field(default_factory=list)
+    _removed: set[str] = field(default_factory=set)
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
-        """Up to the first damaged line; OSError where there is none."""
-        data = (run / NAME).read_bytes()
-        lines, length = whole_lines(data)
-        found = cls(length=length, torn=data[length:])
-        for line in lines:
-            if "closed" in line:
-                found.closed.add(line["closed"])
-                found.segments += [Segment(**segment) for segment in line["segments"]]
-            else:
-                gone = set(line["removed"])
-                found.segments = [segment for segment in found.segments if segment.name not in gone]
+        """All lines that are whole; OSError where there is no file."""
+        data = read_bytes(run, NAME)
+        length = data.rfind(b"\n") + 1
+        found, before = cls(length=length, torn=data[length:]), b""
+        for number, line in enumerate(data.splitlines(keepends=True), 1):
+            if line != before:  # each is there twice
+                found._take(line, number)
+            before = line
+        found.gone = [segment for segment in found.segments if segment.name in found._removed]
+        found.segments = [segment for segment in found.segments if segment.name not in found._removed]
         return found
 
-    def check(self, run: Path, journals: Sequence[int], *, finished: bool) -> None:
-        """InputError where a line is missing that was written whole once: what it names would be forgotten.
+    def _take(self, line: bytes, number: int) -> None:
+        for value in in_line(line):
+            try:
+                if isinstance(value, bytes):
+                    raise ValueError
+                self._add(value)
+            except (ValueError, TypeError, KeyError, AttributeError):
+                if line.endswith(b"\n"):
+                    self.broken.append(number)
 
-        `journals` are the numbers of those that are there. A line may be torn at the end, where the journal that it was
-        to close is still there.
+    def _add(self, value: Mapping[str, Any]) -> None:
+        if "removed" in value:
+            self._removed |= set(value["removed"])
+            return
+        number = value["closed"]
+        if type(number) is not int or not 0 < number < 10**9:
+            raise ValueError
+        segments = [Segment.of(number, segment) for segment in value["segments"]]
+        retained = [Retained.of(number, value["retained"])] if "retained" in value else []
+        if number not in self.closed:
+            self.closed.add(number)
+            self.segments += segments
+            self.retained += retained
+
+    @property
+    def missing(self) -> list[tuple[int, int]]:
+        """First and last numbers of closed journals whose line is damaged, so that what it names is not known."""
+        known = [0, *sorted(self.closed)] if self.broken else []
+        return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
+
+    def check(self, run: Path, journals: Sequence[int]) -> None:
+        """InputError where lines are missing that were written once: what they name would be forgotten.
+
+        `journals` are the numbers of those that are there.
         """
-        whole = not self.torn if finished else self.torn.count(b"\n") < 2
-        if not whole or min(journals, default=0) > max(self.closed, default=0) + 1:
+        if not self.broken and min(journals, default=0) > max(self.closed, default=0) + 1:
             raise InputError(f"{str(run / NAME)!r} is damaged after byte {self.length}; restore it")
 
 
-def closing_line(journal: int, segments: Iterable[Segment]) -> bytes:
-    """A journal's rows are in these segments from now on."""
-    return to_line({"closed": journal, "segments": [asdict(segment) for segment in segments]})
+def name_of(table: str, number: int) -> str:
+    """The file of a table's rows from a journal, in the run's directory."""
+    return f"{table}/{number:06d}.parquet"
+
+
+def closing_line(number: int, segments: Iterable[Segment], retained: Retained | None) -> bytes:
+    """A journal's rows are in these segments from now on; twice, since nothing else names them."""
+    line: dict[str, Any] = {"closed": number, "segments": [asdict(segment) for segment in segments]}
+    if retained is not None:
+        places = [place.to_json() for place in retained.damages]
+        line["retained"] = {"size_bytes": retained.size_bytes, "places": places}
+    return to_line(line) * 2
 
 
 def removal_line(segments: Iterable[Segment]) -> bytes:
-    """These segments were removed to keep the disk budget."""
+    """These segments were removed to keep the disk budget; twice as well."""
     gone = list(segments)
-    return to_line({"removed": [s.name for s in gone], "size_bytes": sum(s.size_bytes for s in gone)})
+    return to_line({"removed": [s.name for s in gone], "size_bytes": sum(s.size_bytes for s in gone)}) * 2

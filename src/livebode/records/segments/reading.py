@@ -1,61 +1,116 @@
-"""Reading a record in segments, also while it is being written."""
+"""Reading a record in segments, also while it is being written. What is damaged is told, and the rest is read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 
+from livebode.nouns import Event, InputError
+from livebode.records.inside import is_folder
 from livebode.records.segments import journal
+from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal
-from livebode.records.segments.manifest import Manifest, Segment
+from livebode.records.segments.manifest import NAME, Manifest, Segment
+from livebode.records.segments.segment_file import open_segment
+
+_ROWS = 1 << 14
+Tell = Callable[[Event], None]
 
 
 def in_segments(run: Path) -> bool:
     """Whether this run is kept in segments."""
-    return (run / journal.FOLDER).is_dir()
+    return is_folder(run / journal.FOLDER)
 
 
-def parts(run: Path, table: str, *, finished: bool) -> tuple[list[Segment], list[pa.Table]]:
-    """Closed segments of a table, by age, and the rows behind them that are still in a journal."""
+Rows = dict[str, list[pa.RecordBatch]]
+
+
+def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
+    """Closed segments of all tables, by age, and the rows of each behind them that are still in a journal."""
     # The newest first: what is before a journal that is there is complete. And before the manifest: a journal that is
     # closed in between is then in both, and not in neither.
-    journals = {number: _read(run, number) for number in reversed(journal.numbers(run))}
+    journals: dict[int, Journal] = {}
+    for number in reversed(journal.numbers(run)):
+        following = journals.get(number + 1)
+        journals[number] = _read(run, number, following, tell)
     found = Manifest.read(run)
-    found.check(run, list(journals), finished=finished)
-    rows = [
-        pa.Table.from_batches(journals[number].rows[table])
-        for number in sorted(journals)
-        if number not in found.closed and table in journals[number].rows
-    ]
-    return [segment for segment in found.segments if segment.table == table], rows
+    found.check(run, list(journals))
+    _tell_of(found, finished, tell)
+    left = [number for number in sorted(journals) if number not in found.closed]
+    for number in left:
+        if places := journals[number].damages:
+            tell(event_of(journal.name_of(number), places, None))
+    rows: Rows = {}
+    for number in left:
+        for table, batches in journals[number].rows.items():
+            rows.setdefault(table, []).extend(batches)
+    return found.segments, rows
 
 
 def tables(
-    run: Path, table: str, size_bytes_max: int | None, span_s: tuple[float, float] | None = None, *, finished: bool
+    run: Path,
+    table: str,
+    tell: Tell,
+    size_bytes_max: int | None,
+    span_s: tuple[float, float] | None = None,
+    *,
+    finished: bool,
 ) -> Iterator[pa.Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
-    segments outside of that time.
+    segments outside of that time. A damaged segment is told and left out.
 
     Raises
     ------
     InputError
-        If a segment is not what the manifest says, or the manifest is damaged.
+        If the record holds what a run does not write.
     OSError
         If something cannot be read.
     """
-    segments, rows = parts(run, table, finished=finished)
+    segments, rows = parts(run, tell, finished=finished)
+    segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
-    for segment in segments if size_bytes_max is None else _newest(segments, size_bytes_max):
-        try:
-            yield segment.read(run)
-        except FileNotFoundError:
-            if segment in Manifest.read(run).segments:
-                raise
-            # It was removed to keep the budget since we looked.
-    yield from rows
+    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), tell)
+    if table in rows:
+        yield pa.Table.from_batches(rows[table])
+
+
+def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table]:
+    """The rows of segments, small ones together: what is done with each part costs more than its rows."""
+    held: list[pa.Table] = []
+    for segment in segments:
+        if (file := whole(run, segment, tell)) is None:
+            continue
+        # Without Arrow's threads, which a short process may not outlive in peace.
+        held.append(file.read(use_threads=False))
+        if sum(table.num_rows for table in held) >= _ROWS:
+            yield pa.concat_tables(held)
+            held = []
+    if held:
+        yield pa.concat_tables(held)
+
+
+def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
+    """The file of a segment; None where it is damaged, which is told, or was removed to keep the budget."""
+    try:
+        return open_segment(run, segment)
+    except FileNotFoundError:
+        if segment not in Manifest.read(run).segments:
+            return None  # it was removed since we looked
+        why = "it is gone"
+    except (InputError, OSError) as error:
+        why = str(error)
+    lost = f"{segment.rows} rows of {segment.table} of samples {segment.first_sample} to {segment.last_sample}"
+    details = {
+        "file": segment.name, "rows": {segment.table: segment.rows}, "seconds": segment.last_s - segment.first_s,
+        "samples": segment.last_sample - segment.first_sample + 1,
+    }  # fmt: skip
+    message = f"{segment.name} is damaged: {why}; {lost} ({details['seconds']:.4g} s) are not read"
+    tell(Event(KIND, segment.first_sample, segment.first_s, message, details))
+    return None
 
 
 def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:
@@ -65,8 +120,20 @@ def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:
     return segments[at:]
 
 
-def _read(run: Path, number: int) -> Journal:
+def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Journal:
     try:
-        return Journal.read(journal.path_of(run, number))
+        return Journal.read(run, number, lambda: None if following is None else following.first)
     except FileNotFoundError:  # it was closed since we looked
         return Journal()
+    except InputError as error:
+        tell(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
+        return Journal()
+
+
+def _tell_of(found: Manifest, finished: bool, tell: Tell) -> None:
+    if not found.broken and not (finished and found.torn):
+        return
+    lines = ", ".join(map(str, found.broken)) or "the last"
+    lost = ", ".join(f"{first} to {last}" for first, last in found.missing)
+    what = f"the segments of journals {lost} are not read" if lost else "each is there twice, so that nothing is lost"
+    tell(Event(KIND, 0, 0.0, f"{NAME} is damaged in line {lines}; {what}", {"file": NAME, "lines": found.broken}))

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.nouns import InputError
+from livebode.records.removal import foreign, remove
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.shelf import sweep
+from livebode.records.summary_file import RUN, read_summary
 
-RUN, EVENTS = "run.json", "events.jsonl"
+EVENTS = "events.jsonl"
 
 
 @dataclass(frozen=True)
 class Found:
     """What a run left.
 
-    `number` and `length` are those of the journal that is gone on with, up to its last commit; `sealed` are the
-    numbers of complete ones before it; `torn_bytes` were being written, behind the commit, when the run ended.
+    `commit` is the last one that is whole. The run goes on in journal `number`, up to `length`; where that is None, in
+    a new one. `sealed` are the numbers of those to be closed, complete or damaged; `torn_bytes` were being written,
+    behind the commit, when the run ended.
     """
 
     manifest: Manifest
     number: int
-    length: int
+    length: int | None
     commit: Commit
     sealed: list[int]
     torn_bytes: int
@@ -40,29 +40,35 @@ def recover(run: Path) -> Found | None:
     Raises
     ------
     InputError
-        If it holds something else, or a run that is finished, or one whose journal is damaged.
+        If it holds something else, or a run that is finished, or one that has no whole commit.
     OSError
         If it cannot be read.
     """
-    if not (run / RUN).exists():
+    if not os.path.lexists(run / RUN):
         _clear(run)
         return None
-    if not (run / manifest.NAME).exists() or json.loads((run / RUN).read_text("utf-8"))["record"]["finished"]:
+    if not (run / manifest.NAME).exists() or read_summary(run)[0].get("record", {}).get("finished", True):
         raise InputError(f"the run in {str(run)!r} is finished; take another --out, or --force to replace it")
     found = Manifest.read(run)
-    found.check(run, journal.numbers(run), finished=False)
+    found.check(run, journal.numbers(run))
     sweep(run, found)
     left = [number for number in journal.numbers(run) if number not in found.closed]
+    damaged: list[int] = []
     while left:
         number = left.pop()
-        read = Journal.read(journal.path_of(run, number))
-        before = Journal.read(journal.path_of(run, left[-1])).commit if left else None
+        read = Journal.read(run, number)
+        before = journal.read_sealed(run, left[-1]).commit if left else None
         if read.commit is None or (before is not None and before.position > read.commit.position):
-            # It was begun, but what came after went to the one before it.
-            os.unlink(journal.path_of(run, number))
+            if read.damages:
+                damaged.insert(0, number)
+            else:  # It was begun, but what came after went to the one before it.
+                os.unlink(run / journal.name_of(number))
             continue
-        torn = journal.path_of(run, number).stat().st_size - read.length
+        torn = (run / journal.name_of(number)).stat().st_size - read.length
         torn += max(0, (run / EVENTS).stat().st_size - read.commit.events_bytes)
+        if damaged or read.damages:
+            sealed = [*left, number, *damaged]
+            return Found(found, sealed[-1] + 1, None, read.commit, sealed, torn)
         return Found(found, number, read.length, read.commit, left, torn)
     raise InputError(f"the run in {str(run)!r} has no whole journal left to go on from; take another --out")
 
@@ -70,9 +76,6 @@ def recover(run: Path) -> Found | None:
 def _clear(run: Path) -> None:
     """Take away what a run left that was killed while it was begun; InputError where anything else is there."""
     ours = {manifest.NAME, EVENTS, journal.FOLDER, f".{RUN}.partial"}
-    if strange := sorted(path.name for path in run.iterdir() if path.name not in ours):
+    if strange := sorted({path.name for path in run.iterdir()} - ours) or foreign(run):
         raise InputError(f"{str(run)!r} holds {strange[0]!r} and no run; take another --out")
-    shutil.rmtree(run / journal.FOLDER, ignore_errors=True)
-    for name in ours - {journal.FOLDER}:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(run / name)
+    remove(run, itself=False)

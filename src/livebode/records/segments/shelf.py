@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import os
@@ -11,10 +12,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory
-from livebode.records.segments.journal import Journal
-from livebode.records.segments.manifest import Manifest, Segment
+from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.table import Table
 
 FIRST_TO_GO = "samples"
@@ -40,15 +41,27 @@ class Shelf:
 
     def __init__(self, run: Path, tables: Mapping[str, Table], found: Manifest, sealed: list[int]) -> None:
         self._run, self._tables = run, tables
-        self._file = AppendFile(run / manifest.NAME, found.length)
+        self._file = AppendFile(run, manifest.NAME, found.length)
         self._segments = list(found.segments)
+        self._retained = list(found.retained)
         self._sealed = list(sealed)
-        self._unwanted: list[Path] = []
+        self._unwanted: list[str] = []
 
     @property
     def used_bytes(self) -> int:
-        """Of the manifest and the segments that stand."""
-        return self._file.length + sum(segment.size_bytes for segment in self._segments)
+        """Of the manifest, the segments that are recorded and the damaged journals that are retained."""
+        sizes = [one.size_bytes for one in self._segments] + [one.size_bytes for one in self._retained]
+        return self._file.length + sum(sizes)
+
+    @property
+    def retained(self) -> list[Retained]:
+        """Journals that were damaged when they were closed."""
+        return list(self._retained)
+
+    @property
+    def sealed(self) -> list[int]:
+        """Numbers of the journals that are still to be closed."""
+        return list(self._sealed)
 
     def seal(self, number: int) -> None:
         """This journal is complete; another one goes on."""
@@ -74,34 +87,39 @@ class Shelf:
         if gone:
             self._file.append_synced(manifest.removal_line(gone))
             self._segments = [segment for segment in self._segments if segment not in gone]
-            self.discard(*(self._run / segment.name for segment in gone))
+            self.discard(*(segment.name for segment in gone))
         return gone
 
-    def discard(self, *paths: Path) -> None:
+    def discard(self, *names: str) -> None:
         """Remove files that nobody counts; those that cannot be removed now are tried again the next time."""
-        self._unwanted = [path for path in (*self._unwanted, *paths) if not _removed(path)]
+        self._unwanted = [name for name in (*self._unwanted, *names) if not _removed(self._run, name)]
 
     def close(self) -> None:
         """Close the manifest."""
         self._file.close()
 
     def _turn(self, number: int) -> None:
-        path = journal.path_of(self._run, number)
-        rows = Journal.read(path).rows
-        segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in rows.items()]
-        self._file.append_synced(manifest.closing_line(number, segments))
+        read = journal.read_sealed(self._run, number)
+        segments = [self._put(number, table, pa.Table.from_batches(batches)) for table, batches in read.rows.items()]
+        retained = Retained.of_journal(self._run, number, read)
+        self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
-        self.discard(path)
+        if retained is None:
+            self.discard(journal.name_of(number))
+        else:
+            self._retained.append(retained)
+            with contextlib.suppress(OSError):  # then it is done when the run is continued
+                journal.set_aside(self._run, number)
 
     def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
         folder = self._run / table
-        if not folder.is_dir():
+        if not is_folder(folder):
             os.mkdir(folder)
             sync_directory(self._run)
         sink = pa.BufferOutputStream()
         pq.write_table(rows, sink, compression="lz4", use_dictionary=list(self._tables[table].repeating))
         data = memoryview(sink.getvalue())
-        name = f"{table}/{number:06d}.parquet"
+        name = manifest.name_of(table, number)
         put_whole(self._run / name, data)
         sample, time_s = rows["sample"], rows["time_s"]
         return Segment(
@@ -118,19 +136,24 @@ class Shelf:
 
 
 def sweep(run: Path, found: Manifest) -> None:
-    """Remove files that a kill left between two steps: half written ones, closed journals, segments nobody counts."""
-    known = {segment.name for segment in found.segments}
-    for path in [*run.glob(".*.partial"), *run.glob("*/.*.partial"), *run.glob("*/[0-9]*.parquet")]:
-        if path.relative_to(run).as_posix() not in known:
-            _removed(path)
+    """Remove what a kill left between two steps: segments that the manifest says are removed, and closed journals.
+
+    What else a kill leaves is written again under the same name.
+    """
+    for segment in found.gone:
+        _removed(run, segment.name)
+    retained = {one.number for one in found.retained}
     for number in journal.numbers(run):
-        if number in found.closed:
-            _removed(journal.path_of(run, number))
+        if number in retained:
+            journal.set_aside(run, number)
+        elif number in found.closed:
+            _removed(run, journal.name_of(number))
 
 
-def _removed(path: Path) -> bool:
+def _removed(run: Path, name: str) -> bool:
     try:
-        os.unlink(path)
+        check_folder(run, name)
+        os.unlink(run / name)
     except OSError as error:
         return error.errno == errno.ENOENT
     return True

@@ -12,19 +12,21 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.nouns import Event, InputError
-from livebode.records.plain_json import to_json
+from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing
+from livebode.records.segments.damage import total
 from livebode.records.segments.disk import AppendFile, put_whole, sync_directory, why
 from livebode.records.segments.event_log import EventLog
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
-from livebode.records.segments.recovery import EVENTS, RUN, Found, recover
+from livebode.records.segments.recovery import EVENTS, Found, recover
 from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import Waiting
+from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table import Table
 
 
@@ -64,6 +66,7 @@ class Store:
         self._waiting = Waiting(tuple(self._tables))
         self._log = EventLog()
         self._pause: Event | None = None
+        self._attempts = 0  # to close a segment that failed since the last one that was closed
         self._committed_s = self._synced_s = 0.0
         self._syncing = Syncing()
 
@@ -121,7 +124,7 @@ class Store:
         try:
             self._settle(self._syncing.done())
             self._log.write(self._events)
-            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states))
+            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states), dict(self._waiting.rows))
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             parts = self._waiting.written()
             full = self._full(sample)
@@ -137,8 +140,10 @@ class Store:
         self._go_on_after_pause(sample, time_s)
         if full:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
-            with contextlib.suppress(OSError):
+            try:
                 self._close_segment()
+            except OSError as error:
+                self._not_closed(error, "with the next commit")
         elif self._closing.done:
             self._closed()
         return True
@@ -162,7 +167,7 @@ class Store:
             self._not_paused()
             self._write_summary(summary, finished=finished)
             if finished:
-                self._shelf.discard(journal.path_of(self.path, self._number))
+                self._shelf.discard(journal.name_of(self._number))
 
     def _not_paused(self) -> None:
         if self._pause is not None:
@@ -173,12 +178,18 @@ class Store:
         return self._journal.length >= limits.journal_bytes_max or sample - self._began >= limits.segment_samples
 
     def _go_on(self, found: Found) -> None:
-        self.last, self._number = found.commit, found.number
+        self.last = found.commit
+        self._waiting.rows |= found.commit.rows
         self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
-        self._journal = AppendFile(journal.path_of(self.path, found.number), found.length)
+        if found.length is None:
+            self._open_journal(found.number, found.commit)
+        else:
+            self._journal = AppendFile(self.path, journal.name_of(found.number), found.length)
+            self._number, self._safe_bytes = found.number, found.length
+            self._began = self._committed = found.commit.sample
         self._files.callback(self._close_open_journal)
-        self._safe_bytes = found.length
-        self._began = self._committed = found.commit.sample
+        if found.sealed:
+            self._begin_closing()
         away_s = max(0.0, time.time() - found.commit.unix_s)
         self._log.say(
             "record-continued",
@@ -194,17 +205,24 @@ class Store:
         self._files.callback(self._shelf.close)
         self._closing = Closing(self._shelf)
         self._files.callback(self._closing.wait)
-        self._events = AppendFile(self.path / EVENTS, events_bytes)
+        self._named = len(found.retained)
+        self._events = AppendFile(self.path, EVENTS, events_bytes)
         self._files.callback(self._events.close)
 
     def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
-        text = to_json(summary | {"record": {"finished": finished, "tables": list(self._tables)}}, indent=2) + "\n"
-        put_whole(self.path / RUN, text.encode())
+        record: dict[str, Any] = {"finished": finished, "tables": list(self._tables)}
+        if retained := self._shelf.retained:
+            places = [place for one in retained for place in one.damages]
+            record["damaged"] = {"files": [journal.set_aside_name(one.number) for one in retained], **total(places)}
+        data = to_document(summary | {"record": record})
+        for name in (RUN, COPY):
+            put_whole(self.path / name, data)
 
     def _open_journal(self, number: int, commit: Commit) -> None:
-        path = journal.path_of(self.path, number)
-        put_whole(path, journal.head(self._tables) + commit.to_frame())
-        self._journal, self._number = AppendFile(path), number
+        name = journal.name_of(number)
+        check_own(self.path, name)
+        put_whole(self.path / name, journal.head(self._tables, commit))
+        self._journal, self._number = AppendFile(self.path, name), number
         self._safe_bytes = self._journal.length
         self._began = self._committed = commit.sample
 
@@ -232,13 +250,19 @@ class Store:
         self._open_journal(number + 1, self.last)
         before.close()
         self._shelf.seal(number)
+        self._begin_closing()
+
+    def _begin_closing(self) -> None:
         budget = self.limits.budget_bytes
         used = self._events.length + JOURNALS * self.limits.journal_bytes_max
         self._closing.begin(None if budget is None else budget - used)
 
     def _closed(self) -> OSError | None:
-        """Wait until the journal before is turned, and say what was removed; what the disk said where it refused."""
+        """Wait until the journal before is turned, and say what was removed or damaged; the error where it failed."""
         gone, error = self._closing.result()
+        for retained in self._shelf.retained[self._named :]:
+            self._log.say_event(retained.event)
+            self._named += 1
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
@@ -249,7 +273,37 @@ class Store:
                 f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
                 removed=[segment.name for segment in gone],
             )
+        if error is not None:
+            self._not_closed(
+                error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
+            )
+        elif self._attempts and not self._shelf.sealed:
+            self._say_closed()
         return error
+
+    def _not_closed(self, error: OSError, retried: str) -> None:
+        """Say that a segment cannot be closed: the first, second, fourth, eighth … time."""
+        self._attempts += 1
+        if self._attempts & (self._attempts - 1):
+            return
+        assert self.last is not None
+        waiting = [*self._shelf.sealed, self._number]
+        self._log.say(
+            "record-unclosed",
+            self.last.sample,
+            self.last.time_s,
+            f"no segment could be closed: {why(error)} (attempt {self._attempts}); it is retried {retried}, and the "
+            f"record remains in {len(waiting)} journal{'s' * (len(waiting) > 1)}",
+            attempts=self._attempts,
+            journals=waiting,
+            errno=error.errno,
+        )
+
+    def _say_closed(self) -> None:
+        assert self.last is not None
+        message = f"segments are closed again, after {self._attempts} failed attempt{'s' * (self._attempts > 1)}"
+        self._log.say("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
+        self._attempts = 0
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
         with contextlib.suppress(OSError):  # what was being synced may be safe all the same

@@ -26,15 +26,22 @@ class Waiting:
     ----------
     tables
         Names, in the order of the journal's schemas.
+
+    Attributes
+    ----------
+    rows
+        Of each table since the run began, but for those that were given up.
+    lost
+        Rows, first and last sample of what was given up, for each table.
     """
 
     def __init__(self, tables: tuple[str, ...]) -> None:
         self._tables = tables
+        self.rows = dict.fromkeys(tables, 0)
         self._new: dict[str, list[pa.RecordBatch]] = {}
         self._parts: list[_Part] = []
         self._written = 0
         self.lost: dict[str, dict[str, int]] = {}
-        """Rows, first and last sample of what was given up, for each table."""
 
     def add(self, table: str, batch: pa.RecordBatch) -> None:
         if batch.num_rows:
@@ -46,6 +53,7 @@ class Waiting:
             batch = pa.concat_batches(batches)
             sample = to_numpy(batch["sample"])
             frame = to_frame(ROWS, memoryview(batch.serialize()), table=self._tables.index(table))
+            self.rows[table] += batch.num_rows
             self._parts.append(_Part(table, frame, batch.num_rows, int(sample.min()), int(sample.max())))
         self._new.clear()
 
@@ -75,6 +83,7 @@ class Waiting:
         for part in self._parts:
             sum_ = self.lost.setdefault(part.table, {"rows": 0, "first_sample": part.first_sample})
             sum_["rows"] += part.rows
+            self.rows[part.table] -= part.rows
             sum_["last_sample"] = part.last_sample
         self._parts.clear()
 

@@ -8,7 +8,7 @@ from math import hypot, isfinite
 import numpy as np
 
 from livebode.fitting import Fit
-from livebode.margins import Margins, OpenLoop, margins
+from livebode.margins import Margins, OpenLoop, against_lines, margins
 from livebode.nouns import InputError
 from livebode.session.axis import FitSection, LoopSection
 from livebode.session.fits import fit_averaged
@@ -98,7 +98,8 @@ def _margins(fit: Fit, loop: LoopSection) -> Margins | None:
     built = loop.build(fit.rate_hz)
     if built.feedback is None:
         return None
-    return margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
+    found = margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
+    return found if fit.measured is None else against_lines(found, fit.measured, built)
 
 
 def _rows(found: Margins) -> dict[str, tuple[float, float, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.fitting import RunningMean
-from livebode.nouns import InputError, Lines, Response, Responses, widened
+from livebode.nouns import PER_LINE, InputError, Lines, Response, Responses, widened
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import TrackingSection
@@ -242,7 +242,7 @@ def _by_place(run: Run, span: tuple[float, float]) -> dict[tuple[int, bool], Res
 
 def _on(one: Response, lines: Lines, at: NDArray[np.intp]) -> Response:
     """The response at some of its lines."""
-    rows = {name: getattr(one, name)[at] for name in ("value", "sigma", "coherence", "valid")}
+    rows = {name: getattr(one, name)[at] for name in PER_LINE}
     return replace(one, lines=lines, **rows)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from livebode.nouns import Event
 from livebode.nouns.clock import moment
 from livebode.nouns.document import Paragraph, Part, Table
+from livebode.session.event_groups import each_event
 from livebode.session.reporting.wording import many
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
@@ -39,7 +40,8 @@ class EventSummary:
     def of(cls, events: Iterable[Event]) -> EventSummary:
         found = cls()
         for event in events:
-            found._add(event)
+            for one in each_event(event):
+                found._add(one)
         return found
 
     def _add(self, event: Event) -> None:

@@ -104,7 +104,7 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
-    happenings = EventSummary.of(run.each_event())
+    happenings = EventSummary.of(run.each_event_and_damage())
     return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
 
 
@@ -124,9 +124,8 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
         return None, "No margins: the run's configuration does not describe the loop ([loop])."
     if fit is None:
         return None, "No margins: they are read around a fitted model, and there is none."
-    section = FitSection.model_validate(configuration["fit"])
     try:
-        found = loop_report(fit, "the mean", of.overview, described, section)
+        found = loop_report(fit, "the mean", of.overview, described)
     except InputError as error:
         return None, f"No margins: {error}."
     return replace(found, responses=Responses.of(of.response)), ""

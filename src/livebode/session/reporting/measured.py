@@ -15,7 +15,9 @@ _ESTIMATOR = {
 }
 _NOISE = {
     "periods": "the scatter between windows that lie whole periods apart",
-    "quiet": "the quiet bins beside each line",
+    "auto": "the scatter between windows that lie whole periods apart; where the schedule moves, detection lines "
+    "(non-excited bins)",
+    "quiet": "detection lines (non-excited bins), at standstill the scatter between periods where it is larger",
 }
 _ROLES = {"excitation": "excitation w", "input": "plant input u", "output": "output y", "schedule": "schedule"}
 

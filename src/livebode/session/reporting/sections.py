@@ -77,7 +77,7 @@ def parameters(of: Material) -> Section | str:
         mean = with_bound(*fitted[name]) if name in fitted else ("held" if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
         rows.append((name.replace("_", " "), *mean, *late, units.get(name) or (now.unit if now else "")))
-    note = "± holds 95 % of noise and of what ε allows the model to lack."
+    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % of noise, and of what ε allows."
     at = next((n.time_s for n in newest.values()), float("nan"))
     headings = ("", "of the mean", "±", f"newest, at {moment(at, 2)}" if newest else "newest", "±", "unit")
     if of.fit is not None:
@@ -113,6 +113,8 @@ def margins(of: Material) -> Section | str:
     """The loop's margins, with bounds, and where they were read."""
     if of.loop is None:
         return of.loop_words
+    if of.loop.message:
+        return f"No margins: {of.loop.message}."
     found = of.loop.margins
     bound = found.bound()[0]
     rows = []
@@ -174,7 +176,8 @@ _COUNTS = {
 _SOURCE = {
     "connected": "connection stood at the end", "lost": "lost samples", "silent_s": "silent, s",
     "measured_hz": "rate by arrival, Hz", "clock_offset_s": "sender's clock at sample 0",
-    "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "first_sample": "first sample", "counts": "events",
+    "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "waiting_s": "backlog, s",
+    "first_sample": "first sample", "counts": "events",
 }  # fmt: skip
 
 

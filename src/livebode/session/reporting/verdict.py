@@ -99,7 +99,7 @@ def _margins(of: Material) -> list[Finding]:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
     if not least:
-        return [Finding("check", f"No margins: {of.loop.margins.status[0]}; check the loop's description and the fit.")]
+        return [Finding("check", f"No margins: {of.loop.message}.")]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
     where = f"over {many(len(of.loop.places), 'fit')} along the way" if len(of.loop.places) > 1 else "of the fit"
     sizes = [

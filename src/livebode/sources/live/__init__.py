@@ -4,6 +4,7 @@ from livebode.sources.live.batch import Batch, LiveBlock
 from livebode.sources.live.frame import FrameDecoder, encode_layout, encode_samples
 from livebode.sources.live.health import Health
 from livebode.sources.live.opening import checked_address, make_source, open_source
+from livebode.sources.live.position import Origin, Position
 from livebode.sources.live.said import KINDS
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
@@ -18,6 +19,8 @@ __all__ = [
     "Health",
     "LiveBlock",
     "LiveSource",
+    "Origin",
+    "Position",
     "Sequencer",
     "SourceSettings",
     "SpectraBatch",

@@ -65,6 +65,8 @@ class AdsSource(LiveSource):
             if code in _REFUSED:
                 raise RefusedError(f"{_REFUSED[code]} ({settings.symbol})") from None
             raise ConnectionError(str(error).strip()) from None
+        except RuntimeError as error:  # pyads, of an answer that is shorter than what was asked for
+            raise ConnectionError(f"the PLC's answer cannot be used: {str(error).strip()}"[:200]) from None
         return False
 
     def _place(self, plc: Any) -> tuple[int, int, int]:
@@ -80,8 +82,8 @@ class AdsSource(LiveSource):
         def read(at: int, length: int) -> bytes:
             return bytes(plc.read(group, offset + at, ctypes.c_ubyte * length, return_ctypes=True))
 
-        have: int | None = None
-        epoch = 0
+        # Of a record that continues, what is still in the ring is not lost.
+        have, epoch = (None, 0) if self._resumed is None else (self._resumed.number, self._resumed.epoch)
         while not self._stop.is_set():
             try:
                 ring, dtype = read_ring(read(0, HEADER.size), size)

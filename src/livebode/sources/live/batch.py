@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.nouns import Block, Channel, InputError
+from livebode.sources.live.position import Mark, Origin
 
 CHANNELS_MAX = 1024
 VALUES_MAX = 1 << 20
@@ -35,6 +36,8 @@ class Batch:
         The sender's clock at the first sample, seconds since 1970; None where it has none.
     arrived_s
         `time.monotonic()` when the batch was received.
+    mark
+        Where the source can read it again; None where it cannot.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class Batch:
     epoch: int = 0
     stamp_s: float | None = None
     arrived_s: float = nan
+    mark: Mark | None = None
 
     def __post_init__(self) -> None:
         if self.data.ndim != 2 or len(self.data) != len(self.channels) or not 0 < self.data.size <= VALUES_MAX:
@@ -74,8 +78,10 @@ class Batch:
 
     def block(self, number: int, start: int, gap: bool) -> LiveBlock:
         """The samples from the sender's number `start` on, as a Block that begins at `number`."""
-        data = self.data[:, start - self.first_sample :]
-        return LiveBlock(data, self.channels, self.rate_hz, start=number, gap=gap, arrived_s=self.arrived_s)
+        data, origin = self.data[:, start - self.first_sample :], Origin(self.epoch, start - number, self.mark)
+        return LiveBlock(
+            data, self.channels, self.rate_hz, start=number, gap=gap, arrived_s=self.arrived_s, origin=origin
+        )
 
 
 def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> None:
@@ -105,7 +111,9 @@ def check_channels(channels: tuple[Channel, ...], at_least: int = 1) -> None:
 class LiveBlock(Block):
     """A Block from a live source.
 
-    `arrived_s` is `time.monotonic()` when its last sample was received; other parameters as in `Block`.
+    `arrived_s` is `time.monotonic()` when its last sample was received, `origin` how its sender numbers its samples;
+    other parameters as in `Block`.
     """
 
     arrived_s: float = nan
+    origin: Origin | None = None

@@ -36,6 +36,12 @@ class Face:
         self._seen: tuple[SpectraLayout | tuple[Channel, ...], float] | None = None
         self._rows: list[int] | None = None
 
+    def announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
+        """The stream has these, which are known before its first batch."""
+        if not self.channels:
+            self.rate_hz = self.rate_hz or rate_hz
+            self.channels = channels
+
     def aligned(self, batch: AnyBatch) -> AnyBatch | None:
         """The batch with the stream's channels; None where it is not of the stream."""
         stated = (_layout(batch) or batch.channels, batch.rate_hz)

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, BinaryIO, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.nouns import Channel, InputError
 from livebode.sources.delimited import DelimitedRecording
+from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
+from livebode.sources.live.followed import LINE_BYTES_MAX, FileLines, FileMark, FolderMark, checksum
+from livebode.sources.live.position import Mark, Position
+from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import TICK_S, LiveSource
 from livebode.sources.log import Log
 from livebode.sources.opening import open_log
@@ -21,8 +25,12 @@ from livebode.sources.recording import Column, Recording
 from livebode.sources.timing import find_time
 from livebode.sources.units import SECONDS
 
-PIECE_BYTES = 1 << 19
-LINE_BYTES_MAX = 1 << 20
+REPLACED = {
+    "most": "no longer ends as it was read up to byte {end}: what is different there is not recorded",
+    "none": "is another file than the one that was read up to byte {end}: that was truncated or replaced. It is read "
+    "from its beginning; what was added to the other one is not recorded",
+}
+"""What happened to a file that was read before, by how much of it is as it was."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +53,25 @@ class FollowSource(LiveSource):
     """A file of rows that is appended to, or a directory whose files are read in the order of their names.
 
     The time column numbers the samples, so that missing rows are gaps; without one (`rate_hz` given) rows are counted.
-    A file that becomes shorter or is replaced is a restart.
+    A file that becomes shorter or is replaced is a restart, unless it begins with all that was read of the other.
     """
 
     format: ClassVar[str] = "follow"
     waits: ClassVar[bool] = True
+    paced: ClassVar[bool] = False
+
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        super().__init__(settings, address)
+        self._epoch, self._due = 1, -1
+        self._mark: Mark = {}
+        self._behind: tuple[str, int] | None = None
+
+    def resume(self, position: Position) -> None:
+        """Continue with the sample that follows in the file or the directory."""
+        super().resume(position)
+        self._epoch, self._due = position.epoch, position.number
+        self._mark = position.mark or self._mark
+        self._sequencer.face.rate_hz = self.settings.rate_hz or position.rate_hz
 
     def _receive(self) -> bool:
         assert self.settings.log is not None
@@ -57,12 +79,10 @@ class FollowSource(LiveSource):
         if path.is_dir():
             self._follow_directory(path)
             return False
-        epoch = 0
         while not self._stop.is_set():
             table = self._looked_at(path)
             if table is not None:
-                epoch += 1
-                self._follow_file(path, table, epoch)
+                self._follow_file(path, table)
             self._stop.wait(TICK_S)
         return False
 
@@ -77,28 +97,43 @@ class FollowSource(LiveSource):
             self._trouble = str(error)
             return None
 
-    def _follow_file(self, path: Path, table: Table, epoch: int) -> None:
+    def _follow_file(self, path: Path, table: Table) -> None:
         """Batches of what stands there and of what is added, until the file is another one."""
-        rows, kept = 0, b""
         with path.open("rb") as file:
-            file.seek(table.recording.offset)
+            begin, again = self._begin(path, file, table)
+            self._announce(table.channels, table.rate_hz)
+            lines = FileLines(file, begin, table.recording.encoding)
             self._stands()
             while not self._stop.is_set():
-                piece = file.read(PIECE_BYTES)
-                if not piece:
+                piece = lines.read(again)
+                if piece is None:
                     if is_another(path, table.inode, file.tell()):
                         return
                     self._stop.wait(TICK_S)
                     continue
-                lines, kept = whole_lines(kept + piece, table.recording.encoding)
-                if len(kept) > LINE_BYTES_MAX:
+                if lines.cut:
                     self._malformed(f"a line is longer than {LINE_BYTES_MAX} bytes")
-                    kept = b""
-                for batch in self._batches(table, lines, rows, epoch):
-                    self._deliver(batch)
-                rows += lines.count(b"\n")
+                for batch in self._batches(table, piece.raw, piece.mark.rows, piece.mark.as_plain()):
+                    if piece.mark.offset >= again or batch.stop > self._due:
+                        self._deliver(batch)
+                self._mark = piece.after.as_plain()
 
-    def _batches(self, table: Table, lines: bytes, row: int, epoch: int) -> Iterator[Batch]:
+    def _begin(self, path: Path, file: BinaryIO, table: Table) -> tuple[FileMark, int]:
+        """Where to begin to read, and up to which byte the rows have been read before."""
+        start = FileMark.start(file, table.recording.offset)
+        if not self._mark:
+            return start, start.end
+        mark = FileMark.of(self._mark)
+        kept = mark.kept_in(file)
+        if kept == "all":
+            return mark, mark.end
+        self._said.say("replaced", f"{path} {REPLACED[kept]}".format(end=mark.end), end_bytes=mark.end)
+        if kept == "most":
+            return mark, path.stat().st_size
+        self._epoch, self._due = self._epoch + 1, -1
+        return start, start.end
+
+    def _batches(self, table: Table, lines: bytes, row: int, mark: Mark) -> Iterator[Batch]:
         """Batches of these lines; a line that does not fit the table is left out."""
         if not lines.strip():
             return
@@ -110,8 +145,8 @@ class FollowSource(LiveSource):
             if middle >= len(lines):
                 self._malformed(error)
                 return
-            yield from self._batches(table, lines[:middle], row, epoch)
-            yield from self._batches(table, lines[middle:], row + lines[:middle].count(b"\n"), epoch)
+            yield from self._batches(table, lines[:middle], row, mark)
+            yield from self._batches(table, lines[middle:], row + lines[:middle].count(b"\n"), mark)
             return
         numbers = row + np.arange(len(values[0]))
         if table.time is not None:
@@ -121,36 +156,68 @@ class FollowSource(LiveSource):
                 self._malformed(f"{np.count_nonzero(~usable)} rows have no time")
             numbers = np.rint(time_s[usable] * table.rate_hz).astype(np.int64)
             values = [column[usable] for column in values]
-        yield from numbered(numbers, values, table.channels, table.rate_hz, epoch)
+        yield from numbered(numbers, values, table.channels, table.rate_hz, self._epoch, mark)
 
     def _follow_directory(self, folder: Path) -> None:
-        seen, counted = "", 0
+        self._behind = self._behind or self._begin_folder(folder)
         self._stands()
         while not self._stop.is_set():
+            seen, counted = self._behind
             names = sorted(name for name in os.listdir(folder) if name > seen and not name.startswith("."))
             for at, name in enumerate(names):
-                whole = self._segment(folder / name, counted)
+                whole = self._segment(folder / name, seen, counted)
                 # A file that cannot be read may still be written, unless a later one is there.
                 if whole is None and at == len(names) - 1:
                     break
-                seen, counted = name, counted if whole is None else whole
+                seen, counted = self._behind = name, counted if whole is None else whole
+                self._due = -1
             self._stop.wait(TICK_S)
 
-    def _segment(self, path: Path, counted: int) -> int | None:
+    def _begin_folder(self, folder: Path) -> tuple[str, int]:
+        """Behind which name to begin to read, and the rows that were counted up to there."""
+        if not self._mark:
+            return "", 0
+        mark = FolderMark.of(self._mark)
+        path = folder / mark.name
+        if path.exists() and checksum(path) == mark.crc:
+            return mark.seen, mark.counted  # its rows that were recorded are left out
+        due, self._due = self._due, -1
+        whole = mark.last is not None and due >= mark.last
+        if whole and not path.exists():
+            return mark.name, mark.stop
+        gone = "was removed" if not path.exists() else "was changed"
+        self._said.say("replaced", f"{path} {gone} since it was read up to sample {due - 1}; its other samples "
+                       "are not recorded")  # fmt: skip
+        self._epoch += not mark.timed
+        return mark.name, max(mark.counted, mark.stop)
+
+    def _segment(self, path: Path, seen: str, counted: int) -> int | None:
         """Deliver one recording whose rows are counted from `counted` on; the count behind it, None if unreadable."""
         try:
             log = open_log(path, rate_hz=self.settings.rate_hz or self._sequencer.face.rate_hz, time=self.settings.time)
-            labels = log.channels
+            labels, mark = log.channels, FolderMark(path.name, checksum(path), seen, counted, log.timing is not None)
+            self._announce(labels, log.rate_hz)
+            held: Batch | None = None
+            last = counted
             for block in log.blocks([channel.name for channel in labels], max(1, VALUES_MAX // len(labels))):
                 first = counted + block.start
                 if log.timing is not None:
                     first = round((block.origin_s + block.start / block.rate_hz) * block.rate_hz)
-                self._deliver(Batch(first, np.array(block.data), labels, block.rate_hz))
+                self._pass_on(held)
+                held = Batch(first, np.array(block.data), labels, block.rate_hz, self._epoch, mark=mark.as_plain())
                 last = counted + block.stop
+            if held is not None:
+                self._pass_on(replace(held, mark=replace(mark, stop=last, last=held.stop).as_plain()))
         except (InputError, OSError) as error:
             self._trouble = str(error)
             return None
         return last
+
+    def _pass_on(self, batch: Batch | None) -> None:
+        """Deliver it, unless it was recorded before."""
+        if batch is not None and batch.stop > self._due:
+            self._deliver(batch)
+            self._due = batch.stop
 
 
 def table_of(log: Log, time: str | None, inode: int) -> Table:
@@ -167,7 +234,7 @@ def table_of(log: Log, time: str | None, inode: int) -> Table:
 
 
 def numbered(
-    numbers: NDArray[np.int64], values: list[Any], channels: tuple[Channel, ...], rate_hz: float, epoch: int
+    numbers: NDArray[np.int64], values: list[Any], channels: tuple[Channel, ...], rate_hz: float, epoch: int, mark: Mark
 ) -> Iterator[Batch]:
     """Batches of the samples with these numbers, each as long as they follow each other and a batch may be."""
     cuts = np.flatnonzero(np.diff(numbers) != 1) + 1
@@ -176,19 +243,7 @@ def numbered(
         for a in range(first, last, most):
             b = min(a + most, last)
             data = np.stack([np.asarray(column[a:b], dtype=np.float64) for column in values])
-            yield Batch(int(numbers[a]), data, channels, rate_hz, epoch)
-
-
-def whole_lines(raw: bytes, encoding: str) -> tuple[bytes, bytes]:
-    r"""The lines that have ended, and the beginning of the next.
-
-    >>> whole_lines(b"1,2\n3,4\n5", "utf-8")
-    (b'1,2\n3,4\n', b'5')
-    """
-    end = {"utf-16-le": b"\n\0", "utf-16-be": b"\0\n"}.get(encoding, b"\n")
-    at = raw.rfind(end)
-    at = at + len(end) if at >= 0 else 0
-    return raw[:at], raw[at:]
+            yield Batch(int(numbers[a]), data, channels, rate_hz, epoch, mark=mark)
 
 
 def is_another(path: Path, inode: int, read: int) -> bool:

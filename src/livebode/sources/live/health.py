@@ -27,7 +27,9 @@ class Health:
         This computer's clock at the arrival of the newest batch less the sender's at its last sample; it means
         something where both clocks are synchronised.
     waiting_bytes
-        Received and not yet taken.
+        Received and not yet tracked.
+    waiting_s
+        The same in seconds of the machine: the backlog.
     """
 
     connected: bool
@@ -38,3 +40,4 @@ class Health:
     clock_offset_s: float | None
     latency_s: float | None
     waiting_bytes: int
+    waiting_s: float

@@ -11,19 +11,34 @@ INBOX_S_MAX = 60.0
 """The machine's time that may wait: longer than any pause of a tracker that works."""
 INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
 """What may wait however long it is, and what may not however short: many axes share one computer."""
+RESUMES_AT = 0.75
+"""A queue that was full takes batches again when no more than this share of it is used: what is dropped is in few long
+spans, and the windows between them are whole."""
+WAITING_S_MAX = 0.1
+"""The same where the sender can wait: what it still has is not lost when this process is killed."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
-    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB."""
+    """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB.
 
-    def __init__(self, bytes_max: int = INBOX_BYTES_MAX) -> None:
+    Where the sender waits, at most 0.1 s, or one batch.
+    """
+
+    def __init__(self, bytes_max: int = INBOX_BYTES_MAX, *, waits: bool = False) -> None:
         self._bytes_max = bytes_max
+        self._bytes_min, self._seconds_max = (0, WAITING_S_MAX) if waits else (INBOX_BYTES_MIN, INBOX_S_MAX)
         self._batches: deque[AnyBatch] = deque()
         self._bytes = 0
         self._seconds = 0.0
         self._changed = threading.Condition()
         self._closed = False
+        self._full = False
+
+    @property
+    def seconds(self) -> float:
+        """The machine's time that waits."""
+        return self._seconds
 
     @property
     def bytes(self) -> int:
@@ -36,19 +51,23 @@ class Inbox:
             return self._closed and not self._batches
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
-        """Whether the batch was taken. A full inbox refuses it, or with `wait` lets the sender wait."""
+        """Whether the batch was taken. A full inbox refuses it and those behind it until a quarter is free, or with
+        `wait` lets the sender wait.
+        """
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._closed or self._has_room(batch))
-            if self._closed or not self._has_room(batch):
+            self._full = not self._has_room(batch, RESUMES_AT if self._full else 1.0)
+            if self._closed or self._full:
                 return False
             self._batches.append(batch)
             self._count(batch, 1)
             return True
 
-    def _has_room(self, batch: AnyBatch) -> bool:
-        size = self._bytes + _size_bytes(batch)
-        return size <= self._bytes_max and (size <= INBOX_BYTES_MIN or self._seconds + _seconds(batch) <= INBOX_S_MAX)
+    def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
+        size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
+        short = size <= share * self._bytes_min or seconds <= share * self._seconds_max
+        return size <= share * self._bytes_max and (short or not self._batches)
 
     def _count(self, batch: AnyBatch, sign: int) -> None:
         self._bytes += sign * _size_bytes(batch)

@@ -11,7 +11,7 @@ from livebode.nouns import InputError
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
 from livebode.sources.live.source import TICK_S, LiveSource
 
-_PIECE_BYTES = 1 << 16
+_PIECE_BYTES = 1 << 13  # what was read and is not recorded a kill costs
 
 
 class StdinSource(LiveSource):

@@ -12,7 +12,7 @@ from livebode.nouns import Event
 
 KINDS = (
     "connected", "disconnected", "refused", "loss", "repeat", "reordered", "restart", "clock-jump", "wrong-rate",
-    "layout-changed", "unit-changed", "malformed", "foreign", "overflow",
+    "layout-changed", "unit-changed", "malformed", "foreign", "overflow", "resumed", "replaced", "computer-clock",
 )  # fmt: skip
 """Kinds of Events of live sources; docs/live.md says what each means."""
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.clock import ClockWatch
+from livebode.sources.live.computer_clock import ClockReading, pause
+from livebode.sources.live.doubts import CONFIRMED, Doubts
 from livebode.sources.live.face import Face
+from livebode.sources.live.position import Position
 from livebode.sources.live.said import Said
-from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 
 FAR_BACK_S = 60.0
 FAR_AHEAD_S = 3600.0
-CONFIRMED = 2
-"""Batches that another stream must bring before it is believed."""
-CONFIRMED_NEAR = 32
-"""The same where numbers go back by less than a minute: a broker may send that many again."""
+JUMP_S = 1.0
+"""A batch that is further ahead than this, and than those that may be missing, is believed when more follow it."""
+CLOCK_S = 10.0
+"""How much longer than this computer's clock says the pause of a sender without an epoch may be by its numbers."""
 _EPOCHS_REMEMBERED = 64
 
 
@@ -24,9 +25,11 @@ class Sequencer:
 
     Batches that arrive at most `reorder` batches late are put right; what is then still missing is lost: the next Block
     begins at the later number with its gap flag. What comes twice is dropped. A restart of the sender, told by its
-    epoch or by numbers that begin anew, is a gap of unknown length. Blocks are numbered from the first sample received.
+    epoch or by numbers that begin anew, is a gap of unknown length. Blocks are numbered from the first sample received,
+    or from where a record continues (`resume`).
 
-    A batch out of place is believed only when more of its kind follow; memory is bounded by that and by `reorder`.
+    A batch out of place is believed only when more of its kind follow and none of the stream comes between them; a
+    sender that was replaced is believed again in the same way. Memory is bounded by that and by `reorder`.
 
     Parameters
     ----------
@@ -52,19 +55,21 @@ class Sequencer:
         confirmed: int = CONFIRMED,
     ) -> None:
         self._said, self._reorder, self._wait_s = said, reorder, wait_s
-        self._confirmed = confirmed
+        self._doubts = Doubts(said, confirmed, reorder)
+        self._jump_s = JUMP_S if confirmed > 1 else FAR_AHEAD_S
         self.face = Face(said, rate_hz)
         self.clock: ClockWatch | None = None
         self._epoch: int | None = None
-        self._left: deque[int] = deque(maxlen=_EPOCHS_REMEMBERED)
+        self._left: dict[int, int] = {}
         self._next: int | None = None
         self._highest = -1
         self._waiting: dict[int, AnyBatch] = {}
-        self._doubted: list[AnyBatch] = []
         self._progress_s = 0.0
         self._gap = False
         self._number = 0
         self._begun_at = 0
+        self._resumed: Position | None = None
+        self._paced = True
         self.lost = 0
         """Samples that were lost, of those whose number is known."""
 
@@ -72,6 +77,17 @@ class Sequencer:
     def first_sample(self) -> int | None:
         """The sender's number of the sample at which it was begun, or begun anew; None before."""
         return None if self._next is None else self._begun_at
+
+    def resume(self, position: Position, *, paced: bool = True) -> None:
+        """Continue a record at this position, before anything came.
+
+        The sender's numbers tell exactly what is missing. Where it has begun anew, this computer's clock estimates it,
+        if the sender is `paced`: sends its samples when they are taken.
+        """
+        self._resumed, self._paced = position, paced
+        self._epoch, self._next, self._number = position.epoch, position.number, position.sample
+        self._begun_at = position.number
+        self._said.position = (position.sample, position.sample / position.rate_hz)
 
     def push(self, batch: AnyBatch) -> list[LiveBlock]:
         """Blocks that this batch completes."""
@@ -81,8 +97,7 @@ class Sequencer:
         if self._epoch is None:
             self._epoch = batch.epoch
         if self._fits(aligned):
-            if self._doubted and self._doubted[0].epoch == self._epoch:
-                self._dismiss()  # the stream goes on, so what came from before it were repeats
+            self._doubts.dismiss(self._epoch, self._next)  # the stream goes on, so they were none of it
             return self._insert(aligned)
         return self._doubt(aligned)
 
@@ -95,7 +110,7 @@ class Sequencer:
 
     def finish(self) -> list[LiveBlock]:
         """Blocks of everything that still waits: nothing more will come."""
-        self._dismiss()
+        self._doubts.dismiss(self._epoch, self._next)
         return self._release(0)
 
     def _fits(self, batch: AnyBatch) -> bool:
@@ -104,7 +119,21 @@ class Sequencer:
         if self._next is None:
             near = next(iter(self._waiting.values()), batch).first_sample
             return abs(batch.first_sample - near) <= FAR_BACK_S * batch.rate_hz
-        return batch.stop > self._next and batch.first_sample <= self._next + FAR_AHEAD_S * batch.rate_hz
+        near_ahead = max(self._jump_s * batch.rate_hz, (self._reorder + 1) * batch.samples)
+        ahead = min(near_ahead, self._ahead_max(batch)) if self._resumed is not None else near_ahead
+        return batch.stop > self._next and batch.first_sample <= max(self._next, self._highest) + ahead
+
+    def _ahead_max(self, batch: AnyBatch) -> float:
+        """How many samples a sender can be ahead of where the stream was, unless it has begun anew."""
+        if self._epoch:
+            return float("inf")
+        seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
+        return (FAR_AHEAD_S if seconds is None else seconds + CLOCK_S) * batch.rate_hz
+
+    def _pause_s(self, batch: AnyBatch, resumed: Position) -> float | None:
+        """From the last recorded sample to the batch's first one, by this computer's clock."""
+        found = pause(resumed.arrived, ClockReading.at(batch.arrived_s)).seconds
+        return None if found is None or not self._paced else max(0.0, found - batch.samples / batch.rate_hz)
 
     def _insert(self, batch: AnyBatch) -> list[LiveBlock]:
         known = self._waiting.get(batch.first_sample)
@@ -142,7 +171,7 @@ class Sequencer:
         if batch.stamp_s is not None:
             self.clock = self.clock or ClockWatch(self._said, batch.rate_hz)
             self.clock.take(start, batch.stamp_s + (start - batch.first_sample) / batch.rate_hz, self._number)
-        self._gap = False
+        self._gap, self._resumed = False, None
         self._next, self._number = batch.stop, block.stop
         self._progress_s = batch.arrived_s
         self._said.position = (self._number, self._number / batch.rate_hz)
@@ -154,9 +183,10 @@ class Sequencer:
         rate_hz = self.face.rate_hz or 1.0
         self.lost += missing
         self._number += missing
+        unsure = "; the sender sends no epoch, so that a restart of it meanwhile would not be seen"
         self._said.say(
             "loss",
-            f"{missing} samples did not come",
+            f"{missing} samples did not come{unsure if self._resumed is not None and not self._epoch else ''}",
             sample=self._number,
             rate_hz=rate_hz,
             missing_samples=missing,
@@ -167,48 +197,84 @@ class Sequencer:
         self._said.say("repeat", f"sample {batch.first_sample} of the sender came again and was dropped")
 
     def _doubt(self, batch: AnyBatch) -> list[LiveBlock]:
-        """A batch that is not where the stream goes on: a repeat, another sender, or this one begun anew."""
-        if batch.epoch in self._left:
-            self._said.say("foreign", "a batch of a sender that was replaced, or of a second one, was dropped")
+        """A batch that is not where the stream goes on: a repeat, a jump, another sender, or this one begun anew."""
+        far = self._next is None or batch.stop < self._next - FAR_BACK_S * batch.rate_hz
+        ahead = batch.epoch == self._epoch and self._next is not None and batch.first_sample > self._next
+        if self._is_told_again(batch):
+            self._repeat(batch)
             return []
-        last = self._doubted[-1] if self._doubted else None
-        new_epoch = batch.epoch != self._epoch
-        if last is not None and (last.epoch != batch.epoch or not (new_epoch or last.stop == batch.first_sample)):
-            self._dismiss()
-        self._doubted.append(batch)
-        needed = self._confirmed if new_epoch else CONFIRMED if self._is_far(batch) else CONFIRMED_NEAR
-        if len(self._doubted) < needed:
+        if batch.epoch != self._epoch:
+            believed = self._doubts.another_epoch(batch, self._epoch, self._next, replaced=batch.epoch in self._left)
+        elif ahead:
+            believed = self._doubts.ahead(batch, self._epoch, self._next, self._jump_s * batch.rate_hz)
+        else:
+            believed = self._doubts.behind(batch, self._epoch, self._next, far=far)
+        if not believed:
             return []
-        return self._restart()
+        if ahead and batch.first_sample - (self._next or 0) <= self._ahead_max(batch):
+            return [block for late in believed for block in self._insert(late)]
+        return self._restart(believed)
 
-    def _is_far(self, batch: AnyBatch) -> bool:
-        return self._next is None or (
-            batch.stop < self._next - FAR_BACK_S * batch.rate_hz or batch.first_sample > self._next
-        )
+    def _is_told_again(self, batch: AnyBatch) -> bool:
+        """Whether a broker gives again what the record has already: an epoch that is the same was not begun anew."""
+        known = self._resumed is not None and bool(self._epoch) and batch.epoch == self._epoch
+        return known and self._next is not None and batch.stop <= self._next
 
-    def _dismiss(self) -> None:
-        doubted, self._doubted = self._doubted, []
-        for batch in doubted:
-            if batch.epoch == self._epoch and self._next is not None and batch.stop <= self._next:
-                self._repeat(batch)
-            else:
-                self._said.say("foreign", f"a batch at sample {batch.first_sample}, of no stream, was dropped")
-
-    def _restart(self) -> list[LiveBlock]:
-        doubted, self._doubted = self._doubted, []
+    def _restart(self, believed: list[AnyBatch]) -> list[LiveBlock]:
+        """Go on with these batches of another epoch, or of numbers that begin anew."""
         blocks = self._release(0)
-        if self._epoch is not None and doubted[0].epoch != self._epoch:
-            self._left.append(self._epoch)
-        self._said.say(
-            "restart",
-            f"the sender began anew at its sample {doubted[0].first_sample}; how long it paused is not known",
-            sample=self._number,
-            rate_hz=self.face.rate_hz or 1.0,
-            sender_sample=doubted[0].first_sample,
-        )
-        self._epoch, self._next, self._highest, self._gap = doubted[0].epoch, None, -1, self._number > 0
+        epoch, first = believed[0].epoch, min(batch.first_sample for batch in believed)
+        offset = self._left.pop(epoch, None)
+        if self._epoch is not None and epoch != self._epoch and self._next is not None:
+            self._left[self._epoch] = self._next - self._number
+            while len(self._left) > _EPOCHS_REMEMBERED:
+                del self._left[next(iter(self._left))]
+        back = offset is not None and first - offset >= self._number - FAR_BACK_S * believed[0].rate_hz
+        if offset is not None and back:
+            self._return_to(epoch, offset, first)
+        else:
+            self._begin_anew(believed[0], first)
+        self._epoch, self._highest, self._gap = epoch, -1, self._number > 0
         if self.clock is not None:
             self.clock.restart()
-        for batch in doubted:
-            blocks += self._insert(batch)
+        for batch in believed:
+            if self._next is None or batch.stop > self._next:
+                blocks += self._insert(batch)
         return blocks
+
+    def _begin_anew(self, batch: AnyBatch, first: int) -> None:
+        seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
+        missing, how = 0, "how long it paused is not known"
+        if seconds is not None:
+            step = batch.layout.hop if isinstance(batch, SpectraBatch) else 1
+            missing = step * round(seconds * batch.rate_hz / step)
+            how = f"by this computer's clock it paused for {seconds:.1f} s, which is an estimate"
+        self._number += missing
+        self._say_restart(
+            f"the sender began anew at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
+        )
+        self._next, self._resumed = None, None
+
+    def _return_to(self, epoch: int, offset: int, first: int) -> None:
+        """Trust a replaced sender again: its numbers still tell the time."""
+        lost = max(0, self._number + offset - first)
+        self.lost += lost
+        self._next = self._number + offset
+        other = "" if self._epoch is None else f" {self._epoch:#x}"
+        self._say_restart(
+            f"the sender of epoch {epoch:#x} still sends, and that of epoch{other}, which had replaced it, is silent; "
+            f"it continues at its sample {max(first, self._next)}, and {lost} samples of it were not recorded. "
+            "If only one machine may send, name its address in source.sender",
+            epoch, first, lost_samples=lost,
+        )  # fmt: skip
+
+    def _say_restart(self, message: str, epoch: int, first: int, **details: int) -> None:
+        self._said.say(
+            "restart",
+            message,
+            sample=self._number,
+            rate_hz=self.face.rate_hz or 1.0,
+            sender_sample=first,
+            epoch=f"{epoch:#x}",
+            **details,
+        )

@@ -15,7 +15,7 @@ FRAMES = {"rate_hz", "reorder_batches"}
 TLS = {"ca_file", "certificate_file", "key_file"}
 LOGIN = {"username", "password_env", "password_file"}
 TAKEN: dict[str, set[str]] = {
-    "udp": FRAMES,
+    "udp": FRAMES | {"sender"},
     "tcp": FRAMES,
     "stdin": {"rate_hz"},
     "mqtt": FRAMES | LOGIN | {"client_id"},
@@ -42,6 +42,7 @@ class SourceSettings(BaseModel):
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
     reorder_batches: Annotated[int, Field(ge=0, le=256)] = 8
+    sender: str | None = None
     username: str | None = None
     password_env: str | None = None
     password_file: File | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -15,11 +16,15 @@ import numpy as np
 from livebode.nouns import Channel, Event, InputError, SpectraLayout, missing_channel
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
+from livebode.sources.live.computer_clock import ClockReading, pause
+from livebode.sources.live.doubts import CONFIRMED
+from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
+from livebode.sources.live.position import Position
 from livebode.sources.live.said import Said
-from livebode.sources.live.sequencer import CONFIRMED, Sequencer
+from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -45,11 +50,14 @@ class LiveSource(ABC):
     """Whether batches can arrive in another order than they were sent."""
     waits: ClassVar[bool] = False
     """Whether the sender can wait until there is room."""
+    paced: ClassVar[bool] = True
+    """Whether samples come when they are taken, so that this computer's clock tells how long it was paused."""
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._said = Said()
-        self._inbox = Inbox()
+        self._inbox = Inbox(waits=self.waits)
+        self._dropped = Dropped(self._said)
         self._sequencer = Sequencer(
             self._said,
             reorder=settings.reorder_batches if self.reorders else 0,
@@ -68,6 +76,7 @@ class LiveSource(ABC):
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
+        self._resumed: Position | None = None
 
     @abstractmethod
     def _receive(self) -> bool:
@@ -121,13 +130,47 @@ class LiveSource(ABC):
             clock_offset_s=None if clock is None else clock.offset_s,
             latency_s=None if newest is None else newest[1],
             waiting_bytes=self._inbox.bytes,
+            waiting_s=self.waiting_s,
         )
 
-    def open(self) -> Self:
-        """Begin to receive, and wait for the first batch; InputError where none comes within `timeout_s`."""
+    @property
+    def waiting_s(self) -> float:
+        """The machine's time that was received and is not tracked yet: the backlog."""
+        return self._inbox.seconds
+
+    def resume(self, position: Position) -> None:
+        """Continue a record at this position: to be called before `open`.
+
+        Blocks are numbered on from there, and the sender's numbers and epoch tell exactly what is missing.
+        """
+        self._resumed = position
+        self._sequencer.resume(position, paced=self.paced)
+        exact = (
+            "its numbers tell what is missing"
+            if position.epoch
+            else "it sends no epoch, so that what is missing is an estimate if it was restarted meanwhile"
+        )
+        self._said.say(
+            "resumed",
+            f"continues behind sample {position.number - 1} of the sender; {exact}",
+            sender_sample=position.number,
+            epoch=f"{position.epoch:#x}",
+        )
+        if remark := pause(position.arrived, ClockReading.at(time.monotonic())).remark:
+            self._said.say("computer-clock", remark)
+
+    def open(self, late: Callable[[str], None] | None = None) -> Self:
+        """Begin to receive, and wait for the first batch.
+
+        Where none comes within `timeout_s`, InputError; with `late` a sentence is handed to it once, and the wait
+        continues until the machine sends, refuses or the source is stopped.
+        """
         self._thread.start()
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
+            if late is not None and time.monotonic() > until:
+                late(f"{self.address}: no samples came within {self.settings.timeout_s:g} s ({self._trouble})")
+                until = math.inf
             if self._inbox.ended or time.monotonic() > until:
                 asked = self._stop.is_set()
                 self.close()
@@ -222,12 +265,18 @@ class LiveSource(ABC):
             self._failure = error
         finally:
             self._connected = False
+            self._dropped.finish()
             self._inbox.close()
 
     def _stands(self) -> None:
         """A connection stands."""
         self._connected, self._outage = True, False
         self._said.say("connected", f"connected to {self.address}")
+
+    def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
+        """Of a record that continues the channels are known before new samples come."""
+        if self._resumed is not None:
+            self._sequencer.face.announce(channels, rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
@@ -249,5 +298,7 @@ class LiveSource(ABC):
         self._first = self._first or (now, self._received)
         if np.isnan(batch.arrived_s):
             batch = replace(batch, arrived_s=now)
-        if not self._inbox.put(batch, self.waits) and not self._stop.is_set():
-            self._said.say("overflow", f"{batch.samples} samples came faster than they were taken and were dropped")
+        if self._inbox.put(batch, self.waits):
+            self._dropped.finish()
+        elif not self._stop.is_set():
+            self._dropped.take(batch)

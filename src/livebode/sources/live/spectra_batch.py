@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.nouns import Channel, InputError, Spectra, SpectraLayout, rms
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
+from livebode.sources.live.position import Origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +106,7 @@ class SpectraBatch:
             state=self.state[skipped:],
             place=(start + layout.hop) % layout.window,
             arrived_s=self.arrived_s,
+            origin=Origin(self.epoch, start - number),
         )
 
 

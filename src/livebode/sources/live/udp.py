@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import socket
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import ClassVar
 
 from livebode.nouns import InputError
+from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
+from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import TICK_S, LiveSource
 
 _DATAGRAM_BYTES_MAX = 65535
@@ -19,8 +22,17 @@ class UdpSource(LiveSource):
     format: ClassVar[str] = "udp"
     reorders: ClassVar[bool] = True
 
+    def __init__(self, settings: SourceSettings, address: Address) -> None:
+        super().__init__(settings, address)
+        try:
+            self._sender = None if settings.sender is None else plain_address(settings.sender)
+        except ValueError:
+            raise InputError(
+                f"source.sender = {settings.sender!r} is not an IP address; give one such as 192.168.0.5"
+            ) from None
+
     def _receive(self) -> bool:
-        decoder = FrameDecoder()
+        decoder, sender = FrameDecoder(), self._sender
         family = socket.AF_INET6 if ":" in self.address.host else socket.AF_INET
         with socket.socket(family, socket.SOCK_DGRAM) as port:
             port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
@@ -29,8 +41,12 @@ class UdpSource(LiveSource):
             self._stands()
             while not self._stop.is_set():
                 try:
-                    datagram = port.recv(_DATAGRAM_BYTES_MAX)
+                    datagram, (host, *_) = port.recvfrom(_DATAGRAM_BYTES_MAX)
                 except TimeoutError:
+                    continue
+                if sender is not None and (other := plain_address(host)) != sender:
+                    self._said.say("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
+                    self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
                     continue
                 try:
                     batch = decoder.decode(datagram)
@@ -40,6 +56,16 @@ class UdpSource(LiveSource):
                 if batch is not None:
                     self._deliver(batch)
         return False
+
+
+def plain_address(host: str) -> IPv4Address | IPv6Address:
+    """The address without a zone, and of IPv4 where an IPv6 port shows it as one of its own.
+
+    >>> plain_address("::ffff:192.168.0.5"), plain_address("fe80::1%eth0")
+    (IPv4Address('192.168.0.5'), IPv6Address('fe80::1'))
+    """
+    address = ip_address(host.partition("%")[0])
+    return getattr(address, "ipv4_mapped", None) or address
 
 
 SOURCE = UdpSource

@@ -1,0 +1,116 @@
+"""`python -m bench.overload`: a live run whose model does not fit, at 200 responses a second.
+
+A sender in another process sends 4 kHz over UDP in batches of 25 ms, as a drive would. `two-mass-gain` is fitted to a
+delay, which it does not describe, at a hop of 20 samples: each fit is scanned again and fails. Printed are samples
+lost, the longest backlog, how many responses were fitted, lines and groups of events, and how long the end took.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import socket
+import tempfile
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from bench.job import LINES, RATE_HZ, WINDOW
+from livebode.excitation import multisine
+from livebode.nouns import Block, Channel
+from livebode.records import Run
+from livebode.session import Audience, Axis, Destination, Orders, run_live
+from livebode.session.event_groups import each_event
+from livebode.sources.live import Batch, encode_layout, encode_samples
+
+CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))
+BATCH, PERIODS = 100, 100
+
+
+class Backlog(Audience):
+    """The longest backlog of a run."""
+
+    def __init__(self, orders: Orders) -> None:
+        self.longest_s = 0.0
+        self._orders = orders
+
+    def followed(self, _: Block) -> None:
+        if self._orders.source is not None:
+            self.longest_s = max(self.longest_s, self._orders.source.waiting_s)
+
+
+def send(port: int, seconds: float) -> None:
+    """What a drive sends, at its pace."""
+    rng = np.random.default_rng(0)
+    w = np.resize(multisine(LINES), PERIODS * WINDOW)
+    u = w + 0.1 * rng.standard_normal(w.size)
+    data = np.array([w, u, np.roll(u, 3) + 0.1 * rng.standard_normal(w.size)])
+    link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    link.connect(("127.0.0.1", port))
+    began = time.monotonic()
+    for turn in range(round(seconds * RATE_HZ / BATCH)):
+        time.sleep(max(0.0, began + turn * BATCH / RATE_HZ - time.monotonic()))
+        at = turn * BATCH % data.shape[1]
+        batch = Batch(turn * BATCH, data[:, at : at + BATCH], CHANNELS, float(RATE_HZ), epoch=7)
+        with suppress(ConnectionRefusedError):  # nobody listens yet
+            if turn % 40 == 0:
+                link.send(encode_layout(CHANNELS, float(RATE_HZ), epoch=7))
+            link.send(encode_samples(batch, sequence=turn))
+
+
+def measured(seconds: float, folder: Path) -> dict[str, float]:
+    """Figures of one run."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind(("127.0.0.1", 0))
+        port = link.getsockname()[1]
+    axis = Axis.of(
+        {
+            "source": {"url": f"udp://127.0.0.1:{port}"},
+            "signals": {"excitation": "w", "input": "u", "output": "y"},
+            "lines": {"frequencies": ",".join(f"k={k}" for k in LINES.bins), "window": WINDOW},
+            "tracking": {"hop": 20},
+            "fit": {"model": "two-mass-gain", "output": "velocity"},
+        },
+        "overload",
+    )
+    orders = Orders()
+    backlog = Backlog(orders)
+    run = threading.Thread(target=run_live, args=(axis, Destination(folder, lambda *_: None, audience=backlog), orders))
+    sender = multiprocessing.get_context("spawn").Process(target=send, args=(port, seconds))
+    run.start()
+    sender.start()
+    sender.join()
+    assert orders.source is not None
+    asked, waited_s = time.monotonic(), orders.source.waiting_s
+    orders.end()
+    run.join()
+    stop_s, found = time.monotonic() - asked, Run.open(folder)
+    events = found.events()
+    return {
+        "samples": found.summary["counts"]["samples"],
+        "samples lost": found.summary["source"]["lost"],
+        "longest backlog, s": backlog.longest_s,
+        "responses": found.summary["counts"]["responses"],
+        "of them fitted": sum(found.summary["fit"]["statuses"].values()),
+        "lines of events": len(events),
+        "groups of events": len({event.details.get("group", id(event)) for event in events}),
+        "events": sum(1 for event in events for _ in each_event(event)),
+        "backlog at the end, s": waited_s,
+        "stop, s": stop_s,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m bench.overload", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=150.0)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for label, value in measured(asked.seconds, Path(folder) / "run").items():
+            print(f"{label:24}{value:12.4g}" if isinstance(value, float) else f"{label:24}{value:12,}")
+
+
+if __name__ == "__main__":
+    main()

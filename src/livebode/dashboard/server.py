@@ -1,0 +1,77 @@
+"""The server: uvicorn behind a Listener of ours, and what becomes of a fault in it."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import uvicorn
+
+from livebode.dashboard.listener import Listener
+from livebode.dashboard.patience import PatientProtocol
+
+_FAULT_EVERY_S = 60.0
+
+
+class Server(uvicorn.Server):
+    """uvicorn's, with connections that a Listener takes in.
+
+    Parameters
+    ----------
+    config
+        Of uvicorn.
+    listening
+        Not blocking.
+    tell
+        Hears of connections that were closed.
+    """
+
+    def __init__(self, config: uvicorn.Config, listening: socket.socket, tell: Callable[[str], None]) -> None:
+        super().__init__(config)
+        self._listening, self._tell = listening, tell
+        self._accepting: asyncio.Task[None] | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets=sockets or [])
+        listener = Listener(self._listening, self.config.ssl, self._protocol, self._tell)
+        self._accepting = asyncio.create_task(listener.run())
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        if self._accepting is not None:
+            self._accepting.cancel()
+        await super().shutdown(sockets)
+
+    def _protocol(self) -> PatientProtocol:
+        return PatientProtocol(self.config, self.server_state, self.lifespan.state)
+
+
+class Faults:
+    """Says what went wrong in the server itself, in one sentence, at most once a minute.
+
+    A traceback for each would let anybody who finds a fault fill the disk.
+    """
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
+        self._count, self._told_s = 0, float("-inf")
+
+    def take(self, error: BaseException | None, what: str = "") -> None:
+        """A fault."""
+        self._count += 1
+        now_s = time.monotonic()
+        if now_s - self._told_s < _FAULT_EVERY_S:
+            return
+        self._told_s = now_s
+        frames = traceback.extract_tb(error.__traceback__) if error is not None else []
+        place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
+        often = f", the {self._count}th" if self._count > 1 else ""
+        self._tell(f"internal error in the dashboard{often}: {what or repr(error)}{place}; the run continues")
+
+    def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """For `loop.set_exception_handler`."""
+        error = context.get("exception")
+        self.take(error, f"{context.get('message', '')} ({error!r})")

@@ -1,0 +1,51 @@
+// Moments of a run: time of day in the viewer's zone where the run has a clock, else the run's own time in s.
+const PLAIN = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" };
+const format = (more) => new Intl.DateTimeFormat("en-GB", { ...PLAIN, ...more });
+const TIME = format({}),
+  TENTHS = format({ fractionalSecondDigits: 1 }),
+  HUNDREDTHS = format({ fractionalSecondDigits: 2 }),
+  DAY = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short" }), // year-month-day
+  ZONE = format({ timeZoneName: "short" });
+
+let clockS = null; // seconds since 1970 at the run's time 0
+
+// Whether another clock is used from here on.
+export function setClock(originS) {
+  const before = clockS;
+  clockS = originS ?? null;
+  return before !== clockS;
+}
+
+const dateOf = (timeS) => new Date(1000 * (timeS + clockS));
+const zoneOf = (date) => ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName").value;
+
+// For a sentence: "14:32:07 CEST", with its date where that is not today's; `fine` with hundredths.
+export function moment(timeS, fine = false) {
+  if (!Number.isFinite(timeS)) return "–";
+  if (clockS === null) return seconds(timeS);
+  const date = dateOf(timeS),
+    day = DAY.format(date);
+  const words = `${(fine ? HUNDREDTHS : TIME).format(date)} ${zoneOf(date)}`;
+  return day === DAY.format(new Date()) ? words : `${day} ${words}`;
+}
+
+function seconds(timeS) {
+  const sign = timeS < 0 ? "−" : "",
+    size = Math.abs(timeS);
+  if (size < 120) return `${sign}${size.toFixed(2)} s`;
+  const whole = Math.floor(size),
+    hours = Math.floor(whole / 3600),
+    minutes = Math.floor(whole / 60) % 60;
+  return `${sign}${hours ? `${hours} h ` : ""}${minutes} min ${whole % 60} s`;
+}
+
+// For an axis of time, with marks that are so many seconds apart.
+export function ticks(splits, stepS) {
+  if (clockS === null) return splits.map((v) => Number(v.toFixed(6)).toString().replace("-", "−"));
+  return splits.map((v) => (stepS < 0.1 ? HUNDREDTHS : stepS < 1 ? TENTHS : TIME).format(dateOf(v + 1e-6)));
+}
+
+export function timeLabel(timeS) {
+  if (clockS === null) return "time in s";
+  return Number.isFinite(timeS) ? `time, ${zoneOf(dateOf(timeS))}` : "time";
+}

@@ -1,0 +1,138 @@
+"""Detection lines: bins that the excitation leaves without power, and what they show of the noise at the lines."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.bounds import power
+from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BESIDE = 4  # detection lines on each side of a line, and at most as many beyond the outermost lines
+_POWERLESS = 1e-4  # of the excitation's power at its lines: a bin with more is excited, whatever the lines say
+
+
+def beyond(lines: Lines) -> tuple[int, ...]:
+    """Bins below the first and above the last line, for the noise at these."""
+    first, last = lines.bins[0], lines.bins[-1]
+    above = range(last + 1, min(last + _BESIDE, (lines.window - 1) // 2) + 1)
+    return (*range(max(1, first - _BESIDE), first), *above)
+
+
+class Interpolation:
+    """A frequency response at bins from that at the lines, shape (rows, lines) to (rows, bins).
+
+    Between two lines linear in Ĝ where the phase rises (as at an antiresonance, whose numerator is smooth) and linear
+    in 1/Ĝ where it falls (as at a resonance, whose denominator is); beyond the outermost lines as at these.
+    """
+
+    def __init__(self, lines: NDArray[np.int64], bins: NDArray[np.int64]) -> None:
+        right = np.searchsorted(lines, bins).clip(0, len(lines) - 1)
+        self._left, self._right = np.where(lines[right] > bins, np.maximum(right - 1, 0), right), right
+        width = np.maximum(lines[self._right] - lines[self._left], 1)
+        self._share = np.where(self._right > self._left, (bins - lines[self._left]) / width, 0.0)
+
+    def at(self, ratio: Complex) -> Complex:
+        left, right = ratio[..., self._left], ratio[..., self._right]
+        falls = times(right, left.conj()).imag < 0
+        straight = left + _scaled(right - left, self._share)
+        across = right + _scaled(left - right, self._share)
+        size = power(across)
+        inverse = times(times(left, right), across.conj())
+        return np.where(falls, _scaled(inverse, 1 / size), straight)
+
+
+def times(one: Complex, other: Complex) -> Complex:
+    """Product by real operations: NumPy's of complex numbers rounds otherwise in the last elements of an array."""
+    product = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
+    product.real = one.real * other.real - one.imag * other.imag
+    product.imag = one.real * other.imag + one.imag * other.real
+    return product
+
+
+def _scaled(one: Complex, factor: Floats) -> Complex:
+    product = np.empty(one.shape, dtype=np.complex128)
+    product.real, product.imag = one.real * factor, one.imag * factor
+    return product
+
+
+class Groups:
+    """Powers at lines from those at bins: the mean of up to four bins on each side, linear between the two means.
+
+    Where one side has none the other counts alone. Bins with power NaN do not count.
+    """
+
+    def __init__(self, lines: NDArray[np.int64], bins: NDArray[np.int64]) -> None:
+        above = np.searchsorted(bins, lines)[:, np.newaxis] + np.arange(_BESIDE)
+        at = np.stack([above - _BESIDE, above])  # (sides, lines, bins of a side)
+        member = (at >= 0) & (at < len(bins))
+        self._at, self._member = at.clip(0, max(len(bins) - 1, 0)), member
+        count = member.sum(axis=2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            centre = np.where(member, bins[self._at], 0).sum(axis=2) / count
+            self._share = np.nan_to_num((lines - centre[0]) / (centre[1] - centre[0]))
+        weight = np.stack([np.where(count[1] > 0, 1 - self._share, 1.0), np.where(count[0] > 0, self._share, 1.0)])
+        self.dof = 1 / np.sum(weight**2 / np.where(count > 0, count, np.inf), axis=0)
+
+    def at(self, powers: Floats) -> Floats:
+        """Shape (rows, bins) to (rows, lines)."""
+        beside = powers[:, self._at]  # (rows, sides, lines, bins of a side)
+        known = self._member & np.isfinite(beside)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # One by one: the order of NumPy's own sums depends on how many rows there are.
+            side = sum(np.moveaxis(np.where(known, beside, 0.0), 3, 0)) / known.sum(axis=3)
+        below, above = side[:, 0], side[:, 1]
+        between = below + (above - below) * self._share
+        return np.asarray(np.where(np.isnan(below), above, np.where(np.isnan(above), below, between)))
+
+
+class DetectionNoise:
+    """|A_q − Ĝ_q·B_q|² at the detection lines (non-excited bins), interpolated over frequency to the lines.
+
+    What is left there is noise, distortion, and what the axis's own motion leaks there.
+
+    Parameters
+    ----------
+    lines
+        The lines, and the bins between them that are not excited.
+    outside
+        More bins that may be without excitation, below the first and above the last line.
+
+    Raises
+    ------
+    InputError
+        If there are too few such bins.
+    """
+
+    def __init__(self, lines: Lines, outside: tuple[int, ...] = ()) -> None:
+        if len(lines.quiet) < DETECTION_LINES_MIN:
+            raise InputError(
+                f"the lines leave {len(lines.quiet)} bins quiet, but the noise needs {DETECTION_LINES_MIN}; "
+                "take the scatter between periods instead, or fewer lines"
+            )
+        at = np.asarray(lines.bins)
+        self.bins = np.sort(np.array(lines.quiet + outside, dtype=np.int64))
+        self._interpolation = Interpolation(at, self.bins)
+        self._groups = Groups(at, self.bins)
+        self.dof = float(self._groups.dof.min())
+
+    def power(self, ratio: Complex, numerator: Complex, denominator: Complex, excited: Floats | None) -> Floats:
+        """Noise power of the numerator at each line, shape (rows, lines).
+
+        Parameters
+        ----------
+        ratio
+            The estimate at the lines, (rows, lines).
+        numerator, denominator
+            Spectra at the detection lines, (rows, bins).
+        excited
+            Power of the excitation at the detection lines over that at the lines; bins that have some do not count.
+        """
+        rest = power(numerator - times(self._interpolation.at(ratio), denominator))
+        if excited is not None:
+            rest = np.where(excited > _POWERLESS, np.nan, rest)
+        return self._groups.at(rest)

@@ -1,0 +1,110 @@
+"""Distortion at the lines from detection lines: what repeats with the excitation where the excitation has no power."""
+
+from __future__ import annotations
+
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.bounds import power
+from livebode.estimation.detection import Groups, Interpolation
+from livebode.estimation.moments import Moments
+from livebode.nouns import Lines
+
+Floats = NDArray[np.float64]
+
+_INSIDE_MIN = 2  # detection lines between the outermost lines, without which nothing is known of the band
+_OUTSIDE = 6  # more of them on each side
+_COHERENT = 3.0
+"""What a nonlinearity does to a line itself over what it spreads to a detection line.
+
+A nonlinearity changes the gain at the lines (the describing function) and spreads the rest over the bins that it
+reaches. Of a sign of Gaussian velocity the gain has 2/π of the power, and the rest is spread over a band twice as wide:
+about 2 for a flat velocity, 3 … 3.5 where a line is stronger than the others (`python -m studies.repeating`).
+"""
+_STEPS_MARGIN = 3.0  # how much more than uniform rounding the steps of a sensor may show at a few bins
+_POWERLESS = 1e-4
+_SMOOTH = np.ones(5)  # detection lines over which the noise is averaged before it is compared with
+
+
+def reached(lines: Lines) -> NDArray[np.int64]:
+    """Bins without excitation on which distortion of these lines falls as it does on the lines, ascending.
+
+    Sums and differences of excited bins are multiples of their common divisor; of odd multiples an odd nonlinearity
+    reaches the odd ones, and an even one the even ones, where no line is. Empty where too few lie between the lines.
+    """
+    bins = np.asarray(lines.bins)
+    unit = gcd(*lines.bins)
+    odd = bool(np.all(bins // unit % 2 == 1))
+    every = np.arange(unit, (lines.window + 1) // 2, 2 * unit if odd else unit)
+    free = np.setdiff1d(every, bins)
+    inside = free[(free > bins[0]) & (free < bins[-1])]
+    inside = np.intersect1d(inside, np.asarray(lines.quiet, dtype=np.int64))
+    if inside.size < _INSIDE_MIN:
+        return np.zeros(0, dtype=np.int64)
+    below, above = free[free < bins[0]][-_OUTSIDE:], free[free > bins[-1]][:_OUTSIDE]
+    return np.concatenate([below, inside, above]).astype(np.int64)
+
+
+class Distortion:
+    """Variance that distortion adds to numerator − Ĝ·denominator at the lines.
+
+    The residual of the mean over all periods, less what noise leaves there, at the detection lines on which distortion
+    falls; interpolated over frequency once as it is and once over |Ĝ|, of which the larger counts: steps of a sensor
+    are alike in the output, friction is alike in the torque. Three times that amplitude is what it may do to a line.
+
+    Parameters
+    ----------
+    lines
+        The lines, of which `reached` must not be empty.
+    """
+
+    def __init__(self, lines: Lines) -> None:
+        at = np.asarray(lines.bins)
+        self.bins = reached(lines)
+        self._interpolation = Interpolation(at, self.bins)
+        self._groups = Groups(at, self.bins)
+        self.dof = float(self._groups.dof.min())
+
+    def variance(self, moments: Moments, lines: slice, beside: slice, instrument: bool, steps: Floats) -> Floats:
+        """Shape (lines,), from Moments of one row at the lines and at `bins`.
+
+        `steps` (lines,) is the variance that steps of the sensor may have: these change no gain, for the other lines
+        carry each line over them, and so do not count three times.
+        """
+        numerator, denominator = moments.pair[:, 0]
+        ratio = numerator[lines] / denominator[lines]
+        everywhere = np.concatenate([ratio, self._interpolation.at(ratio)])
+        model = everywhere[len(ratio) :]
+        mean = power(numerator[beside] - model * denominator[beside])
+        scatter = moments.unexplained(_placed(everywhere, lines, beside))[0, beside]
+        noise = scatter / moments.unbiased[0] * moments.of_mean[0]
+        if instrument:
+            reference = moments.power[0, 0]
+            mean = np.where(reference[beside] > _POWERLESS * reference[lines].mean(), np.nan, mean)
+        gain = power(model)
+        as_output = self._groups.at((mean - noise)[np.newaxis])[0]
+        as_input = self._groups.at(((mean - noise) / gain)[np.newaxis])[0] * power(ratio)
+        found = np.maximum(np.fmax(as_output, as_input), 0.0)
+        coherent = (_COHERENT**2 - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
+        return np.asarray(_share(mean, noise) * (found + coherent))
+
+
+def _placed(everywhere: NDArray[np.complex128], lines: slice, beside: slice) -> NDArray[np.complex128]:
+    placed = np.zeros((1, beside.stop), dtype=np.complex128)
+    placed[0, lines], placed[0, beside] = everywhere[: lines.stop], everywhere[lines.stop :]
+    return placed
+
+
+def _share(mean: Floats, noise: Floats) -> float:
+    """How surely what repeats is more than noise: the square of its share of all the power, 0 … 1.
+
+    Squared, so that the chance by which noise repeats widens no bound by more than a few percent.
+    """
+    known = np.isfinite(mean) & np.isfinite(noise)
+    if not known.any():
+        return 0.0
+    smooth = np.convolve(np.where(known, noise, 0.0), _SMOOTH, "same") / np.convolve(known * 1.0, _SMOOTH, "same")
+    against_noise = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)[known].mean()
+    return float(max(0.0, 1 - 1 / against_noise) ** 2) if against_noise > 0 else 0.0

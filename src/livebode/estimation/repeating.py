@@ -1,0 +1,239 @@
+"""Errors that repeat with the excitation, and so are in no scatter: distortion, hum of the mains, steps of a sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation.bounds import power
+from livebode.estimation.distortion import Distortion, reached
+from livebode.estimation.mains import Mains
+from livebode.estimation.moments import Moments, PeriodMoments
+from livebode.estimation.movement import Movement
+from livebode.estimation.settings import Settings
+from livebode.estimation.spectra import Rows, after
+from livebode.estimation.steps import step_of
+from livebode.nouns import Block, Channel, Event
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_PERIODS_MIN = 2
+_DISTORTED = 0.5  # of |G|: from where on the value is not that of a linear machine
+_STEPS = 0.5  # amplitude in steps of the sensor below which a line may not be seen at all
+_EXCITED = 1e-12
+_KINDS = ("distorted", "hum", "steps")
+
+
+@dataclass(frozen=True, eq=False)
+class Repeating:
+    """What the periods before each window show: `distortion` of numerator/denominator and `invalid`, (rows, lines)."""
+
+    distortion: Floats
+    invalid: NDArray[np.bool_]
+    dof: float
+
+
+class RepeatingErrors:
+    """Watches whole periods of the signals for what repeats with the excitation without being a linear response.
+
+    One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out, and periods in
+    which the machine moves, do not count; a start, a gap and a movement begin the mean over periods again. What is
+    found counts from the next window on, and is never averaged away.
+
+    Parameters
+    ----------
+    settings
+        Lines, signals and estimator.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings, lines = settings, settings.lines
+        self._mains = Mains(lines)
+        possible = reached(lines).size > 0 and not settings.hann
+        self._distortion = Distortion(lines) if possible else None
+        beside = self._distortion.bins if self._distortion else np.zeros(0, dtype=np.int64)
+        self._bins = np.concatenate([np.asarray(lines.bins), beside])
+        self._lines, self._beside = slice(0, len(lines)), slice(len(lines), len(self._bins))
+        differenced = np.array([settings.channel(role) in settings.differenced for role in settings.roles])
+        advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
+        self._differenced, self._after = differenced, after(self._bins, lines.window, differenced, advanced)
+        self._samples = np.zeros((len(settings.roles), lines.window + 1))  # with the one before the period
+        self._position = np.full(lines.window, np.nan)
+        self._at, self._whole, self._largest, self._step = 0, False, 0.0, 0.0
+        self._movement = Movement(1)
+        self._forget()
+        self._now = np.full(len(lines), np.nan), np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
+        self._hum = np.zeros(len(lines), dtype=np.bool_)
+        self._told = np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
+        self._events: list[Event] = []
+
+    def _forget(self) -> None:
+        self._moments = PeriodMoments(1, len(self._bins), 1.0, own=True)
+        self._output = np.zeros(self._settings.lines.window // 2 + 1, dtype=np.complex128)
+        self._periods = 0
+
+    _STATE = ("_samples", "_position", "_output", "_hum", "_told")
+    _NUMBERS = ("_at", "_whole", "_largest", "_step", "_periods")
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        parts = {f"moments.{name}": array for name, array in self._moments.state().items()} | self._movement.state()
+        arrays = {name: getattr(self, name).copy() for name in self._STATE}
+        numbers = np.array([float(getattr(self, name)) for name in self._NUMBERS])
+        return arrays | parts | {"numbers": numbers, "distortion": self._now[0].copy(), "invalid": self._now[1].copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        for name in self._STATE:
+            getattr(self, name)[...] = state[name]
+        for name, value in zip(self._NUMBERS, state["numbers"].tolist()):
+            setattr(self, name, value)
+        self._at, self._periods, self._whole = int(self._at), int(self._periods), bool(self._whole)
+        self._moments.load({name.removeprefix("moments."): a for name, a in state.items() if name.startswith("mom")})
+        self._movement.load(state)
+        self._now = state["distortion"].astype(np.float64), state["invalid"].astype(np.bool_)
+
+    def drain(self) -> list[Event]:
+        """Events since the last call: lines that became invalid, each once with its reason."""
+        events, self._events = self._events, []
+        return events
+
+    def judged(self) -> dict[str, Any]:
+        """For a record: the lines with a reason against them, and the newest distortion at each."""
+        f = self._settings.lines.frequency_hz
+        reasons = {kind: f[self._told[i]].tolist() for i, kind in enumerate(_KINDS) if self._told[i].any()}
+        known = None if self._distortion is None else [None if np.isnan(d) else float(d) for d in self._now[0]]
+        return {
+            "distortion": known,
+            "invalid_lines_hz": reasons,
+            "mains_lines_hz": f[self._mains.lines.any(axis=0)].tolist(),
+        }
+
+    def restart(self, sample: int) -> None:
+        """The next sample has this number, and does not follow the one before."""
+        self._at = sample % self._settings.lines.window
+        self._whole = False
+        self._forget()
+        self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
+
+    def process(
+        self,
+        data: Floats,
+        rows: Rows,
+        schedule: Floats,
+        block: Block,
+    ) -> Repeating:
+        """What goes with the windows of these rows.
+
+        Parameters
+        ----------
+        data
+            Signals, shape (channels, samples), in the order of the settings' roles.
+        rows
+            The windows that end in these samples, and which samples are left out.
+        schedule
+            Shape (samples,).
+        block
+            Where the samples come from: their numbers, times and channels.
+        """
+        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
+        known, edges, done, window = [self._now], [0], 0, self._settings.lines.window
+        while done < data.shape[1]:
+            n = min(data.shape[1] - done, window - self._at)
+            piece = slice(done, done + n)
+            self._samples[:, self._at + 1 : self._at + 1 + n] = data[:, piece]
+            self._position[self._at : self._at + n] = schedule[piece]
+            self._whole &= not np.any((left_out >= done) & (left_out < done + n))
+            self._at, done = self._at + n, done + n
+            if self._at == window:
+                self._end_period(block.start + done - 1, block)
+                known.append(self._now)
+                edges.append(done)
+        which = np.searchsorted(edges, rows.sample - block.start, side="right") - 1
+        distortion, invalid = np.array([d for d, _ in known]), np.array([i.any(axis=0) for _, i in known])
+        dof = self._distortion.dof if self._distortion else np.inf
+        return Repeating(distortion[which], invalid[which], dof)
+
+    def _end_period(self, sample: int, block: Block) -> None:
+        if self._movement.process(0, np.array([np.mean(self._position)])).any():
+            self._forget()
+            self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
+        elif self._whole:
+            with np.errstate(all="ignore"):
+                self._take(block.channels)
+            self._tell(sample, block.origin_s + sample / block.rate_hz)
+        self._samples[:, 0] = self._samples[:, -1]
+        self._at, self._whole = 0, True
+
+    def _take(self, channels: Sequence[Channel]) -> None:
+        """The period that is complete."""
+        signals = np.where(self._differenced[:, np.newaxis], np.diff(self._samples), self._samples[:, 1:])
+        every = np.fft.rfft(signals)
+        spectra = dict(zip(self._settings.roles, every[:, self._bins] * self._after))
+        method = self._settings.method
+        reference = spectra[method.reference]
+        level = float(power(reference[self._lines]).max())
+        self._largest = max(self._largest, level)
+        if level <= _EXCITED * self._largest:
+            self._hum |= self._mains.seen_alone(power(every[0]))
+            return
+        three = np.stack([spectra["output"], spectra[method.denominator], reference])[:, np.newaxis]
+        powers = np.stack([power(reference), power(spectra["output"]), *2 * [np.zeros(len(self._bins))]])
+        moments = self._moments.update(0, three, powers[:, np.newaxis], np.zeros((3, 1)), np.array([True]))
+        self._periods += 1
+        self._output += (every[0] - self._output) / self._periods
+        self._step = step_of(signals[0]) if self._step == 0 or self._periods == 1 else self._step
+        if self._periods >= _PERIODS_MIN:
+            self._judge(moments, channels)
+
+    def _judge(self, moments: Moments, channels: Sequence[Channel]) -> None:
+        numerator, denominator = moments.pair[:, 0, self._lines]
+        step, window = self._steps_at_lines(channels), self._settings.lines.window
+        of_steps = window * step**2 / 12
+        distortion = np.full(len(numerator), np.nan)
+        if self._distortion is not None:
+            instrument = self._settings.method.reference == "excitation"
+            variance = self._distortion.variance(moments, self._lines, self._beside, instrument, of_steps)
+            distortion = np.sqrt(variance) / np.abs(denominator)
+        hum = self._hum | self._mains.seen(power(self._output))
+        distorted = distortion > _DISTORTED * np.abs(numerator / denominator)
+        self._counts = 2 * np.abs(numerator) / window / step
+        # Noise larger than the steps carries any amplitude over them.
+        quiet = moments.scatter[0, 0, self._lines] / moments.unbiased[0] < of_steps
+        self._now = distortion, np.stack([distorted, hum, (self._counts < _STEPS) & quiet])
+
+    def _steps_at_lines(self, channels: Sequence[Channel]) -> Floats:
+        """The output's step at each line, in its unit; 0 without steps.
+
+        The steps of a velocity are those of the position that it was differenced from.
+        """
+        unit = next((c.unit for c in channels if c.name == self._settings.output), "")
+        lines = self._settings.lines
+        velocity = unit.endswith("/s") or not unit
+        return self._step * (np.abs(1 - 1 / lines.z) if velocity else np.ones(len(lines)))
+
+    def _tell(self, sample: int, time_s: float) -> None:
+        invalid = self._now[1]
+        for i, at in zip(*np.nonzero(invalid & ~self._told)):
+            self._told[i, at] = True
+            f = self._settings.lines.frequency_hz[at]
+            message, value = self._reason(_KINDS[i], int(at), f)
+            details = {"line_hz": float(f)} | value
+            self._events.append(Event(_KINDS[i], sample, time_s, f"{message}; the line is not valid", details))
+
+    def _reason(self, kind: str, at: int, f: float) -> tuple[str, dict[str, float]]:
+        if kind == "hum":
+            return (
+                f"{f:g} Hz is a multiple of the mains frequency, and hum of the mains is seen; choose other lines",
+                {},
+            )
+        if kind == "steps":
+            counts = float(self._counts[at])
+            return f"the output moves {counts:.2g} steps of its sensor at {f:g} Hz: excite more", {"steps": counts}
+        numerator, denominator = self._moments.now.pair[:, 0, at]
+        share = float(self._now[0][at] / np.abs(numerator / denominator))
+        why = "friction, backlash or steps of a sensor; excite more, or move the axis"
+        return f"distortion may be {share:.0%} of the response at {f:g} Hz ({why})", {"share": share}

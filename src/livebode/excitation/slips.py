@@ -1,0 +1,133 @@
+"""Where a periodic excitation leaps in phase: samples that were dropped, or recorded twice, without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_PERIODS_MIN = 6
+_REMEMBERED = 16  # periods behind the expected one: a clock that drifts is followed, not taken for leaps
+# The energy by which a leap changes a period, over the noise of a sample: chance takes it for one once in 1e4 periods.
+_CLEAR = 16.0**2
+_CONFIRMED = 2  # periods in a row with the same leap
+_ROUNDING = 1e-6  # of a period's energy
+_STRANGE, _STRANGE_MAX = 4.0, 3  # times the noise, and periods in a row
+_AGREES = 1 / 8  # of that energy: how well the period before fits its own phase, and those after the new one
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A leap of the phase.
+
+    Attributes
+    ----------
+    sample
+        Number of the first sample behind it, as recorded.
+    missing
+        Samples that are missing before it; negative where so many came twice.
+    """
+
+    sample: int
+    missing: int
+
+
+def find_slips(x: Floats, period: int) -> tuple[Slip, ...]:
+    """The leaps of a signal with this period, all finite; what leaps by more than half a period counts backwards.
+
+    Each period is shifted to where it agrees best with the mean of the last 16. A shift counts where it explains more
+    than half of what such a shift does to the signal, far above the noise, in two periods in a row, and where the
+    period before fits well without it: a spike, a transient or a slow drift of the phase is none. Two leaps within
+    three periods are found as one, at one place.
+
+    Examples
+    --------
+    >>> x = np.resize(np.sin(2 * np.pi * np.arange(100) / 50) + np.sin(2 * np.pi * np.arange(100) / 10), 1000)
+    >>> find_slips(np.delete(x, 420), 50)
+    (Slip(sample=420, missing=1),)
+    """
+    count = x.size // period
+    if count < _PERIODS_MIN:
+        return ()
+    blocks = x[: count * period].reshape(count, period)
+    return tuple(_Search(blocks - blocks.mean(axis=1, keepdims=True)).slips())
+
+
+class _Search:
+    def __init__(self, blocks: Floats) -> None:
+        self._x, self._blocks, self._period = blocks.ravel(), blocks, blocks.shape[1]
+        self._spectra = np.fft.rfft(blocks, axis=1)
+        self._energy = np.sum(blocks**2, axis=1)
+        change = np.sum(np.diff(blocks, axis=0) ** 2, axis=1)
+        self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: leaps are in fewer than three of four pairs
+
+    def slips(self) -> list[Slip]:
+        found: list[Slip] = []
+        shift, strange, recent = 0, 0, [self._blocks[0]]
+        for at in range(1, len(self._blocks)):
+            expected = np.mean(recent[-_REMEMBERED:], axis=0)
+            leap = self._leap(at, expected, shift)
+            if leap:
+                found.append(Slip(self._place(at, expected, shift, shift + leap), leap))
+                shift += leap
+            here = np.roll(self._blocks[at], shift)
+            # A period with a leap in it says little of the next ones; one after the other says that the signal changed.
+            usual = _STRANGE * self._noise + _ROUNDING * self._energy[at]
+            strange = strange + 1 if np.sum((here - expected) ** 2) > usual else 0
+            if strange in (0, _STRANGE_MAX):
+                recent.append(here)
+                strange = 0
+        return found
+
+    def _leap(self, at: int, expected: Floats, shift: int) -> int:
+        """By how many samples the phase leaps in this period or the one before; 0 where it does not."""
+        if at + _CONFIRMED > len(self._blocks):
+            return 0
+        template = np.fft.rfft(expected)
+        own = np.fft.irfft(np.abs(template) ** 2, self._period)
+        leap = 0
+        for m in range(at, at + _CONFIRMED):
+            agreement = np.fft.irfft(template * self._spectra[m].conj(), self._period)
+            best = int(np.argmax(agreement))
+            here = _folded(best - shift, self._period)
+            energy = 2 * (own[0] - own[here % self._period])
+            gain = 2 * (agreement[best] - agreement[shift % self._period])
+            rest = self._energy[m] + own[0] - 2 * agreement[best]
+            fits = rest <= self._noise * 2 + _AGREES * energy
+            clear = gain > energy / 2 and energy > _CLEAR * self._noise / self._period
+            if not here or not fits or not clear or (leap and here != leap):
+                return 0
+            leap = here
+        return leap if self._fitted(at, expected, shift, float(energy)) else 0
+
+    def _fitted(self, at: int, expected: Floats, shift: int, energy: float) -> bool:
+        """Whether one of the two periods before still fits the old phase: the leap may lie in the nearer one."""
+        before = [np.roll(self._blocks[m], shift) for m in range(max(at - 2, 0), at)]
+        rests = [float(np.sum((block - expected) ** 2)) for block in before]
+        return min(rests) <= self._noise * 2 + _AGREES * energy
+
+    def _place(self, at: int, expected: Floats, shift: int, leapt: int) -> int:
+        """The first sample behind the leap: where the old phase before and the new one behind leave least."""
+        first, last = max(at - 1, 0) * self._period, (at + 1) * self._period
+        n, part = np.arange(first, last), self._x[first:last]
+        old = (part - expected[(n + shift) % self._period]) ** 2
+        new = (part - expected[(n + leapt) % self._period]) ** 2
+        return int(first + np.argmin(np.concatenate(([0.0], np.cumsum(old - new)))))
+
+
+def _folded(shift: int, period: int) -> int:
+    shift %= period
+    return shift - period if shift > period // 2 else shift
+
+
+def realigned(x: Floats, slips: Sequence[Slip]) -> Floats:
+    """The signal with NaN for what is missing, and without what came twice, on one grid of periods."""
+    parts, done = [], 0
+    for slip in slips:
+        parts += [x[done : slip.sample], np.full(max(slip.missing, 0), np.nan)]
+        done = slip.sample + max(-slip.missing, 0)
+    return np.concatenate([*parts, x[done:]])

@@ -1,0 +1,253 @@
+"""Competing models for one response: which adequate one explains it best, and how far the others are from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Set
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, Extended
+from livebode.fitting.physical import DELAY, PhysicalModel
+from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.rows import Fitted, fit_rows
+from livebode.fitting.weighing import misfit, weights
+from livebode.nouns.parameters import OK
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_TAKEN = 3  # at most
+_FRICTION_PRICE = 2.5  # that −2·ln(likelihood) must fall by: 1.6 sigma, for every machine has some
+_PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0}
+_DAMPING_PRICE = 4.0  # of a mode whose damping is free
+_APART = 0.15  # of a frequency of the model itself: a further mode nearer to it would bend that one's own shape
+_MODES, _MODES_TRIED = 40, 3
+_LOWEST, _HIGHEST = 0.7, BEYOND  # of the lowest and of the highest line, where a further mode is looked for
+_NEAR_NYQUIST = 0.9
+_DAMPINGS = (0.02, 0.1)
+_EARLIEST_TICKS = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Competitor:
+    """One model, its fit of one row, and what it costs: −2·ln(likelihood) and the price of what it has taken.
+
+    Attributes
+    ----------
+    taken
+        What it has beside the model that was asked for, in the order in which it was taken.
+    """
+
+    problem: Problem
+    fitted: Fitted
+    cost: float
+    taken: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What competitors may change: not what the user holds, and a delay only where nobody else freed it."""
+
+    fixed: Set[str]
+    delay: bool
+    top_hz: float
+
+
+def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: Allowed) -> list[Competitor]:
+    """The model that explains one row best, then all others that were fitted.
+
+    From the model that was asked for on, the best of all that differ from it by one step is taken as long as the cost
+    falls, at most three times; what was taken before is left again where the cost is then less.
+    """
+    every, best = [start], start
+    for _ in range(_TAKEN):
+        found = list(_rivals(best, measured, noise_dof, allowed))
+        every += found
+        better = min([best, *found], key=lambda c: c.cost)
+        if better is best:
+            break
+        best = better
+        less = list(_less(best, measured, noise_dof))
+        every += less
+        best = min([best, *less], key=lambda c: c.cost)
+    return [best, *(c for c in every if c is not best)]
+
+
+def competitor(
+    problem: Problem, measured: Measured, noise_dof: Floats, fitted: Fitted, taken: tuple[str, ...] = ()
+) -> Competitor:
+    """A fit with its cost."""
+    price = sum(_PRICE.get(name, _FRICTION_PRICE) for name in taken)
+    if MODE in taken:
+        # It is looked for over all lines, and the largest of as many chances is found.
+        price += 2 * float(np.log(np.count_nonzero(measured.use)))
+        price += _DAMPING_PRICE * ("mode_damping" not in problem.held)
+    return Competitor(
+        problem, fitted, float(misfit(measured, fitted.response, fitted.dof, noise_dof)[0]) + price, taken
+    )
+
+
+def mixed(every: list[Competitor]) -> Floats:
+    """Covariance (parameters, parameters) of the first one's values that holds the choice too.
+
+    Each model has the weight e^(−cost/2). What the models' values differ by, and what a wider model is less certain,
+    count by these weights: about the best one's values the mean square error of the mixture.
+    """
+    best = every[0]
+    found = np.array(best.fitted.covariance[0])
+    names = best.problem.model.names
+    for other in every[1:]:
+        common = [name for name in names if name in other.problem.model.names]
+        mine, theirs = ([c.problem.model.names.index(n) for n in common] for c in (best, other))
+        apart = other.fitted.values[0, theirs] - best.fitted.values[0, mine]
+        more = other.fitted.covariance[0][np.ix_(theirs, theirs)] - best.fitted.covariance[0][np.ix_(mine, mine)]
+        found[np.ix_(mine, mine)] += _weight(other, every) * (np.outer(apart, apart) + positive(more))
+    return found
+
+
+def _weight(of: Competitor, every: list[Competitor]) -> float:
+    relative = np.exp(-np.array([c.cost - min(e.cost for e in every) for c in (of, *every)]) / 2)
+    return float(relative[0] / relative[1:].sum())
+
+
+def positive(matrix: Floats) -> Floats:
+    """The part of a symmetric matrix that is not negative, in units in which its diagonal is one."""
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    return np.asarray((vectors * values.clip(0)) @ vectors.T * np.outer(scale, scale))
+
+
+def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allowed) -> Iterator[Competitor]:
+    for name, problem, starts in _steps(of, measured, allowed):
+        if 2 * np.count_nonzero(measured.use) <= problem.size:
+            continue
+        begun = _best_start(problem, measured, of.fitted, starts)
+        fitted = fit_rows(problem, measured, noise_dof, begun)
+        if fitted.status[0] == OK and _possible(problem, fitted, allowed):
+            yield competitor(problem, measured, noise_dof, fitted, (*of.taken, name))
+
+
+def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
+    """The same without one of the parameters that it took before: a delay, say, that stood in for a mode."""
+    for i, name in enumerate(of.taken[:-1]):
+        if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
+            problem = of.problem.variant(held={name: 0.0})
+            fitted = fit_rows(problem, measured, noise_dof, problem.with_held(of.fitted.ended))
+            if fitted.status[0] == OK:
+                yield competitor(problem, measured, noise_dof, fitted, of.taken[:i] + of.taken[i + 1 :])
+
+
+def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tuple[str, Problem, Floats]]:
+    """Name, problem and starts (starts, parameters) of each."""
+    problem, at = of.problem, of.fitted.ended[0]
+    for name in (DELAY, *problem.model.frictions):
+        if name in problem.held and name not in allowed.fixed:
+            wider = problem.variant(free=(name,))
+            begun = at if name == DELAY else _only(at, wider.model.shown(at, problem.grid), wider, name)
+            yield name, wider, begun[np.newaxis]
+    model = problem.model
+    base, extras = (model.base, model.extras) if isinstance(model, Extended) else (model, ())
+    if LAG not in extras:
+        lagging = Extended(base, (*extras, LAG), allowed.top_hz)
+        begun = _padded(lagging, problem.model, at)
+        yield LAG, problem.variant(lagging), begun[np.newaxis]
+        if allowed.delay and DELAY in model.names and DELAY not in problem.held:
+            instead = problem.variant(lagging, held={DELAY: 0.0})
+            late = max(float(at[model.names.index(DELAY)]), 1e-5)
+            begun = instead.with_held(begun)
+            begun[instead.model.names.index("lag")] = late
+            yield LAG, instead, begun[np.newaxis]
+    if hasattr(base, "output") and not {RESIDUAL, MODE} & set(extras):
+        if BEYOND * allowed.top_hz < _NEAR_NYQUIST * problem.grid.rate_hz / 2:
+            stiff = problem.variant(Extended(base, (*extras, RESIDUAL), allowed.top_hz))
+            yield RESIDUAL, stiff, _padded(stiff.model, model, at)[np.newaxis]
+        moving = problem.variant(Extended(base, (*extras, MODE), allowed.top_hz))
+        starts = _mode_starts(moving, problem, measured, of.fitted)
+        yield MODE, moving, starts
+        # Far above the band its damping cannot be seen.
+        undamped = moving.variant(held={"mode_damping": START_DAMPING})
+        yield MODE, undamped, undamped.with_held(starts)
+
+
+def _only(at: Floats, shown: Floats, problem: Problem, name: str) -> Floats:
+    """`at` with one parameter as large as the lines would just show."""
+    begun = problem.with_held(at)
+    begun[problem.model.names.index(name)] = shown[problem.model.names.index(name)]
+    return begun
+
+
+def _padded(model: PhysicalModel, of: PhysicalModel, at: Floats) -> Floats:
+    """Values of a model as those of one with more parameters, the new ones at their start."""
+    known = dict(zip(of.names, at))
+    return np.array([known.get(p.name, p.start) for p in model.parameters])
+
+
+def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitted) -> Floats:
+    """Values with a further mode where it would lower chi² most to first order, (starts, parameters).
+
+    For each frequency and damping the gain is the only new parameter, and linear: beside the slopes of the fit, which
+    take their share of it, least squares give it at once.
+    """
+    grid = problem.grid
+    weight = np.where(measured.use, weights(measured.sigma, np.abs(fitted.response), fitted.epsilon), 0.0)
+    known, _ = of.solve(measured, weight, fitted.ended, 1)
+    slope = _stacked((weight[..., np.newaxis] * known.slope)[0])
+    rest = _stacked((weight * np.where(measured.use, measured.value - fitted.response, 0.0))[0])
+    basis = np.linalg.qr(slope)[0]
+    high = min(_HIGHEST * grid.frequency_hz.max(), _NEAR_NYQUIST * grid.rate_hz / 2)
+    frequency = np.geomspace(_LOWEST * grid.frequency_hz.min(), high, _MODES)
+    names = problem.model.names
+    modes = np.repeat(_padded(problem.model, of.model, fitted.ended[0])[np.newaxis], _MODES * len(_DAMPINGS), axis=0)
+    modes[:, names.index("mode")] = np.tile(frequency, len(_DAMPINGS))
+    modes[:, names.index("mode_damping")] = np.repeat(_DAMPINGS, _MODES)
+    unit = problem.model.shown(modes, grid)[:, names.index("mode_gain")]
+    modes[:, names.index("mode_gain")] = unit
+    column = _stacked((weight * (problem.model.at(modes, grid) - fitted.response)).T)
+    column = column - basis @ (basis.T @ column)
+    power = np.sum(column**2, axis=0) + 1e-300
+    share = rest @ column / power
+    gain = share**2 * power
+    gain[(share < 0) & problem.model.parameters[-1].one_sided] = 0.0
+    gain[_near_own(of, fitted.ended, modes[:, names.index("mode")])] = 0.0
+    chosen = np.argsort(-gain)[:_MODES_TRIED]
+    modes[:, names.index("mode_gain")] = unit * share
+    return modes[chosen]
+
+
+def _near_own(problem: Problem, values: Floats, frequency_hz: Floats) -> NDArray[np.bool_]:
+    """Which frequencies are near a resonance or antiresonance of the model."""
+    transfer = problem.model.continuous(values[0])
+    own_hz = np.abs(np.concatenate([transfer.poles(), transfer.zeros()])) / (2 * np.pi)
+    return np.asarray((np.abs(np.log(np.divide.outer(frequency_hz, own_hz + 1e-300))) < _APART).any(axis=1))
+
+
+def _stacked(values: Complex) -> Floats:
+    """Real above imaginary parts."""
+    return np.concatenate([values.real, values.imag])
+
+
+def _best_start(problem: Problem, measured: Measured, fitted: Fitted, starts: Floats) -> Floats:
+    """One row, of the start that leads to the least."""
+    if len(starts) == 1:
+        return starts
+    weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)
+    every = measured.repeated(len(starts))
+    found, cost = problem.solve(every, np.tile(weight, (len(starts), 1)), starts)
+    return found.values[[int(np.argmin(cost))]]
+
+
+def _possible(problem: Problem, fitted: Fitted, allowed: Allowed) -> bool:
+    """Whether its mode is apart from the model's own, and its delay, if it has a free one, one that logging makes."""
+    model = problem.model
+    if isinstance(model, Extended) and MODE in model.extras:
+        own = len(model.base.names)
+        base = Problem(model.base, problem.grid)
+        if _near_own(base, fitted.values[:, :own], fitted.values[:, model.names.index("mode")]).any():
+            return False
+    if DELAY in problem.held or DELAY not in problem.model.names or not allowed.delay:
+        return True
+    late_s = fitted.values[0, problem.model.names.index(DELAY)]
+    return bool(late_s * problem.grid.rate_hz >= -_EARLIEST_TICKS)

@@ -1,0 +1,76 @@
+"""Files of a run: regular ones, by plain name inside its directory, through no link.
+
+A run may come from anybody. A link in it, a pipe or a device would let it name what is outside.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from livebode.nouns import InputError
+
+_SAFE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+_SAFE |= getattr(os, "O_BINARY", 0)
+
+
+def open_read(run: Path, name: str) -> BinaryIO:
+    """A file of a run, to be read.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, or reached through a link.
+    OSError
+        If it cannot be opened; FileNotFoundError where it is not there.
+    """
+    check_folder(run, name)
+    try:
+        file = os.fdopen(os.open(run / name, os.O_RDONLY | _SAFE), "rb")
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link; a socket
+            raise _not_regular(run / name) from None
+        raise
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise _not_regular(run / name)
+    return file
+
+
+def read_bytes(run: Path, name: str, size_bytes_max: int | None = None) -> bytes:
+    """All that a file of a run holds; InputError where it is longer than this."""
+    with open_read(run, name) as file:
+        data = file.read(-1 if size_bytes_max is None else size_bytes_max + 1)
+    if size_bytes_max is not None and len(data) > size_bytes_max:
+        raise InputError(f"{str(run / name)!r} is longer than {size_bytes_max} bytes; a run does not write that")
+    return data
+
+
+def is_folder(path: Path) -> bool:
+    """Whether this is a directory, and not a link to one."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def check_folder(run: Path, name: str) -> None:
+    """InputError where the directory of a run's file is a link, or a file."""
+    folder = (run / name).parent
+    if folder != run and os.path.lexists(folder) and not is_folder(folder):
+        raise InputError(f"{str(folder)!r} is not a directory of the run; remove it")
+
+
+def check_own(run: Path, name: str) -> None:
+    """InputError where a file that is to be written is a link, no regular file, or has another name elsewhere."""
+    check_folder(run, name)
+    try:
+        found = os.lstat(run / name)
+    except FileNotFoundError:
+        return
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        raise _not_regular(run / name)
+
+
+def _not_regular(path: Path) -> InputError:
+    return InputError(f"{str(path)!r} is not a file of its own (a link, a pipe or a device); remove it")

@@ -1,0 +1,122 @@
+"""The checksums of a table in one Parquet file: of each row group and of the end, so that damage costs little."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.nouns import Event, InputError
+from livebode.records.inside import open_read
+from livebode.records.segments.damage import KIND
+
+_BLOCK = 1 << 20
+_verified: dict[tuple[object, ...], list[bool]] = {}
+
+
+@dataclass(frozen=True)
+class Part:
+    """Consecutive bytes of a Parquet file: a row group, or, with no rows, what is behind the last one."""
+
+    rows: int
+    size_bytes: int
+    sha256: str
+
+
+def parts_of(path: Path) -> list[dict[str, Any]]:
+    """The parts of a file that has just been written, for run.json."""
+    with path.open("rb") as file:
+        about = pq.read_metadata(file)
+        groups = [about.row_group(number) for number in range(about.num_row_groups)]
+        ends = [max(_end(group.column(k)) for k in range(group.num_columns)) for group in groups]
+        rows = [group.num_rows for group in groups]
+        file.seek(0)
+        size = os.fstat(file.fileno()).st_size
+        sizes = [end - begin for begin, end in zip([0, *ends], [*ends, size])]
+        return [asdict(Part(n, size, _sha256(file, size))) for n, size in zip([*rows, 0], sizes)]
+
+
+class Piece:
+    """A table in one file, with what run.json says of its parts; None where it says nothing.
+
+    Raises
+    ------
+    InputError
+        If run.json says what a run does not write.
+    """
+
+    def __init__(self, run: Path, name: str, parts: Any, tell: Callable[[Event], None]) -> None:
+        self._run, self._name, self._tell = run, name, tell
+        self._parts: list[Part] | None = None
+        try:
+            if parts is not None:
+                self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
+                self._parts[-1]
+        except (TypeError, LookupError, ValueError):
+            raise InputError(f"{str(run / 'run.json')!r} does not name the parts of {name} as a run does") from None
+
+    def groups(self) -> list[int] | None:
+        """The numbers of the row groups that are whole; None for all. Damaged ones are told.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be opened.
+        """
+        with open_read(self._run, self._name) as file:
+            if self._parts is None:
+                return None
+            whole = self._whole(file, self._parts)
+        if not whole[-1]:
+            self._tell_of("its end is, and nothing of it can be read", sum(part.rows for part in self._parts))
+            return []
+        begin = 0
+        for part, sound in zip(self._parts, whole):
+            if not sound:
+                self._tell_of(f"rows {begin} to {begin + part.rows - 1} are not read", part.rows)
+            begin += part.rows
+        return [number for number, sound in enumerate(whole[:-1]) if sound]
+
+    def batches(self, rows: int) -> Iterator[pa.RecordBatch]:
+        """The rows that are whole, in parts of at most so many."""
+        groups = self.groups()
+        if groups == []:
+            return
+        # Else what was read ahead of a long run stays in memory until its end.
+        with pq.ParquetFile(self._run / self._name, pre_buffer=False) as file:
+            yield from file.iter_batches(rows, row_groups=groups)
+
+    def _whole(self, file: BinaryIO, parts: list[Part]) -> list[bool]:
+        """Whether each part is; computed once in a process, as long as the file is not touched."""
+        status = os.fstat(file.fileno())
+        key = (tuple(parts), status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+        if key not in _verified:
+            sound = [_sha256(file, part.size_bytes) == part.sha256 for part in parts]
+            sound[-1] &= status.st_size == sum(part.size_bytes for part in parts)
+            _verified[key] = sound
+        return _verified[key]
+
+    def _tell_of(self, what: str, rows: int) -> None:
+        table = self._name.removesuffix(".parquet")
+        self._tell(Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}}))
+
+
+def _end(column: Any) -> int:
+    begin = column.data_page_offset
+    if column.has_dictionary_page:
+        begin = min(begin, column.dictionary_page_offset)
+    return int(begin + column.total_compressed_size)
+
+
+def _sha256(file: BinaryIO, size: int) -> str:
+    found = hashlib.sha256()
+    while size > 0 and (block := file.read(min(size, _BLOCK))):
+        found.update(block)
+        size -= len(block)
+    return found.hexdigest()

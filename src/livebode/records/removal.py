@@ -1,0 +1,84 @@
+"""Removing a run: what livebode writes there, by name, and nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import stat
+from pathlib import Path
+
+from livebode.nouns import InputError
+from livebode.records.inside import is_folder
+from livebode.records.summary_file import read_summary
+
+_SHOWN = 5
+_FILES = re.compile(
+    r"(run|run-copy)\.json|(events|manifest)\.jsonl|(responses|parameters)\.parquet|report\.(html|pdf)"
+    r"|(bode|tracking|margins|validation)\.png|\.(run|run-copy)\.json\.partial|\.report\.(html|pdf)\.partial"
+)
+_SEGMENT = re.compile(r"\d{6,9}\.parquet|\.\d{6,9}\.parquet\.partial")
+_JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")
+_PICTURE = re.compile(r"[a-z]+\.png")
+_FOLDERS = {
+    "responses": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT, "open": _JOURNAL, "damaged": _JOURNAL,
+    ".pictures.partial": _PICTURE,
+}  # fmt: skip
+
+
+def foreign(run: Path) -> list[str]:
+    """What is in the directory of a run and was not written by livebode: other names, links, pipes, devices."""
+    found = []
+    for path in sorted(run.iterdir()):
+        inner = _FOLDERS.get(path.name)
+        if inner is None or not is_folder(path):
+            found += [] if _FILES.fullmatch(path.name) and _regular(path) else [path.name]
+        else:
+            found += [f"{path.name}/{p.name}" for p in sorted(path.iterdir()) if not _written(p, inner)]
+    return found
+
+
+def check_removable(path: Path) -> None:
+    """InputError where this is not an empty directory, or that of a run with nothing foreign in it."""
+    if not is_folder(path) or (any(path.iterdir()) and not os.path.lexists(path / "run.json")):
+        raise InputError(f"{str(path)!r} is not the directory of a run, so --force leaves it; take another --out")
+    if not any(path.iterdir()):
+        return
+    read_summary(path)
+    if others := foreign(path):
+        named = ", ".join(others[:_SHOWN]) + f" and {len(others) - _SHOWN} more" * (len(others) > _SHOWN)
+        raise InputError(
+            f"{str(path)!r} holds what livebode did not write, so --force leaves it: {named}; move that away, or take "
+            "another --out"
+        )
+
+
+def remove(run: Path, *, itself: bool = True) -> None:
+    """Remove what livebode wrote there, and the directory itself, if it is empty then.
+
+    Raises
+    ------
+    OSError
+        If something cannot be removed, or there is something else.
+    """
+    # Without it the rest is not a run: it goes last, so that what was interrupted can be done again.
+    for path in sorted(run.iterdir(), key=lambda path: path.name == "run.json"):
+        inner = _FOLDERS.get(path.name)
+        if inner is not None and is_folder(path):
+            for file in path.iterdir():
+                if _written(file, inner):
+                    os.unlink(file)
+            with contextlib.suppress(OSError):
+                os.rmdir(path)
+        elif _FILES.fullmatch(path.name) and _regular(path):
+            os.unlink(path)
+    if itself:
+        os.rmdir(run)
+
+
+def _written(path: Path, names: re.Pattern[str]) -> bool:
+    return bool(names.fullmatch(path.name)) and _regular(path)
+
+
+def _regular(path: Path) -> bool:
+    return stat.S_ISREG(path.lstat().st_mode)

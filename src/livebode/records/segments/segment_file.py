@@ -1,0 +1,54 @@
+"""The Parquet file of a closed segment: what the manifest says, or damaged."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from livebode.nouns import InputError
+from livebode.records.inside import open_read
+from livebode.records.segments.manifest import Segment
+
+_VALUES_MAX = 1 << 27  # 1 GiB of numbers; a full journal holds 32 MiB
+_VERIFIED_MAX = 100_000
+_verified: set[tuple[object, ...]] = set()
+
+
+def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
+    """The file, read. Its checksum is computed once in a process, as long as the file is not touched.
+
+    Raises
+    ------
+    InputError
+        If it is not what the manifest says, or holds more than a segment does.
+    OSError
+        If it cannot be read.
+    """
+    with open_read(run, segment.name) as file:
+        status = os.fstat(file.fileno())
+        data = file.read(segment.size_bytes + 1)
+    key = (segment.sha256, status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+    if key not in _verified:
+        if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
+            raise InputError("its checksum is not that of the manifest")
+        if len(_verified) >= _VERIFIED_MAX:
+            _verified.clear()
+        _verified.add(key)
+    try:
+        file = pq.ParquetFile(pa.BufferReader(data))
+    except pa.ArrowException as error:
+        raise InputError(f"it is not Parquet ({error})") from None
+    _check_size(file.metadata, segment)
+    return file
+
+
+def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
+    if about.num_rows != segment.rows:
+        raise InputError(f"it has {about.num_rows} rows, where the manifest says {segment.rows}")
+    size_bytes = sum(about.row_group(group).total_byte_size for group in range(about.num_row_groups))
+    if max(about.num_rows * about.num_columns, size_bytes // 8) > _VALUES_MAX:
+        raise InputError(f"its {about.num_rows} rows are more than a segment holds")

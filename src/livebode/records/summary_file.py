@@ -1,0 +1,88 @@
+"""run.json: what a run measured and how, with a checksum, and a copy of it that is read where it is damaged."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zlib
+from pathlib import Path
+from typing import Any
+
+from livebode.nouns import InputError
+from livebode.records.inside import read_bytes
+from livebode.records.plain_json import to_json
+
+RUN, COPY = "run.json", "run-copy.json"
+_SIZE_BYTES_MAX = 64 << 20
+_CHECKSUM = re.compile(r',\n  "crc32": "([0-9a-f]{8})"\n\}\n?\Z')
+
+
+class DamagedError(ValueError):
+    """The file is not what was written."""
+
+
+def to_document(summary: dict[str, Any]) -> bytes:
+    """The summary as JSON over several lines, with the CRC-32 of its text without that key as its last one.
+
+    >>> print(to_document({"found": {}}).decode(), end="")
+    {
+      "found": {},
+      "crc32": "a68c2252"
+    }
+    """
+    text = to_json(summary, indent=2)
+    return f'{text[:-2]},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()
+
+
+def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
+    """The summary again, without its checksum; DamagedError where it is not what was written.
+
+    One without a checksum is taken where it need not be `checked`.
+
+    >>> from_document(to_document({"found": {"rate_hz": 1000}}))
+    {'found': {'rate_hz': 1000}}
+    >>> from_document(to_document({"found": {"rate_hz": 1000}}).replace(b"1000", b"1001"))
+    Traceback (most recent call last):
+    livebode.records.summary_file.DamagedError: its checksum is wrong
+    """
+    try:
+        text = data.decode("utf-8")
+        end = _CHECKSUM.search(text)
+        if end is None and checked:
+            raise DamagedError("it has no checksum")
+        if end is not None:
+            text = text[: end.start()] + "\n}"
+            if f"{zlib.crc32(text.encode()):08x}" != end[1]:
+                raise DamagedError("its checksum is wrong")
+        found = json.loads(text)
+    except RecursionError:
+        raise DamagedError("it is nested too deeply") from None
+    except ValueError as error:
+        raise error if isinstance(error, DamagedError) else DamagedError(str(error)) from None
+    if not isinstance(found, dict):
+        raise DamagedError("it is not an object")
+    return found
+
+
+def read_summary(run: Path) -> tuple[dict[str, Any], str]:
+    """What run.json says, or its copy where it is damaged; then also a sentence that says so.
+
+    Raises
+    ------
+    InputError
+        If neither can be read, or this is not the directory of a run.
+    """
+    try:
+        data = read_bytes(run, RUN, _SIZE_BYTES_MAX)
+        # An earlier livebode wrote neither a checksum nor a copy.
+        return from_document(data, checked=os.path.lexists(run / COPY)), ""
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{str(run)!r} is not the directory of a run: it has no run.json") from None
+    except (OSError, ValueError) as error:
+        why = str(error)
+    try:
+        copy = from_document(read_bytes(run, COPY, _SIZE_BYTES_MAX))
+        return copy, f"{str(run / RUN)!r} is damaged ({why}); its copy {COPY} is read instead"
+    except (OSError, ValueError):
+        raise InputError(f"{str(run / RUN)!r} cannot be read: {why}") from None

@@ -1,0 +1,80 @@
+"""What run.json holds, by name and type: a file that came from anybody is refused before anything relies on it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+Text = Annotated[str, Field(max_length=100_000)]
+Count = Annotated[int, Field(ge=0, lt=1 << 62)]
+Positive = Annotated[int, Field(gt=0, lt=1 << 62)]
+Section = dict[str, Any]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+
+
+class _Found(_Part):
+    rate_hz: Annotated[float, Field(gt=0)]
+    window: Positive
+    bins: list[Positive]
+    quiet_bins: list[Positive]
+    quantity: Text = ""
+    unit: Text = ""
+    hop: Positive = 1
+    frequency_hz: list[float] = []
+    schedule: Text | None = None
+    format: Text | None = None
+    rate_from: Text | None = None
+
+
+class _Speed(_Part):
+    recorded_s: float
+    run_s: float
+    times_real_time: float
+
+
+class _Record(_Part):
+    finished: bool
+    tables: list[Text] = []
+
+
+class _Configuration(_Part):
+    signals: dict[str, Any] = {}
+    source: Section = {}
+    tracking: Section | None = None
+    lines: Section | None = None
+    monitoring: Section | None = None
+    record: Section | None = None
+    fit: Section | None = None
+    loop: Section | None = None
+
+
+class _Summary(_Part):
+    configuration: _Configuration = _Configuration()
+    found: _Found
+    counts: dict[str, Count | None] = {}
+    speed: _Speed | None = None
+    versions: Section = {}
+    source: Section | None = None
+    fit: Section | None = None
+    loop: Section | None = None
+    monitoring: Section | None = None
+    record: _Record | None = None
+    files: dict[str, list[Section]] = {}
+
+
+def what_is_wrong(summary: dict[str, Any]) -> str:
+    """The first value that a run does not write, in words; empty where there is none.
+
+    >>> what_is_wrong({"found": {"rate_hz": "fast", "window": 10, "bins": [1], "quiet_bins": []}})
+    'found.rate_hz: Input should be a valid number'
+    """
+    try:
+        _Summary.model_validate(summary)
+    except ValidationError as error:
+        first = error.errors()[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return ""

@@ -1,0 +1,115 @@
+"""A recording on one grid of periods: what was dropped becomes a gap, a known transient is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from livebode.estimation import Settings
+from livebode.excitation import Slip, find_slips
+from livebode.nouns import Block, Channel, Event, counted
+from livebode.sources import Log
+
+_PART = 1 << 20  # samples that are searched at a time
+_OVERLAP = 8  # periods of two parts, so that a leap at their border is seen with its neighbours
+_LISTED_MAX = 1000
+
+
+def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
+    """Leaps of the excitation's phase by the period of the lines; none where the reference is no excitation."""
+    name, period = settings.excitation, settings.lines.window
+    if settings.method.reference != "excitation" or name is None:
+        return ()
+    found: list[Slip] = []
+    size, overlap = max(_PART // period, 4 * _OVERLAP) * period, _OVERLAP * period
+    held, first = np.zeros(0), 0
+    for part in _whole_parts(log, name, size):
+        held = np.concatenate([held, part])
+        for slip in find_slips(_bridged(held), period):
+            leap = Slip(first + slip.sample, slip.missing)
+            if not found or leap.sample > found[-1].sample + 2 * period:
+                found.append(leap)
+        # The next part begins on the grid of this one.
+        kept = held.size - max(held.size - overlap, 0) // period * period
+        first, held = first + held.size - kept, held[held.size - kept :]
+    return tuple(found)
+
+
+def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
+    """The samples of a channel in parts of about this size, NaN where some are missing."""
+    parts: list[np.ndarray] = []
+    held, stop = 0, 0
+    for block in log.blocks([channel]):
+        parts += [np.full(block.start - stop, np.nan), block[channel]]
+        held, stop = held + block.stop - stop, block.stop
+        if held >= size:
+            yield np.concatenate(parts)
+            parts, held = [], 0
+    if parts:
+        yield np.concatenate(parts)
+
+
+def _bridged(x: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(x), x, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedLog:
+    """A recording from a sample on, with its leaps as gaps: numbers count what is missing, not what came twice."""
+
+    log: Log
+    slips: tuple[Slip, ...]
+    first: int = 0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.log.channels
+
+    @property
+    def samples(self) -> int | None:
+        known = self.log.samples
+        return None if known is None else known - self.first - sum(max(-slip.missing, 0) for slip in self.slips)
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
+        """The Blocks of the recording behind its first samples, cut at the leaps."""
+        for block in self._aligned(channels):
+            if block.stop > self.first:
+                yield block.cut(max(self.first - block.start, 0), len(block))
+
+    def _aligned(self, channels: Sequence[str] | None) -> Iterator[Block]:
+        shift, again, ahead = 0, 0, list(self.slips)
+        for block in self.log.blocks(channels):
+            while len(block):
+                if again:
+                    drop = min(again, len(block))
+                    block, again = block.cut(drop, len(block)), again - drop
+                    continue
+                leap = bool(ahead) and ahead[0].sample <= block.start
+                if leap:
+                    slip = ahead.pop(0)
+                    shift += slip.missing
+                    again = max(-slip.missing, 0)
+                    block = replace(block, gap=True)
+                    if again:
+                        continue
+                stop = min(ahead[0].sample - block.start if ahead else len(block), len(block))
+                piece = block.cut(0, stop)
+                yield replace(piece, start=piece.start + shift)
+                block = block.cut(stop, len(block))
+
+
+def slip_event(slips: Sequence[Slip], settings: Settings) -> Event:
+    """All leaps in one Event, at the first of them."""
+    first = slips[0]
+    missing, again = (sum(max(sign * slip.missing, 0) for slip in slips) for sign in (1, -1))
+    what = " and ".join(
+        f"{counted(many, 'sample')} {word}" for many, word in ((missing, "missing"), (again, "repeated")) if many
+    )
+    message = (
+        f"the phase of {settings.excitation!r} leaps {counted(len(slips), 'time')}, first at sample {first.sample}: "
+        f"{what} without a gap in the recording; each is realigned and treated as a gap"
+    )
+    details = {"count": len(slips), "slips": [[slip.sample, slip.missing] for slip in slips[:_LISTED_MAX]]}
+    return Event("phase-slips", first.sample, first.sample / settings.lines.rate_hz, message, details)

@@ -1,0 +1,60 @@
+"""FitBudget: how much processor time the fits of a live run may take."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import ClassVar
+
+SHARE = 0.5
+"""Of one core, for the fits of all axes of a process: Python runs one thread at a time, and samples come first."""
+CREDIT_S_MAX = 2.0
+"""What a pause may save up."""
+RELIEF_FROM_S, RELIEF_TO_S = 2.0, 8.0
+"""Fits get less time when the run is further behind than the first, and none from the second on."""
+_FIRST_ROW_S = 0.02
+
+
+class FitBudget:
+    """Processor time for fits, earned with real time and spent by them; axes of one process share it evenly.
+
+    Parameters
+    ----------
+    clock, worked
+        Real time, and the processor time of the calling thread, in seconds.
+    """
+
+    _open: ClassVar[weakref.WeakSet[FitBudget]] = weakref.WeakSet()
+
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, worked: Callable[[], float] = time.thread_time
+    ) -> None:
+        self._clock, self._worked = clock, worked
+        self._credit_s, self._then = CREDIT_S_MAX, clock()
+        self._row_s = _FIRST_ROW_S
+
+    def rows(self, wanted: int, behind_s: float) -> int:
+        """How many of `wanted` responses there is time for, when the run is `behind_s` behind."""
+        FitBudget._open.add(self)
+        now = self._clock()
+        relief = (RELIEF_TO_S - behind_s) / (RELIEF_TO_S - RELIEF_FROM_S)
+        share = SHARE * min(max(relief, 0.0), 1.0) / len(FitBudget._open)
+        self._credit_s = min(CREDIT_S_MAX, self._credit_s + share * (now - self._then))
+        self._then = now
+        if share <= 0 or self._credit_s <= 0:
+            return 0
+        # With all that can be saved up one fit may be tried, however long it takes.
+        least = int(self._credit_s >= CREDIT_S_MAX)
+        return min(wanted, max(least, int(self._credit_s / self._row_s)))
+
+    @contextmanager
+    def spending(self, rows: int) -> Iterator[None]:
+        """Fits of so many responses are made inside."""
+        before = self._worked()
+        yield
+        spent = self._worked() - before
+        self._credit_s -= spent
+        if rows:
+            self._row_s += (spent / rows - self._row_s) / 4

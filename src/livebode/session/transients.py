@@ -1,0 +1,61 @@
+"""How many periods at the beginning of a recording are not like those behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.estimation import Settings
+from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.prepare import filled
+from livebode.excitation.transient import leading, unlike
+from livebode.nouns import Event, counted
+from livebode.session.aligned import AlignedLog
+from livebode.session.plan import beginnings
+from livebode.session.roles import ROLES
+
+_PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are looked at, at most
+_PERIODS_MIN = 8
+_SHARE_MAX = 1 / 4  # of what is looked at; more is no transient, but another condition of the machine
+_STILL = 0.01  # of the schedule's largest value
+
+
+def leading_transient(log: AlignedLog, settings: Settings) -> int:
+    """Periods at the beginning that differ from the steady state in a signal of the estimate, as `inspect` finds them.
+
+    0 for a machine that moves, by its schedule, whose periods differ anyway; for fewer than eight periods; and where
+    more than a quarter would be left out.
+    """
+    window = settings.lines.window
+    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
+    channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
+    found = dict(zip(channels, beginnings(log, channels, min(_PERIODS * window, _SAMPLES_MAX))))
+    count = found[names[0]].size // window
+    if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule])):
+        return 0
+    excited = np.zeros((window + 1) // 2, dtype=np.bool_)
+    excited[list(settings.lines.bins)] = True
+    first = max(_transient(found[name], window, excited) for name in names)
+    return first if first <= _SHARE_MAX * count else 0
+
+
+def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
+    if np.count_nonzero(np.isfinite(x)) < window:
+        return 0
+    blocks = cut(filled(x), window)
+    return leading(unlike(blocks, spectra(blocks), excited))
+
+
+def _moves(schedule: np.ndarray) -> bool:
+    known = schedule[np.isfinite(schedule)]
+    return bool(known.size and np.ptp(known) > _STILL * np.max(np.abs(known)))
+
+
+def transient_event(periods: int, settings: Settings) -> Event:
+    """What is left out, in an Event at the beginning."""
+    window = settings.lines.window
+    which = "period differs" if periods == 1 else f"{periods} periods differ"
+    message = (
+        f"the first {which} from the steady state: {counted(periods * window, 'sample')} "
+        f"({periods * window / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
+    )
+    return Event("transient", 0, 0.0, message, {"periods": periods, "samples": periods * window})

@@ -1,0 +1,39 @@
+"""Dropped: the span of samples that a full queue does not take, reported as it begins and as it ends."""
+
+from __future__ import annotations
+
+from livebode.sources.live.said import Said
+from livebode.sources.live.spectra_batch import AnyBatch
+
+
+class Dropped:
+    """Counts what is dropped until the queue takes a batch again; numbers are the sender's own."""
+
+    def __init__(self, said: Said) -> None:
+        self._said = said
+        self._samples = self._first = self._last = 0
+
+    def take(self, batch: AnyBatch) -> None:
+        """This batch is dropped."""
+        if not self._samples:
+            self._first = batch.first_sample
+            self._said.say(
+                "overflow",
+                f"the queue is full; samples from the sender's {batch.first_sample} on are dropped until a quarter of "
+                "it is free; take a longer tracking.hop, fewer lines or fewer axes on this computer",
+                sender_first=batch.first_sample,
+            )
+        self._samples += batch.samples
+        self._last = batch.stop - 1
+
+    def finish(self) -> None:
+        """The queue takes batches again, or nothing more will come."""
+        if self._samples:
+            self._said.say(
+                "overflow",
+                f"the queue was full: {self._samples} samples, the sender's {self._first} … {self._last}, were dropped",
+                samples=self._samples,
+                sender_first=self._first,
+                sender_last=self._last,
+            )
+        self._samples = 0

@@ -1,0 +1,47 @@
+"""Position: where a stream continues, in the sender's numbers and in ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from livebode.sources.live.computer_clock import ClockReading
+
+Mark = Mapping[str, Any]
+"""Where a source that can be read again has the samples of a batch, as plain data."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How the samples of a Block are numbered by their sender: our number plus `offset`, in this `epoch`."""
+
+    epoch: int
+    offset: int
+    mark: Mark | None = None
+
+
+@dataclass(frozen=True)
+class Position:
+    """Where a stream continues.
+
+    Parameters
+    ----------
+    sample
+        Our number of the next sample.
+    epoch, number
+        The sender's epoch, and its number of the next sample.
+    rate_hz
+        Samples per second.
+    mark
+        Where a source that can be read again had the samples before.
+    arrived
+        This computer's clocks when the last sample arrived.
+    """
+
+    sample: int
+    epoch: int
+    number: int
+    rate_hz: float
+    arrived: ClockReading
+    mark: Mark | None = None

@@ -1,0 +1,114 @@
+"""What repeats is in the bound, or the line is not valid with its reason; means are ratios of averages.
+
+Short forms of `python -m studies.repeating`. Statistical bounds: 6 runs of 18 lines give a coverage of 60 % to ± 5 %
+and one of 95 % to ± 2 % (one standard deviation) if all were independent.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from livebode.estimation import Settings, Tracker
+from livebode.excitation import multisine, odd_lines
+from livebode.fitting import mean_response
+from livebode.nouns import Block, Channel, Lines, Responses
+from studies.repeating import CASES, Case, measure
+
+RATE_HZ = 4000.0
+
+
+def case(name: str) -> Case:
+    return next(c for c in CASES if c.name == name)
+
+
+@pytest.mark.parametrize("name", ["encoder of 14 bits", "Coulomb friction of 2 N", "backlash of 10 µm"])
+def test_distortion_is_in_the_bounds_of_windows_averages_and_means(name: str) -> None:
+    found = measure(case(name), runs=6)
+    print(name, found.coverage, found.reasons)
+    for one, two in found.coverage.values():
+        assert one >= 0.6
+        assert two >= 0.93
+
+
+@pytest.mark.parametrize("name", ["hum on a line, with harmonics", "hum on a line, seen before the excitation"])
+def test_a_line_with_hum_is_not_valid_and_the_reason_is_recorded(name: str) -> None:
+    assert measure(case(name), runs=2).reasons == {"hum": [50.0]}
+
+
+def test_noise_alone_is_no_distortion() -> None:
+    found = measure(case("white noise, odd lines"), runs=6)
+    assert found.reasons == {}
+    assert found.valid == 1.0
+    assert found.coverage["average"][0] <= 0.8  # the bound is not wide for safety's sake
+
+
+def tracked(y_of: np.ndarray, lines: Lines, w: np.ndarray, unit: str = "rad") -> tuple[Tracker, Responses]:
+    tracker = Tracker(Settings(lines=lines, output="y", input="u", excitation="w"))
+    channels = (Channel("w"), Channel("u"), Channel("y", unit))
+    return tracker, tracker.process(Block(np.array([w, w, y_of]), channels, RATE_HZ))
+
+
+def test_a_line_below_half_a_step_of_the_sensor_is_not_valid_unless_noise_carries_it_over_the_steps() -> None:
+    lines = odd_lines(20, 140, RATE_HZ, 800, seed=1)
+    amplitude = np.full(len(lines), 3.0)
+    amplitude[2] = 0.3
+    w = np.tile(multisine(lines, amplitude, "random", seed=2), 10)
+    tracker, responses = tracked(np.round(w), lines, w)
+    assert not responses.valid[-1, 2]
+    assert responses.valid[-1, [0, 1, 3, 4]].all()
+    steps = [event for event in tracker.drain_events() if event.kind == "steps"]
+    assert [event.details["line_hz"] for event in steps] == [lines.frequency_hz[2]]
+    assert 0.1 < steps[0].details["steps"] < 0.5
+    dithered = np.round(w + np.random.default_rng(3).standard_normal(w.size))
+    assert tracked(dithered, lines, w)[1].valid[-1].all()
+
+
+def test_distortion_is_not_known_where_every_bin_that_it_reaches_is_excited_or_outside() -> None:
+    lines = Lines.parse("20:140:20", RATE_HZ, 400)
+    w = np.tile(multisine(lines), 10)
+    tracker, responses = tracked(w + 1e-3 * w**3, lines, w)
+    assert np.isnan(responses.distortion).all()
+    assert tracker.found()["judged"]["distortion"] is None
+
+
+def noisy_input(seed: int) -> Responses:
+    """Windows of a plant of gain 2 + j under feedback, at a coherence of 2/3 between excitation and input."""
+    lines = Lines.parse("50", RATE_HZ, 400)
+    rng, periods = np.random.default_rng(seed), 200
+    w = np.tile(multisine(lines), periods)
+    ripple = rng.standard_normal((2, 400 * periods)) * np.sqrt(400 / 8)  # |W|²/2 = N²/8 at the line
+    u = w + ripple[0]
+    y = np.convolve(u, [2.0, 0.0])[: u.size] - 3 * ripple[0] + 0.1 * ripple[1]
+    block = Block(np.array([w, u, y]), ("w", "u", "y"), RATE_HZ)
+    return Tracker(Settings(lines=lines, output="y", input="u", excitation="w", hop=400)).process(block)
+
+
+def test_a_mean_is_the_ratio_of_averages_and_not_the_average_of_quotients() -> None:
+    found = [noisy_input(seed) for seed in range(20)]
+    means = [mean_response(responses)[0] for responses in found]
+    plain = np.mean([np.mean(r.value[1:, 0]) for r in found])
+    # The bias of a quotient, e^(−ρ)·(G − G') with ρ = 2 and G' = −1 what the noise alone shows.
+    assert abs(plain - 2) == pytest.approx(np.exp(-2) * 3, rel=0.4)
+    error = np.array([abs(m.value[0] - 2) for m in means])
+    assert np.mean(error <= [m.bound(1)[0] for m in means]) >= 0.4  # 63 % less two standard deviations of 20 runs
+    assert np.mean(error <= [m.bound(2)[0] for m in means]) >= 0.9
+    assert np.mean([m.input_coherence[0] for m in means]) == pytest.approx(2 / 3, abs=0.05)
+
+
+def test_where_the_schedule_moves_the_noise_is_that_of_detection_lines_and_the_choice_is_recorded() -> None:
+    lines, rng = Lines.parse("20:140:20", RATE_HZ, 400), np.random.default_rng(4)
+    w = np.tile(multisine(lines), 30)
+    x = np.linspace(0.2, 1.4, w.size)  # a gain that changes by 6 % a period, with the position
+    noise = 0.01 * rng.standard_normal(w.size)
+    block = Block(np.array([w, w, x * w + noise, x]), ("w", "u", "y", "x"), RATE_HZ)
+    given = {"lines": lines, "output": "y", "input": "u", "excitation": "w", "schedule": "x"}
+    auto, periods = Tracker(Settings(**given)), Tracker(Settings(**given, noise="periods"))
+    ours, theirs = auto.process(block), periods.process(block)
+    at = ours.valid.all(axis=1) & (ours.schedule > 0.5)
+    assert np.median(theirs.sigma[at] / ours.sigma[at]) > 3
+    error = np.abs(ours.value[at] - ours.schedule[at, np.newaxis])
+    assert np.mean(error <= ours.bound(2)[at]) >= 0.95
+    assert [event.kind for event in auto.drain_events()] == ["noise-from-detection-lines"]
+    assert auto.found()["judged"]["noise_from_detection_lines"] > 0.8 * len(ours)
+    assert periods.drain_events() == []
