@@ -107,7 +107,7 @@ class OrderSpectrum:
         enough = self._count >= _STROKES_MIN
         strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
         mean = np.where(enough, self._sum / np.maximum(self._count, 1), 1.0)
-        # What moves with the speed, as an eccentric pulley's sidebands do, raises whole ranges; a peak is above its own.
+        # What moves with the speed, as an eccentric pulley's sidebands do, raises whole ranges.
         around = np.maximum(median_filter(mean, 2 * _FLOOR * _PADDED + 1), 1.0)
         chance = np.where(enough, gamma.logsf(self._sum / around, np.maximum(self._count, 1)), 0.0)
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
