@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.signal.windows import blackmanharris
 from scipy.stats import gamma
 
@@ -105,7 +106,10 @@ class OrderSpectrum:
         """Orders in cycles a metre, the strongest first, at most eight."""
         enough = self._count >= _STROKES_MIN
         strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
-        chance = np.where(enough, gamma.logsf(self._sum, np.maximum(self._count, 1)), 0.0)
+        mean = np.where(enough, self._sum / np.maximum(self._count, 1), 1.0)
+        # What moves with the speed, as an eccentric pulley's sidebands do, raises whole ranges.
+        around = np.maximum(median_filter(mean, 2 * _FLOOR * _PADDED + 1), 1.0)
+        chance = np.where(enough, gamma.logsf(self._sum / around, np.maximum(self._count, 1)), 0.0)
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))
         orders, apart = list[float](), round(_APART * _PADDED)
         left = chance < limit
