@@ -13,6 +13,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from livebode.nouns import Event, InputError, Parameters, Responses
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.piece import parts_of
@@ -66,9 +68,12 @@ class RunDirectory:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         try:
-            with _disk_errors(self.path):
-                self._close()
-                if kind is None:
+            if kind is not None:
+                with contextlib.suppress(OSError, pa.ArrowException):  # what is closed here is removed below
+                    self._close()
+            else:
+                with _disk_errors(self.path):
+                    self._close()
                     self._check_free()
                     self._put_in_place()
         finally:

@@ -34,7 +34,8 @@ class TableFile:
         self._file.close()
 
     def _flush(self) -> None:
-        if self._waiting:
+        waiting, rows = self._waiting, self._rows
+        self._waiting, self._rows = [], 0  # first, so that rows which a disk refused are not written again by `close`
+        if waiting:
             # One group, so that it ends with a whole response: a damaged one is then left out without cutting the next.
-            self._file.write_table(pa.Table.from_batches(self._waiting, self._schema), row_group_size=self._rows)
-        self._waiting, self._rows = [], 0
+            self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)
