@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
+from livebode.fitting.weighing import epsilon_for
 from livebode.nouns import InputError, Lines, Parameters, Responses
 from tests.truth.test_fits import LINES, TRUTH, noisy
 
@@ -120,3 +121,13 @@ def test_a_failed_fit_evaluates_to_nothing() -> None:
         nothing.response(20.0)
     assert np.isnan(nothing["Keff"])
     assert np.isnan(nothing.bound("resonance"))
+
+
+def test_the_epsilon_of_a_row_does_not_depend_on_the_rows_beside_it() -> None:
+    rng = np.random.default_rng(3)
+    rest, noise, size = rng.exponential(size=(3, 40, 9)) * np.array([2.0, 1.0, 1.0])[:, np.newaxis, np.newaxis]
+    dof = np.full(40, 14.0)
+    together = epsilon_for(rest, noise, size, dof)
+    alone = [epsilon_for(*(part[i : i + 1] for part in (rest, noise, size, dof)))[0] for i in range(40)]
+    assert together.tolist() == alone
+    assert 10 < np.count_nonzero(together) < 40

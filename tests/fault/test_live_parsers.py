@@ -105,7 +105,7 @@ def test_damaged_frames_give_batches_or_a_sentence():
             sequencer.push(found)  # a hostile batch that is well formed must not harm the stream either
     assert decoded > CASES // 100
     assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
-    assert len(sequencer._waiting) + len(sequencer._doubted) < 64
+    assert len(sequencer._waiting) + len(sequencer._doubts._doubted) < 64
 
 
 SPECTRA = SpectraLayout(CHANNELS, (Channel("x", "m"),), 400, 20, (2, 4), (3,), (0.5, 0.0), (False, True))
@@ -153,7 +153,7 @@ def test_damaged_frames_of_spectra_give_batches_or_a_sentence():
     assert decoded > CASES // 100
     assert tracked > CASES // 100
     assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
-    assert len(sequencer._waiting) + len(sequencer._doubted) < 64
+    assert len(sequencer._waiting) + len(sequencer._doubts._doubted) < 64
 
 
 def test_damaged_texts_of_spectra_give_a_layout_or_a_sentence():

@@ -31,6 +31,17 @@ def _send(say: Connection, run: Path) -> None:
     say.send([event.kind for event in on_a_limited_file(run)])
 
 
+def check_pause(kinds: list[str]) -> None:
+    """One pause; segments that the disk refused to close meanwhile are closed behind it."""
+    assert [kind for kind in kinds if kind in ("record-paused", "record-resumed")] == [
+        "record-paused",
+        "record-resumed",
+    ]
+    closing = [kind for kind in kinds if kind in ("record-unclosed", "record-closed")]
+    assert not closing or closing[-1] == "record-closed"
+    assert len(closing) + 2 == len(kinds)
+
+
 def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     said, say = context.Pipe(duplex=False)
@@ -38,7 +49,7 @@ def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
     process.start()
     process.join()
     assert process.exitcode == 0
-    assert said.recv() == ["record-paused", "record-resumed"]
+    check_pause(said.recv())
 
 
 def test_a_disk_that_is_full(tmp_path: Path) -> None:
@@ -52,7 +63,7 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
         env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["record-paused", "record-resumed"]
+    check_pause(done.stdout.split())
 
 
 def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ def test_ours_are_small_and_import_only_what_is_here() -> None:
     for file in (HERE / "static").glob("*.js"):
         text = file.read_text(encoding="utf-8")
         assert text.startswith("//"), file.name
-        assert text.count("\n") < 250, file.name
+        assert text.count("\n") < 300, file.name
         assert max(map(len, text.splitlines())) <= 200, file.name
         for name in re.findall(r'from "([^"]+)"', text):
             where = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
-from livebode.nouns import Block, Lines, Responses
+from livebode.nouns import PER_LINE, Block, Lines, Responses
 from livebode.records import Run
 from livebode.session.reporting.difference import ALPHA, Difference, compare
 from tests import command
@@ -133,5 +133,5 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
 
 
 def _first_lines(of: Responses, n: int) -> Responses:
-    rows = {name: getattr(of, name)[:, :n] for name in ("value", "sigma", "coherence", "valid")}
+    rows = {name: getattr(of, name)[:, :n] for name in PER_LINE}
     return replace(of, lines=Lines(of.lines.bins[:n], of.lines.window, of.lines.rate_hz), **rows)

@@ -167,7 +167,7 @@ def test_livebode_run_makes_the_same_of_its_frames_as_of_its_samples(drive, tmp_
     write_parquet(tmp_path / "log.parquet", {"t": np.arange(samples.shape[1]) / 4000} | dict(zip("uy", samples)))
     lines = '[lines]\nfrequencies = "20:220:10"\nwindow = 400\n'
     (tmp_path / "log.toml").write_text(AXIS.replace(URL, 'log = "log.parquet"') + f"hop = 200\n{lines}")
-    assert livebode("run", tmp_path / "log.toml", "--out", tmp_path / "recorded").code == 0
+    assert livebode("run", tmp_path / "log.toml", "--all-periods", "--out", tmp_path / "recorded").code == 0
     theirs = table(tmp_path / "recorded")
     assert set(spectra) == set(theirs)
     theirs["sample"] = theirs["sample"] + STEADY

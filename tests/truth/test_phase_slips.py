@@ -14,6 +14,7 @@ from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
 from livebode.nouns import Lines
 from livebode.records import Run
+from livebode.session.event_groups import each_event
 from tests.command import livebode, write_parquet
 
 RATE_HZ, WINDOW = 4000.0, 400
@@ -105,10 +106,10 @@ def test_a_run_realigns_what_was_dropped_and_reports_it(tmp_path: Path) -> None:
     truth = 2 * np.exp(-2j * np.pi * LINES.frequency_hz / RATE_HZ)
     # 160 windows of 400 samples, noise of √5·0.01 on lines of amplitude 1: 2 · 0.022/√(2 · 160 · 400/4), five sigma.
     assert np.max(np.abs(last.value - truth)) <= 5 * 0.00028
-    events = [json.loads(line) for line in (tmp_path / "run" / "events.jsonl").read_text().splitlines()]
-    (slips,) = [event for event in events if event["kind"] == "phase-slips"]
-    assert [sample for sample, _ in slips["details"]["slips"]] == pytest.approx(places, abs=1)
-    assert sum(event["kind"] == "gap" for event in events) == len(places)
+    events = [event for recorded in run.events() for event in each_event(recorded)]
+    (slips,) = [event for event in events if event.kind == "phase-slips"]
+    assert [sample for sample, _ in slips.details["slips"]] == pytest.approx(places, abs=1)
+    assert sum(event.kind == "gap" for event in events) == len(places)
     inspected = json.loads(livebode("inspect", log, "--rate", 4000, "--excitation", "w", "--json").out)
     assert len(inspected["excitation"]["phase_slips"]) == len(places)
 

@@ -13,7 +13,7 @@ _WHOLE = 1e-3  # of a step: how far rounding may move a difference from a multip
 def step_of(samples: Floats) -> float:
     """Smallest step of which all differences of neighbouring samples are multiples; 0 where there is none.
 
-    >>> step_of(np.array([0.5, 0.5, 1.0, 2.5])), step_of(np.array([0.1, 0.2, 0.35, 0.351]))
+    >>> step_of(np.array([0.5, 0.5, 1.0, 2.5])), step_of(np.array([0.1, 0.2, 0.35, 0.3533]))
     (0.5, 0.0)
     """
     differences = np.abs(np.diff(samples))

@@ -36,13 +36,15 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
         least = (2 * rest / dof[:, np.newaxis] - noise) / size
         square = np.max(np.where(used & np.isfinite(least), least, 0.0), axis=-1, initial=0.0)
         noisy = _reduced(rest, noise, size, np.zeros(len(rest))) <= dof
+        moving = ~noisy  # each row by itself, so that it ends alike whatever other rows it is fitted beside
         for _ in range(_STEPS):
             share = np.where(used, 1 / (noise + square[:, np.newaxis] * size), 0.0)
             total = 2 * np.einsum("rl,rl->r", rest, share)
             slope = 2 * np.einsum("rl,rl,rl,rl->r", rest, size, share, share)
-            step = np.where(noisy | ~(slope > 0), 0.0, (total - dof) / slope)
+            step = np.where(moving & (slope > 0), (total - dof) / slope, 0.0)
             square = square + np.maximum(step, 0.0)
-            if not np.any(step > _CLOSE * square):
+            moving &= step > _CLOSE * square
+            if not moving.any():
                 break
     return np.where(noisy | ~(dof > 0) | ~np.isfinite(square), 0.0, np.sqrt(square))
 

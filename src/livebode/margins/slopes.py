@@ -58,7 +58,9 @@ def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
     by_frequency = np.log(found[0] / found[1]) / np.log(above / below)
     plus, minus = found[2 : 2 + free.size], found[2 + free.size :]
     by_parameter = np.zeros(values.shape, dtype=np.complex128)
-    by_parameter[:, free] = np.log(plus / minus).T / (2 * step) * sigma[:, free]
+    # A parameter that only some rows move has no step in the others where it is zero.
+    shares = np.divide(sigma[:, free], 2 * step, out=np.zeros(step.shape), where=step > 0)
+    by_parameter[:, free] = np.log(plus / minus).T * shares
     return Slopes(np.asarray(by_frequency, dtype=np.complex128), by_parameter)
 
 

@@ -35,6 +35,8 @@ class NoiseLevel:
 
     def process(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
         """Variance of rows from their deviation, the learned variance and what they say beyond, (rows, components)."""
+        if not len(own):
+            return own
         known = np.where(np.isfinite(own), own, np.nan)
         both = np.concatenate([self._before, np.stack([np.where(np.isfinite(own), deviation, np.nan), known])], axis=1)
         square = np.diff(both[0], axis=0) ** 2 / (both[1, 1:] + both[1, :-1])
