@@ -36,8 +36,9 @@ def demo_command(
     """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from livebode.session.demo import LEARNED_S, demo, demo_baseline  # with the simulation
+    from livebode.session.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
 
+    check_seconds(seconds)
     console = terminal.console(stderr=True)
     if not as_json:
         print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
