@@ -20,7 +20,7 @@ from livebode.cli.terminal import visible
 from tests.command import signals
 
 EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
-SHOWN = r"\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
+SHOWN = r"\u001b[2J\u001b]0;owned\u0007\u009b31m\u202e"
 OURS = re.compile(r"\x1b\[[0-9;]*m|\x1b\[\?25[lh]|\x1b\[[0-9]*[AK]|\x1b\[2K")
 """What Rich and the plot write: colours, the cursor hidden and shown, lines taken back."""
 

@@ -78,3 +78,11 @@ def test_the_first_event_of_each_kind_is_reported_at_once() -> None:
     kinds = ["loss", "gap", "loss", "overflow"]
     found = [one.kind for n, kind in enumerate(kinds) for one in groups.take(Event(kind, n, 0.0, ""))]
     assert found == ["loss", "gap", "overflow"]
+
+
+def test_a_change_of_state_is_reported_at_once_among_what_was_left_out() -> None:
+    groups, found = EventGroups(), []
+    for second in range(0, 240, 10):
+        kind = {20: "backlog", 80: "backlog-cleared", 150: "backlog"}.get(second, "thinned")
+        found += [(second, one.kind) for one in groups.take(Event(kind, second, float(second), kind))]
+    assert [one for one in found if one[1] != "thinned"] == [(20, "backlog"), (80, "backlog-cleared"), (150, "backlog")]

@@ -112,3 +112,22 @@ def test_where_the_schedule_moves_the_noise_is_that_of_detection_lines_and_the_c
     assert [event.kind for event in auto.drain_events()] == ["noise-from-detection-lines"]
     assert auto.found()["judged"]["noise_from_detection_lines"] > 0.8 * len(ours)
     assert periods.drain_events() == []
+
+
+def test_distortion_on_a_line_at_the_mains_is_not_called_hum() -> None:
+    """Friction-like distortion of 50 Hz is at its multiples alone, where the mains would be, too."""
+    lines = Lines((10,), 800, RATE_HZ, tuple(k for k in range(1, 60) if k % 10))
+    w = np.tile(multisine(lines), 40)
+    tracker, responses = tracked(w + 0.02 * np.sign(w) + 1e-6 * np.random.default_rng(1).normal(size=w.size), lines, w)
+    assert "hum" not in [event.kind for event in tracker.drain_events()]
+    assert responses.valid[-1].all()
+
+
+def test_the_noise_is_known_again_behind_the_beginning_of_the_excitation() -> None:
+    lines = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
+    w = np.concatenate([np.zeros(1050), np.tile(multisine(lines), 30)])
+    y = w + 0.05 * np.random.default_rng(2).normal(size=w.size)
+    tracker = Tracker(Settings(lines=lines, output="y", input="u", excitation="w", noise="quiet", average=True))
+    last = tracker.process(Block(np.array([w, w, y]), (Channel("w"), Channel("u"), Channel("y", "rad")), RATE_HZ))[-1]
+    assert last.valid.all()
+    assert np.isfinite(last.sigma).all()

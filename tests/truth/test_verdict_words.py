@@ -68,6 +68,20 @@ def test_a_comparison_is_headed_by_the_alarm_of_a_run_though_no_line_differs(tmp
     assert "% would have been seen" in lines.text
 
 
+def test_only_changes_that_have_not_cleared_are_alarms_each_by_its_newest_amount(tmp_path: Path) -> None:
+    def change(kind: str, what: str, message: str) -> Event:
+        return Event(kind, 1, 1.0, message, {"what": what, "place_m": None})
+
+    monitoring = {"baseline": "healthy.json", "judged_s": 9.0, "changes": 2, "standing": [{}], "message": "1 active"}
+    events = [
+        change("change", "stiffness", "soft"), change("change", "damping", "rough amount"),
+        change("change-cleared", "stiffness", "gone"), change("change-corrected", "damping", "right amount"),
+    ]  # fmt: skip
+    run = write_run(tmp_path / "run", measured(300, 1), events=events, monitoring=monitoring)
+    alarms = [finding.text for finding in run_report(run, made=MADE).verdict if finding.tone == "alarm"]
+    assert alarms == ["1 active", "right amount"]
+
+
 def test_a_change_of_the_size_that_would_have_been_seen_is_seen_in_95_percent() -> None:
     """1,400 lines, each changed by its own `seen`: 95 % found, within four deviations of the count."""
     pairs, found, lines = 200, 0, 0

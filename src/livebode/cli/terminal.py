@@ -22,12 +22,12 @@ _COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
 
 
 def visible(text: str) -> str:
-    r"""The text with control characters, but for new lines and tabs, as their escapes.
+    r"""The text with control characters, but for new lines and tabs, as escapes that JSON knows, too.
 
     >>> visible("belt\x1b[2J\u202e ok")
-    'belt\\x1b[2J\\u202e ok'
+    'belt\\u001b[2J\\u202e ok'
     """
-    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class VisibleText(io.TextIOWrapper):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from livebode.nouns import Event
@@ -43,11 +43,15 @@ class Notice:
     count: int = 0
     seen: int = 0
     changed: int = 0
+    kinds: set[str] = field(default_factory=set)
     _group: str = ""
     _before: int = 0
 
     def take(self, event: Event) -> None:
         """One more, or as many as the event says that there were."""
+        if self.seen >= self.count:
+            self.kinds = set()
+        self.kinds |= {event.kind, *(str(repeat[0]) for repeat in event.details.get("repeats", ()))}
         self.id, self.kind, self.message = event_id(event), event.kind, event.message[:_PLAIN_MAX]
         group, count = event.details.get("group"), event.details.get("count")
         if isinstance(group, str) and isinstance(count, int):
@@ -61,7 +65,7 @@ class Notice:
     def plain(self) -> dict[str, Any]:
         """For the page."""
         names = ("cause", "id", "kind", "message", "first_s", "last_s", "count", "seen")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in names} | {"kinds": sorted(self.kinds)}
 
 
 class Notices:

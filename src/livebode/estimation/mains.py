@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import gcd
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,7 @@ Floats = NDArray[np.float64]
 MAINS_HZ = (50.0, 60.0)
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 _HARMONICS = 10
-_BESIDE = np.array([-8, -6, -4, -2, 2, 4, 6, 8])  # an even distance: where distortion is like that at the harmonic
+_BESIDE = np.array([-4, -3, -2, -1, 1, 2, 3, 4])
 _CHANCE = 1e-8  # of noise alone to be taken for a tone: (1 + r/n)^-n for a power of r times the mean of n neighbours
 
 _MATTERS = 1e-8
@@ -35,6 +37,9 @@ class Mains:
             free = np.setdiff1d(_on_bins(mains_hz, lines, _HARMONICS), at)
             self._tones.append(free if self.lines[i].any() else free[:0])
         self._excited = at
+        # Distortion is at multiples of the lines' common divisor, and of odd lines at odd or at even ones alone:
+        # at these distances it is like that at the harmonic.
+        self._beside = _BESIDE * int(np.lcm(2, gcd(*lines.bins)))
         self._highest = (lines.window - 1) // 2
 
     @property
@@ -44,16 +49,21 @@ class Mains:
     def seen(self, output: Floats) -> NDArray[np.bool_]:
         """Which lines may hold hum, (lines,), by the power of the mean output at all bins from 0 on."""
         least = _MATTERS * output[self._excited].max()
-        found = [self._stand_out(output, tones, self._excited) & (output[tones] > least) for tones in self._tones]
+        found = [
+            self._stand_out(output, tones, self._excited, self._beside) & (output[tones] > least)
+            for tones in self._tones
+        ]
         return np.asarray(sum(self.lines[i] & bool(f.any()) for i, f in enumerate(found)) > 0)
 
     def seen_alone(self, output: Floats) -> NDArray[np.bool_]:
         """The same by a period without excitation, in which the lines themselves show it."""
         none = np.zeros(0, dtype=np.int64)
-        return np.asarray(self.lines.any(axis=0) & self._stand_out(output, self._excited, none))
+        return np.asarray(self.lines.any(axis=0) & self._stand_out(output, self._excited, none, 2 * _BESIDE))
 
-    def _stand_out(self, output: Floats, tones: NDArray[np.int64], excited: NDArray[np.int64]) -> NDArray[np.bool_]:
-        beside = tones[:, np.newaxis] + _BESIDE
+    def _stand_out(
+        self, output: Floats, tones: NDArray[np.int64], excited: NDArray[np.int64], distances: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        beside = tones[:, np.newaxis] + distances
         usable = (beside > 0) & (beside <= self._highest) & ~np.isin(beside, excited)
         usable &= ~np.isin(beside, np.concatenate(self._tones))
         power = np.where(usable, output[beside.clip(0, self._highest)], 0.0)

@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _MEANS, _SCATTER = 10, 4
+_NOISE = 8  # of these: the power of the noise at detection lines
 _SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, but for rounding
 
 
@@ -193,6 +194,10 @@ class PeriodMoments:
             if not self._own:
                 kept[:, at] = means
             if usable:
+                known, now = means[_NOISE], new[_NOISE, at]
+                # A window with the start or the end of the excitation knows no noise: the mean is of those that do.
+                means[_NOISE] = np.where(np.isnan(known), now, known)
+                new[_NOISE, at] = np.where(np.isnan(now) & (column[at] < 1), means[_NOISE], now)
                 np.subtract(new[:, at], means, out=deviation[:, at])
                 means += deviation[:, at] * column[at]
             if self._own:

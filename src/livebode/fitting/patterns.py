@@ -15,6 +15,7 @@ Complex = NDArray[np.complex128]
 LACKS = 10.0
 """By how much −2·ln(likelihood) falls with an ε where noise alone does not explain the residuals."""
 
+_ROUNDING = 1e-8
 _RUNS = 2.6  # sigma: once in 200 fits by chance
 _FEW = 16  # lines, too few for the pattern to show
 _LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # lines
@@ -38,6 +39,9 @@ def follows_pattern(measured: Measured, fitted: Fitted, noise_dof: Floats) -> bo
     For independent lines the correlation's standard deviation is 1/√(2·lines).
     """
     lines = int(np.count_nonzero(measured.use))
+    rest, size = (np.abs(x)[measured.use].max() for x in (measured.value - fitted.response, fitted.response))
+    if rest < _ROUNDING * size:
+        return False  # what an iteration leaves of exact data
     if correlation(measured, fitted) * np.sqrt(2 * lines) > _RUNS:
         return True
     known = measured._replace(use=measured.use & (measured.sigma > 0))

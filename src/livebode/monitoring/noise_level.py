@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_ROWS = 5
+_ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
 _MEDIAN = 0.4549364  # of chi square with one degree of freedom
-_BELIEVED = 2.0  # times what the differences show beyond the learned noise
+_BELIEVED = 3.0  # times what the differences show beyond the learned noise
 
 
 class NoiseLevel:
@@ -17,8 +17,8 @@ class NoiseLevel:
 
     A response's sigma comes from how periods scatter. For some periods after a step of the machine the step is in it,
     so that rows behind the step would weigh a hundredth of those before it. A step moves one difference of neighbouring
-    rows; noise moves all of them. The median over the newest five rows and all components of a line shows the second
-    alone. A row's noise beyond the learned one counts up to twice what that median shows.
+    rows; noise moves all of them. The median over the newest 31 rows and all components of a line shows the second
+    alone. A row's noise beyond the learned one counts up to three times what that median shows.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         raise InputError("DuckDB is not installed; pip install 'livebode[query]'") from None
     with duckdb.connect(":memory:") as database:
         try:
-            asked = {str(name).lower() for name in database.get_table_names(sql)}
+            asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)
         except duckdb.Error:
             asked = set(_TABLES)  # it is no SELECT, and will be refused below
         _show(run, database, asked)

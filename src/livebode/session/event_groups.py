@@ -25,11 +25,14 @@ CAUSES = {
         "clock": ("clock-jump", "wrong-rate"),
         "signal": ("non-finite", "implausible", "spike", "not-whole"),
         "fit": ("fit-failed", "fit-resumed"),
-        "backlog": ("backlog", "backlog-cleared", "thinned"),
+        "backlog": ("backlog", "backlog-cleared"),
+        "thinned": ("thinned",),
     }.items()
     for kind in kinds
 }
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
+_AT_ONCE = {"backlog", "backlog-cleared", "restart", "disconnected", "layout-changed", "unit-changed"}
+"""Changes of state: who waited for their report would take the state before for the present one."""
 _FIELDS = {"group", "count", "first_s", "last_s", "repeats"}
 
 
@@ -51,9 +54,10 @@ class EventGroups:
     """Adds to each event of a run the group that it belongs to, and reports repeats in growing steps.
 
     A group is one cause (`CAUSES`) from its first event until it is silent for 60 s of the machine's time. Reported at
-    once are the first event of each kind in a group, and the 2nd, 4th, 8th, … of the group; the others wait for the
-    next of these, for 600 s, for 128 of them, or for the end of the group or the run. What is reported is the newest
-    event, and those that waited are in its details. No event is lost: `each_event` gives them back.
+    once are changes of state, the first event of each kind in a group, and the 2nd, 4th, 8th, … of the group; the
+    others wait for the next of these, for 600 s, for 128 of them, or for the end of the group or the run. What is
+    reported is the newest event, and those that waited are in its details. No event is lost: `each_event` gives them
+    back.
 
     The details get ``group`` (name, unique in the run), ``count`` (events in the group up to this one), ``first_s``,
     ``last_s`` (times of the first and the newest) and, where events waited, ``repeats``: kind, sample, time_s, message
@@ -88,7 +92,7 @@ class EventGroups:
         new = event.kind not in group.kinds
         if new:
             group.kinds.append(event.kind)
-        if new or group.count >= 2 * group.reported or len(group.waiting) >= REPEATS_MAX:
+        if new or event.kind in _AT_ONCE or group.count >= 2 * group.reported or len(group.waiting) >= REPEATS_MAX:
             found.append(_report(group))
         return found
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -83,6 +83,8 @@ class Tracking:
         Where a live source continues.
     before
         The run that it goes on from.
+    noticed
+        What is known of the recording as a whole before it is tracked.
     delivery
         Goes to the source's `blocks`.
     """
@@ -100,6 +102,7 @@ class Tracking:
         orders: Orders | None = None,
         position: StreamPosition | None = None,
         before: Before | None = None,
+        noticed: Sequence[Event] = (),
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
@@ -113,6 +116,7 @@ class Tracking:
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
+        self._noticed = tuple(noticed)
         self._announcing = Announcing()
         self._label = _schedule_label(source, settings.schedule)
         about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
@@ -187,7 +191,12 @@ class Tracking:
         if watching is not None:
             has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
             blocks = watching.over(blocks, self._out.write_event, has_time)
+        noticed = () if self._tally.stop else self._noticed  # a record that is continued has them
         for block in _told(blocks, self.to.audience):
+            for event in noticed:
+                time_s = block.origin_s + event.sample / self._follower.settings.lines.rate_hz
+                self._out.write_event(replace(event, time_s=time_s))
+            noticed = ()
             if self._orders.ended and not isinstance(self.source, LiveSource):
                 raise StoppedError("ended before the end of the recording")
             self._origin_s = block.origin_s

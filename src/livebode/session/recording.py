@@ -46,13 +46,12 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
         noticed.append(transient_event(transient, settings))
     if isinstance(pipeline.follower, Tracker):
         pipeline.follower.know_spikes(early_spikes(source, settings))
-    orders = orders or Orders()
-    for event in noticed:
-        orders.say(event.kind, event.message, **event.details)
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found["left_out_samples"] = source.first
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
-    outcome = whole(Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders))
+    outcome = whole(
+        Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders, noticed=noticed)
+    )
     for event in noticed:
         to.tell(event)
     return outcome

@@ -224,6 +224,7 @@ class SegmentedRun:
         for name, part in self._parts.items():
             part.restore(states[name])
         self._continues = before.get("continues")
+        self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
         return summary if self._continues is None else {"continues": self._continues} | summary

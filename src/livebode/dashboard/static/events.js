@@ -54,7 +54,7 @@ export class Events {
 
   draw() {
     const list = [...this.all.values()].sort((a, b) => b.last_s - a.last_s),
-      alarm = (n) => ALARMS.has(n.kind);
+      alarm = (n) => n.kinds.some((kind) => ALARMS.has(kind));
     const open = list.filter((n) => alarm(n) && n.seen < n.count).length;
     this.open = open;
     this.count.hidden = !open;

@@ -96,6 +96,11 @@ class Store:
             sync_directory(self.path.parent)
             self.last = commit
 
+    def renew(self, summary: dict[str, Any]) -> None:
+        """Write run.json as of a run that is recorded again: what its end found is of the time before."""
+        with _refusing(self.path, "cannot be recorded in"):
+            self._write_summary(summary, finished=False)
+
     def write(self, table: str, rows: pa.RecordBatch) -> None:
         """Append rows to a table with the next commit."""
         self._waiting.add(table, rows)

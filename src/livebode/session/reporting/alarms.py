@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from livebode.nouns import Event
 from livebode.nouns.document import Finding, Tone
 from livebode.records import Run
 from livebode.session.reporting.happenings import EventSummary
@@ -21,8 +22,20 @@ def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
     active = bool(monitoring.get("standing"))
     if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
         tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
-    latest = [event for event in happenings.in_full if event.kind == "change"][-_ACTIVE_MAX:] if active else []
+    latest = _newest(happenings)[-_ACTIVE_MAX:] if active else []
     return (Finding(tone, monitoring["message"]), *(Finding("alarm", event.message) for event in latest))
+
+
+def _newest(happenings: EventSummary) -> list[Event]:
+    """The newest report of each change that has not cleared."""
+    found: dict[tuple[str, str], Event] = {}
+    for event in happenings.in_full:
+        key = str(event.details.get("what")), str(event.details.get("place_m"))
+        if event.kind in ("change", "change-corrected"):
+            found[key] = event
+        elif event.kind == "change-cleared":
+            found.pop(key, None)
+    return list(found.values())
 
 
 def _so_far(run: Run, happenings: EventSummary) -> Finding:

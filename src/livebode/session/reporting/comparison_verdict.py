@@ -32,9 +32,9 @@ def verdict(found: Compared, changes: Changes) -> tuple[Finding, ...]:
 
 
 def _alarms(found: Compared) -> Iterator[Finding]:
-    """What the monitoring of either run reported; nothing of a run without a baseline."""
+    """What the monitoring of either run reported; nothing of a finished run without a baseline."""
     for run, when in zip(found.runs, ("Before", "After")):
-        if run.summary.get("monitoring", {}).get("baseline") is not None:
+        if run.summary.get("monitoring", {}).get("baseline") is not None or not run.finished:
             for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
                 if finding.tone != "ok":
                     yield Finding(finding.tone, f"{when}: {finding.text}")
