@@ -19,7 +19,7 @@ from livebode.dashboard import Dashboard, Serving
 from livebode.session.demo import demo, demo_baseline
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-SECONDS, MOMENT_S = 40.0, 27.8
+SECONDS, MOMENT_S = 40.0, 25.7
 COLOURS = 128
 
 
