@@ -45,7 +45,7 @@ def main() -> None:
             page = browser.new_page(viewport={"width": 1440, "height": 900}, color_scheme=scheme)  # type: ignore[arg-type]
             page.goto(dashboard.url)
             page.wait_for_function("() => window.livebode?.bode.curves.measured")
-            page.evaluate(f"() => livebode.timeline.go({MOMENT_S - 18})")
+            page.evaluate(f"() => livebode.timeline.go({MOMENT_S - 15.7})")
             page.wait_for_timeout(800)
             page.keyboard.press("f")
             page.wait_for_timeout(800)
