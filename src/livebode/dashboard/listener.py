@@ -73,7 +73,7 @@ class Listener:
     protocol
         Makes one for each connection.
     tell
-        Is told, at most once a minute, how many connections were closed for others.
+        Is called, at most once a minute, with how many connections were closed for others.
     """
 
     def __init__(

@@ -62,7 +62,7 @@ class Piece:
             raise InputError(f"{str(run / 'run.json')!r} does not name the parts of {name} as a run does") from None
 
     def groups(self) -> list[int] | None:
-        """The numbers of the row groups that are whole; None for all. Damaged ones are told.
+        """The numbers of the row groups that are whole; None for all. Damaged ones are reported.
 
         Raises
         ------

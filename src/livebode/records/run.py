@@ -158,7 +158,7 @@ class Run:
             raise InputError(f"{str(file)!r} cannot be read: {error}") from None
 
     def _piece(self, name: str) -> Piece | None:
-        """A table that is in one file; None where it was not recorded, or the file is gone, which is told."""
+        """A table that is in one file; None where it was not recorded, or the file is gone, which is reported."""
         file, parts = f"{name}.parquet", self.summary.get("files", {})
         if os.path.lexists(self.path / file):
             return Piece(self.path, file, parts.get(file), self.tell)

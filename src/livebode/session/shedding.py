@@ -24,7 +24,7 @@ REPORT_S = 10.0
 class LoadShedding:
     """Decides what a run has time for: samples and responses always, then monitoring, then fits.
 
-    Of a source whose sender waits nothing is left out, for nothing is lost there, until the run is told to end: then
+    Of a source whose sender waits nothing is left out, for nothing is lost there, until the run is ended: then
     what still waits is tracked as fast as it can be.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Reading a record in segments, also while it is being written. What is damaged is told, and the rest is read."""
+"""Reading a record in segments, also while it is being written. What is damaged is reported, and the rest is read."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def tables(
     finished: bool,
 ) -> Iterator[pa.Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
-    segments outside of that time. A damaged segment is told and left out.
+    segments outside of that time. A damaged segment is reported and left out.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table
 
 
 def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
-    """The file of a segment; None where it is damaged, which is told, or was removed to keep the budget."""
+    """The file of a segment; None where it is damaged, which is reported, or was removed to keep the budget."""
     try:
         return open_segment(run, segment)
     except FileNotFoundError:

@@ -19,7 +19,7 @@ class Doubts:
     Parameters
     ----------
     said
-        Where those are told that were not believed.
+        Where those that were not believed are reported.
     confirmed
         Batches that a new epoch must bring.
     reorder
@@ -43,7 +43,7 @@ class Doubts:
         return self._taken(batch, epoch, due, follows, CONFIRMED_AHEAD)
 
     def behind(self, batch: AnyBatch, epoch: int | None, due: int | None, *, far: bool) -> list[AnyBatch]:
-        """Take a batch that is behind: repeated, or of numbers that begin anew."""
+        """Take a batch that is behind: repeated, or of numbers that begin again."""
         last = self._doubted[-1] if self._doubted else None
         follows = last is not None and last.epoch == batch.epoch and last.stop == batch.first_sample
         return self._taken(batch, epoch, due, follows, CONFIRMED if far else CONFIRMED_NEAR)

@@ -25,7 +25,7 @@ class Sequencer:
 
     Batches that arrive at most `reorder` batches late are put right; what is then still missing is lost: the next Block
     begins at the later number with its gap flag. What comes twice is dropped. A restart of the sender, told by its
-    epoch or by numbers that begin anew, is a gap of unknown length. Blocks are numbered from the first sample received,
+    epoch or by numbers that begin again, is a gap of unknown size. Blocks are numbered from the first sample received,
     or from where a record continues (`resume`).
 
     A batch out of place is believed only when more of its kind follow and none of the stream comes between them; a
@@ -81,7 +81,7 @@ class Sequencer:
     def resume(self, position: Position, *, paced: bool = True) -> None:
         """Continue a record at this position, before anything came.
 
-        The sender's numbers tell exactly what is missing. Where it has begun anew, this computer's clock estimates it,
+        The sender's numbers tell exactly what is missing. Where it was restarted, this computer's clock estimates it,
         if the sender is `paced`: sends its samples when they are taken.
         """
         self._resumed, self._paced = position, paced
@@ -124,7 +124,7 @@ class Sequencer:
         return batch.stop > self._next and batch.first_sample <= max(self._next, self._highest) + ahead
 
     def _ahead_max(self, batch: AnyBatch) -> float:
-        """How many samples a sender can be ahead of where the stream was, unless it has begun anew."""
+        """How many samples a sender can be ahead of where the stream was, unless it was restarted."""
         if self._epoch:
             return float("inf")
         seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
@@ -221,7 +221,7 @@ class Sequencer:
         return known and self._next is not None and batch.stop <= self._next
 
     def _restart(self, believed: list[AnyBatch]) -> list[LiveBlock]:
-        """Go on with these batches of another epoch, or of numbers that begin anew."""
+        """Go on with these batches of another epoch, or of numbers that begin again."""
         blocks = self._release(0)
         epoch, first = believed[0].epoch, min(batch.first_sample for batch in believed)
         offset = self._left.pop(epoch, None)
