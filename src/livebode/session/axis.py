@@ -70,9 +70,11 @@ class MotionSection(_Section):
 
 
 class MonitoringSection(_Section):
-    """[monitoring]: the baseline to tell changes against, and how often a false alarm may come, in words."""
+    """[monitoring]: the baseline to compare with, how often a false alarm may come, in words, and the channels that a
+    baseline's parameters may depend on."""
 
     baseline: File | None = None
+    covariates: Annotated[list[str], Field(max_length=4)] = []
     false_alarms: str = "one in 30 days of motion"
 
 
