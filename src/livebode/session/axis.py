@@ -57,6 +57,7 @@ class TrackingSection(_Section):
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
+    ripple: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = []
     accept_roles: bool = False
     all_periods: bool = False
 
