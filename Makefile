@@ -44,6 +44,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.bandwidth
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.overload
+	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.dashboard
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
