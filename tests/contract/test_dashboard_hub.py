@@ -205,7 +205,7 @@ def test_events_of_one_cause_are_one_notice_and_acknowledged_up_to_the_one_that_
 
 
 def test_groups_that_the_run_made_are_counted_by_what_they_say() -> None:
-    """Their repeats are reported in growing steps; after a pause the same cause begins another group."""
+    """Their repeats share lines; after a pause the same cause begins another group."""
     notices = Notices()
     for sample, name, count in ((0, "loss@0", 1), (10, "loss@0", 2), (40, "loss@0", 8), (900, "loss@900", 1)):
         notices.take(Event("gap", sample, sample / 10, "a gap", {"group": name, "count": count, "first_s": 0.0}))

@@ -10,12 +10,13 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
-from livebode.nouns import InputError
+from livebode.nouns import Event, InputError
+from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, Run
 
 _TABLES = ("responses", "parameters", "samples")
-_EVENTS = pa.schema(
+_SINGLE_EVENTS = pa.schema(
     [
         ("kind", pa.string()),
         ("sample", pa.int64()),
@@ -24,6 +25,8 @@ _EVENTS = pa.schema(
         ("details", pa.string()),
     ]
 )
+_COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
+_EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
 # Reads nothing but what it is given and writes nothing: a query that came by mail can be run.
 _CONFINED = (
     "SET memory_limit = '2GB'",
@@ -44,7 +47,7 @@ class Found:
 
 
 def query(run: Run, sql: str, rows_max: int) -> Found:
-    """The first rows that a query of the tables responses, parameters, samples and events gives.
+    """The first rows that a query of the tables responses, parameters, samples, events and single_events gives.
 
     Parameters
     ----------
@@ -104,7 +107,7 @@ def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
 
 
 def _known(run: Run) -> str:
-    return ", ".join(["events", *run.files(_TABLES)])
+    return ", ".join(["events", "single_events", *run.files(_TABLES)])
 
 
 def _show(run: Run, database: Any, asked: set[str]) -> None:
@@ -117,8 +120,15 @@ def _show(run: Run, database: Any, asked: set[str]) -> None:
         columns = "*" if table == "samples" else _nan_as_null(parts[0].schema)
         united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
-    events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
-    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
+    lines = list(run.each_event_and_damage())
+    rows = [_plain(row.newest) | vars(row) for row in event_rows(lines)]
+    database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
+    each = [_plain(one) for event in lines for one in each_event(event)]
+    database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+
+
+def _plain(event: Event) -> dict[str, Any]:
+    return asdict(event) | {"details": to_json(event.details)}
 
 
 def _nan_as_null(schema: pa.Schema) -> str:

@@ -15,6 +15,7 @@ import pyarrow as pa
 from livebode.arrow import to_numpy
 from livebode.nouns import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
 from livebode.records import event_lines
+from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
 from livebode.records.response_table import ADDED, SCHEMA
 from livebode.records.segments import reading
@@ -188,11 +189,25 @@ class Run:
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
-        """What is in events.jsonl, with an event of kind "record-damaged" in the place of each damaged line."""
+        """What was recorded, with an event of kind "record-damaged" in the place of each damaged line.
+
+        Of a run that goes on, or was killed, with those at the end that are not in events.jsonl yet.
+        """
         return list(self.each_event())
 
     def each_event(self) -> Iterator[Event]:
         """The same one by one, however many they are."""
+        # Before the lines: what was written in between is then in both, and not in neither.
+        waiting = self.waiting_events()
+        yield from still_waiting(self.event_lines(), waiting)
+
+    def waiting_events(self) -> list[Event]:
+        """Those that will share a line of events.jsonl with others, as of the newest commit."""
+        plain = [] if self.finished or not reading.in_segments(self.path) else reading.waiting_events(self.path)
+        return [event for value in plain if (event := event_lines.to_event(value)) is not None]
+
+    def event_lines(self) -> Iterator[Event]:
+        """What is in events.jsonl."""
         try:
             yield from event_lines.events(self.path, self.tell, finished=self.finished)
         except OSError as error:

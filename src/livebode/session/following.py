@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from livebode.session.segmented import SegmentedRun
 
 
+_SILENT_S = 0.2  # without a Block
+
+
 class Source(Protocol):
     """What a run takes its samples from: a recording or a simulated machine."""
 
@@ -112,6 +115,8 @@ class Tracking:
         if isinstance(source, LiveSource):
             self._shedding = LoadShedding(source, lambda: self._orders.ended)
         self._follower, settings = pipeline.follower, pipeline.follower.settings
+        if isinstance(source, LiveSource):
+            delivery["until"] = partial(self._until, delivery.get("until", lambda: False))
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
@@ -126,6 +131,7 @@ class Tracking:
         self._done: dict[str, Any] = {}
         self._newest: Fit | None = None
         self._origin_s = 0.0
+        self._stepped_s = time.monotonic()
         self.recorder = self._recorder(again, before)
         self._out = Outlet(self.recorder, to.audience, self._tally.groups)
 
@@ -146,6 +152,7 @@ class Tracking:
             again=again,
             ends=self.source.samples is not None,
             tell=self._said,
+            waiting=self._tally.groups.waiting,
             position=self._position,
             before=before,
         )
@@ -214,6 +221,21 @@ class Tracking:
         if responses is not None:
             self._tally.take(responses, time.perf_counter() - before)
             self._publish(responses)
+        self._write_events()
+        if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
+            self.recorder.keep(kept)
+
+    def _until(self, changing: Callable[[], bool]) -> bool:
+        """Asked by a live source before each Block and while it waits: events of a silent machine are recorded too."""
+        if self._tally.stop and time.monotonic() - self._stepped_s > _SILENT_S:
+            self._write_events()
+            if not isinstance(self.recorder, RunDirectory):
+                self.recorder.commit_while_silent()
+        return changing()
+
+    def _write_events(self) -> None:
+        """Publish what happened since the last call."""
+        self._stepped_s = time.monotonic()
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
         if self._shedding is not None:
             shed = self._shedding.drain_events(*self.position)
@@ -224,8 +246,6 @@ class Tracking:
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
         self._out.report_groups(self.position[1])
-        if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
-            self.recorder.keep(kept)
 
     def _publish(self, responses: Responses) -> None:
         fits, watching = self.pipeline.fits, self.pipeline.watching

@@ -55,6 +55,8 @@ class SegmentedRun:
         Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
     tell
         Called with what the record itself has to say, at once.
+    waiting
+        Events that are not handed to `write_event` yet, which are stored with every commit.
     position
         Of a live source, which is stored with every commit.
     before
@@ -74,11 +76,14 @@ class SegmentedRun:
         again: bool,
         ends: bool,
         tell: Callable[[Event], None],
+        waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
         before: Before | None = None,
     ) -> None:
         self.path = path
-        self._position = position
+        self._position, self._waiting = position, waiting
+        self._followed: Block | None = None
+        self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
         self._continues = None if before is None else before.name
         self._summary, self._rate_hz = dict(summary), rate_hz
@@ -146,17 +151,24 @@ class SegmentedRun:
         InputError
             At the end, if the disk does not take the last ones.
         """
-        block: Block | None = None
         for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
             if self._samples:
                 self._store.write("samples", as_rows(block, self._samples))
             if self._position is not None:
                 self._position.take(block)
             yield block
+            self._followed, self._new = block, True
             if self._store.due(block.stop):
                 self._commit(block)
-        if block is not None:
-            self._commit(block)
+        if self._followed is not None:
+            self._commit(self._followed)
+
+    def commit_while_silent(self) -> None:
+        """Record what came of the last Block, and the events since, while the next one is waited for."""
+        if self._followed is None or not self._store.due(self._followed.stop):
+            return
+        if self._new or self._waiting() != self._waited:
+            self._commit(self._followed)
 
     def write(self, responses: Responses) -> None:
         """Append responses."""
@@ -172,6 +184,7 @@ class SegmentedRun:
     def write_event(self, event: Event) -> None:
         """Append an event."""
         self._store.write_event(event)
+        self._new = True
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
         """Draw the pictures, close what is open and write run.json; `ends` says that another run goes on instead."""
@@ -199,7 +212,8 @@ class SegmentedRun:
         return iter(blocks)
 
     def _commit(self, block: Block) -> None:
-        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states())
+        self._new, self._waited = False, self._waiting()
+        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states(), self._waited)
         self._hear()
 
     def _hear(self) -> None:

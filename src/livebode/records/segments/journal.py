@@ -7,9 +7,10 @@ import json
 import math
 import os
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
@@ -22,6 +23,7 @@ from livebode.records.table import Table
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
+_PLACE = "sample", "time_s", "unix_s", "events_bytes"
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Commit:
         What goes on from there, as named bytes.
     rows
         How many rows of each table were recorded since the run began.
+    waiting
+        Events as plain data that are not in events.jsonl yet, since they will share a line.
     """
 
     sample: int
@@ -48,6 +52,7 @@ class Commit:
     events_bytes: int
     states: Mapping[str, bytes]
     rows: Mapping[str, int] = field(default_factory=dict)
+    waiting: Sequence[Any] = ()
 
     @property
     def position(self) -> tuple[int, int]:
@@ -55,7 +60,7 @@ class Commit:
         return self.sample, self.events_bytes
 
     def to_frame(self) -> bytes:
-        head = {name: getattr(self, name) for name in ("sample", "time_s", "unix_s", "events_bytes", "rows")}
+        head = {name: getattr(self, name) for name in (*_PLACE, "rows", "waiting")}
         text = json.dumps(head | {"states": {name: len(state) for name, state in self.states.items()}}).encode()
         return to_frame(COMMIT, _LENGTH.pack(len(text)), text, *self.states.values())
 
@@ -67,6 +72,8 @@ class Commit:
         whole = [head["sample"], head["events_bytes"], *head.get("rows", {}).values()]
         if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
             raise ValueError("a commit that a run does not write")
+        if not isinstance(head.get("waiting", []), list):
+            raise ValueError("events that a run does not write")
         states = {}
         for name, length in head.pop("states").items():
             states[name] = bytes(payload[at : at + length])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -119,17 +120,20 @@ class Store:
         long = time.monotonic() - self._committed_s >= self.limits.interval_s
         return long or sample - self._committed >= self.limits.interval_samples
 
-    def commit(self, sample: int, time_s: float, states: Mapping[str, bytes]) -> bool:
+    def commit(self, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event] = ()) -> bool:
         """Make everything up to before this sample part of the record, with the states that go on from there.
 
-        Returns whether the disk took it.
+        Events that are `waiting` for a line of their own are in the record until the next commit. Returns whether the
+        disk took it.
         """
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
         try:
             self._settle(self._syncing.done())
             self._log.write(self._events)
-            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states), dict(self._waiting.rows))
+            plain = [asdict(event) for event in waiting]
+            written = self._events.length, dict(states), dict(self._waiting.rows), plain
+            commit = Commit(sample, time_s, time.time(), *written)
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             parts = self._waiting.written()
             full = self._full(sample)
