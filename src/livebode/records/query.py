@@ -11,6 +11,7 @@ import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
 from livebode.nouns import Event, InputError
+from livebode.nouns.clock import RunClock, moment, moments_by
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, Run
@@ -21,6 +22,7 @@ _SINGLE_EVENTS = pa.schema(
         ("kind", pa.string()),
         ("sample", pa.int64()),
         ("time_s", pa.float64()),
+        ("moment", pa.string()),
         ("message", pa.string()),
         ("details", pa.string()),
     ]
@@ -121,14 +123,16 @@ def _show(run: Run, database: Any, asked: set[str]) -> None:
         united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
     lines = list(run.each_event_and_damage())
-    rows = [_plain(row.newest) | vars(row) for row in event_rows(lines)]
+    clock = RunClock.of(run.summary)
+    rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
     database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
-    each = [_plain(one) for event in lines for one in each_event(event)]
+    each = [_plain(one, clock) for event in lines for one in each_event(event)]
     database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
 
 
-def _plain(event: Event) -> dict[str, Any]:
-    return asdict(event) | {"details": to_json(event.details)}
+def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
+    with moments_by(clock):
+        return asdict(event) | {"details": to_json(event.details), "moment": moment(event.time_s)}
 
 
 def _nan_as_null(schema: pa.Schema) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.clock_relation import ClockRelation
 from livebode.session.continuing import Before, StreamPosition
 from livebode.session.destination import Destination
 from livebode.session.fits import Fits
@@ -28,7 +30,7 @@ from livebode.session.overview import Overview
 from livebode.session.pipeline import Pipeline
 from livebode.session.shedding import LoadShedding
 from livebode.session.tally import Tally
-from livebode.sources.live import Health, LiveSource
+from livebode.sources.live import Health, LiveBlock, LiveSource
 
 if TYPE_CHECKING:
     from livebode.session.segmented import SegmentedRun
@@ -88,6 +90,8 @@ class Tracking:
         The run that it goes on from.
     noticed
         What is known of the recording as a whole before it is tracked.
+    relation
+        The clock of a live source, for as long as it is open.
     delivery
         Goes to the source's `blocks`.
     """
@@ -106,6 +110,7 @@ class Tracking:
         position: StreamPosition | None = None,
         before: Before | None = None,
         noticed: Sequence[Event] = (),
+        relation: ClockRelation | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
@@ -130,6 +135,7 @@ class Tracking:
         self._overview = Overview()
         self._done: dict[str, Any] = {}
         self._newest: Fit | None = None
+        self._relation = relation or ClockRelation()
         self._origin_s = 0.0
         self._stepped_s = time.monotonic()
         self.recorder = self._recorder(again, before)
@@ -165,6 +171,8 @@ class Tracking:
         recorder = self.recorder.__enter__()
         if not isinstance(recorder, RunDirectory):
             self._orders.left = recorder.stopped
+            if recorder.clock:
+                self._relation.clock.pieces = recorder.clock
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -187,7 +195,9 @@ class Tracking:
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
         self.to.audience.share(self._overview)
         self.to.audience.begin(self.to.directory, begun, _health(self.source))
-        blocks = self._blocks
+        if self._relation.clock.pieces:
+            self._set_clock()
+        blocks = self._clocked()
         if not isinstance(self.recorder, RunDirectory):
             for responses in self.recorder.before():
                 self._overview.add(responses)
@@ -213,6 +223,20 @@ class Tracking:
             self.to.progress(self._follower.counts["samples"], self.source.samples)
         if not self._tally.stop:
             raise InputError("the recording holds no samples")
+
+    def _clocked(self) -> Iterator[Block]:
+        for block in self._blocks:
+            if isinstance(block, LiveBlock) and self._relation.take(block):
+                self._set_clock()
+            yield block
+
+    def _set_clock(self) -> None:
+        """Publish the clock of a live run."""
+        pieces = self._relation.clock.pieces
+        self.to.audience.set_clock(pieces)
+        if not isinstance(self.recorder, RunDirectory):
+            with suppress(InputError):  # where the disk is full, the end of the run writes it
+                self.recorder.renew_clock(pieces)
 
     def _step(self, step: Callable[[], Responses | None]) -> None:
         """Take one step of the follower, and publish its responses and what happened meanwhile."""
@@ -296,6 +320,8 @@ class Tracking:
         if watching is not None:
             self._done["monitoring"] = watching.finish(self._out.write_event)
         self._out.finish_groups()
+        if self._relation.clock.pieces:
+            self._done["clock"] = list(self._relation.clock.pieces)
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

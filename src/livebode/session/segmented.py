@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.nouns.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
@@ -85,7 +86,7 @@ class SegmentedRun:
         self._followed: Block | None = None
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
-        self._continues = None if before is None else before.name
+        self._more: dict[str, Any] = {} if before is None else {"continues": before.name}
         self._summary, self._rate_hz = dict(summary), rate_hz
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._tell = force, again, ends, tell
@@ -137,11 +138,21 @@ class SegmentedRun:
 
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
-        if self._continued or self._continues:
+        if self._continued or "continues" in self._more:
             run = Run.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # none are told from no run by their lines
             yield from newest
+
+    @property
+    def clock(self) -> list[tuple[float, float]]:
+        """Which time of day the run's seconds are, as `RunClock` keeps it and run.json says."""
+        return RunClock.of(self._more).pieces
+
+    def renew_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
+        """Write it to run.json."""
+        self._more["clock"] = list(pieces)
+        self._store.renew(self._named(self._summary))
 
     def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
         """The Blocks that are still to be tracked; when one is asked for, all that came of the one before is recorded.
@@ -237,11 +248,11 @@ class SegmentedRun:
             )
         for name, part in self._parts.items():
             part.restore(states[name])
-        self._continues = before.get("continues")
+        self._more = {name: before[name] for name in ("continues", "clock") if name in before}
         self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
-        return summary if self._continues is None else {"continues": self._continues} | summary
+        return self._more | summary
 
 
 def _identity(summary: Mapping[str, Any]) -> list[Any]:

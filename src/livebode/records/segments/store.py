@@ -199,13 +199,19 @@ class Store:
         self._files.callback(self._close_open_journal)
         if found.sealed:
             self._begin_closing()
-        away_s = max(0.0, time.time() - found.commit.unix_s)
+        away_s = time.time() - found.commit.unix_s
+        pause = f"{away_s:.1f} s after it ended there"
+        if away_s < 0:
+            pause = (
+                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back meanwhile, so that "
+                "the length of the pause is not known; check its date and time"
+            )
         self._log.say(
             "record-continued",
             found.commit.sample,
             found.commit.time_s,
-            f"the record goes on at sample {found.commit.sample}, {away_s:.1f} s after it ended there",
-            away_s=away_s,
+            f"the record continues at sample {found.commit.sample}, {pause}",
+            away_s=away_s if away_s >= 0 else None,
             torn_bytes=found.torn_bytes,
         )
 
