@@ -114,6 +114,13 @@ class Run:
         """All that can be read in order, in parts of bounded size; or the newest, from files of no more than this."""
         return self._in_parts(self.tables("responses", size_bytes_max))
 
+    def steady_batches(self) -> Iterator[Responses]:
+        """The same without those from a transient at the start of a live run; those that the run averaged are all."""
+        left_out = int(self.summary.get("left_out_samples") or 0)
+        averages = (self.summary.get("configuration", {}).get("tracking") or {}).get("average")
+        for part in self.batches():
+            yield part if averages or not left_out else part[np.flatnonzero(part.first >= left_out)]
+
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Those that speak for a span of time, ends included, in parts; segments outside of it are not read."""
         for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):

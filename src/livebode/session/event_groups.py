@@ -23,7 +23,7 @@ EXACT_MAX, EXACT_PER_S = 1000.0, 1.0
 CAUSES = {
     kind: cause
     for cause, kinds in {
-        "loss": ("loss", "gap", "overflow"),
+        "loss": ("loss", "gap", "overflow", "phase-slip"),
         "connection": ("connected", "disconnected", "restart", "resumed"),
         "order": ("repeat", "reordered"),
         "sender": ("malformed", "foreign", "replaced", "layout-changed", "unit-changed"),

@@ -25,6 +25,7 @@ from livebode.session.clock_relation import ClockRelation
 from livebode.session.continuing import Before, StreamPosition
 from livebode.session.destination import Destination
 from livebode.session.fits import Fits
+from livebode.session.live_checks import LiveChecks
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.overview import Overview
 from livebode.session.pipeline import Pipeline
@@ -134,6 +135,7 @@ class Tracking:
         self._begun = summary.begun(about, self._follower, response_unit(source.channels, settings))
         self._overview = Overview()
         self._done: dict[str, Any] = {}
+        self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
         self._relation = relation or ClockRelation()
         self._origin_s = 0.0
@@ -191,7 +193,7 @@ class Tracking:
 
     def follow(self) -> None:
         """Every Block through the pipeline into the record; InputError where there is none."""
-        fits, watching = self.pipeline.fits, self.pipeline.watching
+        fits = self.pipeline.fits
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
         self.to.audience.share(self._overview)
         self.to.audience.begin(self.to.directory, begun, _health(self.source))
@@ -205,9 +207,7 @@ class Tracking:
                 if fits is not None:
                     fits.take(responses[0:0], self._out)  # which tells it the lines
             blocks = self.recorder.feed(blocks)
-        if watching is not None:
-            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
-            blocks = watching.over(blocks, self._out.write_event, has_time)
+        blocks = self._watched(blocks)
         noticed = () if self._tally.stop else self._noticed  # a record that is continued has them
         for block in _told(blocks, self.to.audience):
             for event in noticed:
@@ -224,6 +224,31 @@ class Tracking:
         if not self._tally.stop:
             raise InputError("the recording holds no samples")
 
+    def _watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The same Blocks, which are checked and monitored on the way."""
+        if (checks := self._live_checks()) is not None:
+            blocks = checks.over(blocks, self._found)
+        if (watching := self.pipeline.watching) is not None:
+            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
+            blocks = watching.over(blocks, self._out.write_event, has_time)
+        return blocks
+
+    def _live_checks(self) -> LiveChecks | None:
+        axis, source = self.pipeline.axis, self.source
+        if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
+            return None
+        roles = isinstance(self.recorder, RunDirectory) or not self.recorder.continued
+        transient = not (self._tally.stop or axis.tracking.all_periods or axis.motion)
+        settings = self._follower.settings
+        return LiveChecks(settings, self.pipeline.channels, roles=roles, transient=transient)
+
+    def _found(self, event: Event) -> None:
+        """Record and show what the signals of a live run show."""
+        self.to.tell(event)
+        self._out.write_event(event)
+        if event.kind == "transient":
+            self._renew(left_out_samples=event.sample + event.details["samples"])
+
     def _clocked(self) -> Iterator[Block]:
         for block in self._blocks:
             if isinstance(block, LiveBlock) and self._relation.take(block):
@@ -234,9 +259,14 @@ class Tracking:
         """Publish the clock of a live run."""
         pieces = self._relation.clock.pieces
         self.to.audience.set_clock(pieces)
+        self._renew(clock=list(pieces))
+
+    def _renew(self, **found: Any) -> None:
+        """Write what was found on the way to run.json, now and at the end."""
+        self._found_on_the_way |= found
         if not isinstance(self.recorder, RunDirectory):
             with suppress(InputError):  # where the disk is full, the end of the run writes it
-                self.recorder.renew_clock(pieces)
+                self.recorder.renew(**found)
 
     def _step(self, step: Callable[[], Responses | None]) -> None:
         """Take one step of the follower, and publish its responses and what happened meanwhile."""
@@ -320,8 +350,7 @@ class Tracking:
         if watching is not None:
             self._done["monitoring"] = watching.finish(self._out.write_event)
         self._out.finish_groups()
-        if self._relation.clock.pieces:
-            self._done["clock"] = list(self._relation.clock.pieces)
+        self._done |= self._found_on_the_way
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

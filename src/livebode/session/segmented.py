@@ -25,6 +25,7 @@ from livebode.session.continuing import SOURCE, Before, StreamPosition, in_piece
 from livebode.session.orders import StoppedError
 from livebode.session.stateful import Stateful
 
+FOUND_ON_THE_WAY = "clock", "left_out_samples"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval three quarters of a second: what a kill costs at most
 _SEEN_AGAIN_BYTES = 256 << 20  # what a picture of a run that goes on is drawn from, beside what comes
@@ -145,13 +146,18 @@ class SegmentedRun:
             yield from newest
 
     @property
+    def continued(self) -> bool:
+        """Whether the run was there before."""
+        return self._continued
+
+    @property
     def clock(self) -> list[tuple[float, float]]:
         """Which time of day the run's seconds are, as `RunClock` keeps it and run.json says."""
         return RunClock.of(self._more).pieces
 
-    def renew_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
-        """Write it to run.json."""
-        self._more["clock"] = list(pieces)
+    def renew(self, **found: Any) -> None:
+        """Write to run.json what was found on the way."""
+        self._more |= found
         self._store.renew(self._named(self._summary))
 
     def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
@@ -248,7 +254,7 @@ class SegmentedRun:
             )
         for name, part in self._parts.items():
             part.restore(states[name])
-        self._more = {name: before[name] for name in ("continues", "clock") if name in before}
+        self._more = {name: before[name] for name in ("continues", *FOUND_ON_THE_WAY) if name in before}
         self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:

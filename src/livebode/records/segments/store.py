@@ -203,8 +203,8 @@ class Store:
         pause = f"{away_s:.1f} s after it ended there"
         if away_s < 0:
             pause = (
-                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back meanwhile, so that "
-                "the length of the pause is not known; check its date and time"
+                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back meanwhile, so "
+                "that the length of the pause is not known; check its date and time"
             )
         self._log.say(
             "record-continued",
