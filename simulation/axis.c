@@ -29,16 +29,17 @@ static lb_play play(double gap, double elongation, double rate) {
     return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
 }
 
-/* Belt that the motor's pulley has moved, its arm, and the belt's speed there. */
+/* Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its arm, and the
+ * belt's speed there. */
 typedef struct {
-    double travel, arm, speed;
+    double travel, angle, arm, speed;
 } lb_pulley;
 
 static lb_pulley pulley(const lb_axis_config *c, double phi, double omega) {
     const double r = c->radius_m, e = c->eccentricity;
-    if (e == 0.0) return (lb_pulley){r * phi, r, r * omega};
-    const double arm = r * (1.0 + e * sin(phi));
-    return (lb_pulley){r * (phi + e * (1.0 - cos(phi))), arm, arm * omega};
+    if (e == 0.0) return (lb_pulley){r * phi, phi, r, r * omega};
+    const double arm = r * (1.0 + e * sin(phi)), angle = phi + e * (1.0 - cos(phi));
+    return (lb_pulley){r * angle, angle, arm, arm * omega};
 }
 
 static double spots(const lb_axis_config *c, double at) {
@@ -165,8 +166,9 @@ static double control(const lb_axis_config *c, lb_axis_state *state, const doubl
 void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *state) {
     memset(state, 0, sizeof *state);
     state->plant[0] = position_m / c->radius_m;
-    if (c->states == 6) state->plant[2] = position_m / c->radius_m;
-    state->plant[c->states - 2] = pulley(c, state->plant[0], 0.0).travel;
+    const lb_pulley m = pulley(c, state->plant[0], 0.0);
+    if (c->states == 6) state->plant[2] = m.angle; /* no span is elongated, not even by rounding */
+    state->plant[c->states - 2] = m.travel;
     state->angle = state->plant[0];
     state->reading =
         c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad : state->angle;
