@@ -83,7 +83,7 @@ def standing(path: Path, seed: int, *faults: TensionLoss) -> Path:
     signals = 'excitation = "w"\ninput = "u"\noutput = "velocity"'
     text = f'[source]\nlog = "{path.name}"\n[signals]\n{signals}\n[lines]\nfrequencies = "20:140:20"\nwindow = 400\n'
     toml = path.with_suffix(".toml")
-    toml.write_text(text + '[tracking]\nnoise = "quiet"\n[fit]\nmodel = "two-mass"\nradius_m = 0.019\n')
+    toml.write_text(text + '[tracking]\nhop = 100\nnoise = "quiet"\n[fit]\nmodel = "two-mass"\nradius_m = 0.019\n')
     return toml
 
 
@@ -123,7 +123,7 @@ def told_live(toml: Path, base: Path, out: Path) -> list[dict[str, object]]:
     ]
     axis = toml.with_name("live.toml")
     text = toml.read_text().replace(f'log = "{toml.stem}.parquet"', 'url = "stdin:"')
-    axis.write_text(text.replace("[tracking]\n", "[tracking]\nhop = 20\n"))  # that of a recording by default
+    axis.write_text(text)
     command = [Path(sys.executable).with_name("livebode"), "run", axis, "--baseline", base, "--out", out]
     done = subprocess.run([*map(str, command)], input=b"".join(lines), capture_output=True, check=False)
     assert done.returncode == 0, done.stderr

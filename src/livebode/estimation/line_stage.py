@@ -180,8 +180,10 @@ class LineStage:
         # An average goes on through windows that it leaves out.
         seen = rows.whole if s.average else rows.clean
         valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)
+        distortion = np.where(valid, estimate.distortion, np.nan)
         if repeating is not None:
-            valid &= ~(repeating.invalid & ~moving[:, np.newaxis])
+            against = repeating.invalid & ~moving[:, np.newaxis]
+            distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
         several = valid & np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
@@ -198,7 +200,7 @@ class LineStage:
             unit=unit,
             input_coherence=np.where(several, self._input_coherence(moments), np.nan),
             weight=np.where(valid, estimate.weight, complex(np.nan, np.nan)),
-            distortion=np.where(valid, estimate.distortion, np.nan),
+            distortion=distortion,
         )
 
     def _seen(self, signals: dict[Role, Complex]) -> tuple[Complex, Complex, Floats]:

@@ -115,7 +115,7 @@ def _apart(run: Run) -> list[Apart]:
 def _rows(run: Run) -> list[Rows]:
     """Rows at each place of the period."""
     each = _apart(run)
-    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.batches()])
+    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
 
 
 def _joined(batches: list[list[Rows]]) -> list[Rows]:
@@ -129,7 +129,7 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
     rows = []
     for run in runs:
         fitter, each = fitter_of(section, run.found["unit"]), _apart(run)
-        fitted = (fitter.process(batch).only(names) for batch in run.batches())
+        fitted = (fitter.process(batch).only(names) for batch in run.steady_batches())
         rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
