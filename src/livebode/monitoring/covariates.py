@@ -46,16 +46,6 @@ class Covariates:
     def __len__(self) -> int:
         return len(self.names)
 
-    @classmethod
-    def unknown(cls, names: tuple[str, ...]) -> Covariates:
-        """Of unknown range and without influence.
-
-        >>> Covariates.unknown(("temperature",)).shift(np.array([[300.0]]))
-        array([[0., 0., 0., 0.]])
-        """
-        n, zero = len(names), np.zeros(len(names))
-        return cls(names, zero, zero - np.inf, zero + np.inf, np.zeros((4, n)), np.zeros((4, n, n)))
-
     @property
     def half_range(self) -> Floats:
         """Half of the learned range, (covariates,)."""
@@ -98,7 +88,6 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
     InputError
         If one has no value or a constant one, or two cannot be told apart.
     """
-    found = Covariates.unknown(names)
     if not len(value):
         raise InputError(
             f"no window of steady motion has a value of the covariates {', '.join(names)}; check these channels, or "
@@ -118,7 +107,8 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
             f"the covariates {one!r} and {other!r} cannot be told apart in these runs (correlation "
             f"{alike.max():.3f}); name one of them in [monitoring] covariates"
         )
-    return Covariates(names, value.mean(axis=0), low, high, found.slope, found.covariance)
+    n = len(names)
+    return Covariates(names, value.mean(axis=0), low, high, np.zeros((4, n)), np.zeros((4, n, n)))
 
 
 def parts_of(sizes: list[int]) -> list[NDArray[np.intp]]:

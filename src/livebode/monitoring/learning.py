@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy, accuracy
 from livebode.monitoring.between_runs import KNOWN, between_runs
-from livebode.monitoring.covariates import Covariates, jackknife, parts_of, with_range
+from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine, cells
 from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
-from livebode.monitoring.model_evidence import ModelEvidence, held, missing, wave, way
+from livebode.monitoring.model_evidence import SIGNALS, ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.order_search import find_orders
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
@@ -66,7 +66,7 @@ def learn_machine(
         If the runs hold too little steady motion, no two masses fit them, or a covariate is constant.
     """
     names = input, output, schedule, *covariates
-    rows, speed = _first_look(runs, lines, names)
+    rows, speed, covariate = _first_look(runs, lines, names)
     low, high = float(rows.position_m.min()), float(rows.position_m.max())
     splines = _SPLINES if high - low > _FLAT_M else (1, 1)
     fit = Fit(lines.z, lines.rate_hz, radius_m, *splines)
@@ -81,11 +81,8 @@ def learn_machine(
         slowest_m_per_s=slowest,
         fastest_m_per_s=fastest,
         windows=cells(rows.position_m, low, high),
-        covariates=Covariates.unknown(tuple(covariates)),
+        covariates=with_range(tuple(covariates), covariate) if covariates else Covariates(),
     )
-    if covariates:
-        seen = Evidence.join(_all_seen(runs, machine, lines, names))
-        machine = replace(machine, covariates=with_range(tuple(covariates), seen.covariate))
     machine = _fitted(runs, machine, lines, names, passes=2)
     for _ in range(_SEARCHES):
         orders = find_orders((run() for run in runs), machine, lines, names)
@@ -146,9 +143,9 @@ def _with_noise(machine: Machine, seen: Evidence) -> Machine:
     return replace(machine, ripple=ripple.only(matters), noise_power=noise)
 
 
-def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[Rows, Floats]:
-    """Responses of single steady windows that are fast enough, and their speeds."""
-    u, y, centre, speed = (np.concatenate(part) for part in zip(*_spectra(runs, lines, names)))
+def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[Rows, Floats, Floats]:
+    """Responses of single steady windows that are fast enough, their speeds, and the known values of covariates."""
+    u, y, centre, speed, covariate = (np.concatenate(part) for part in zip(*_spectra(runs, lines, names)))
     fastest = np.max(np.abs(speed), initial=0.0)
     use = np.flatnonzero((np.abs(speed) >= _SLOWEST * fastest) & np.all(np.abs(u) > 0, axis=1))
     if use.size < _ROWS_MIN or fastest == 0:
@@ -158,21 +155,23 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tu
         )
     use = use[np.argsort(centre[use], kind="stable")]
     chosen = use[np.unique(np.linspace(0, use.size - 1, _ROWS_MAX).round().astype(int))]
-    return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use]
+    known = covariate[use][np.isfinite(covariate[use]).all(axis=1)]
+    return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use], known
 
 
 def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> Iterator[tuple[NDArray[Any], ...]]:
     transform, window = wave(lines.bins, lines.window), lines.window
     for run in runs:
-        stretches = Stretches(names[:3], window, lines.rate_hz)
+        stretches = Stretches(names, window, lines.rate_hz)
         for stretch in (s for block in run() for s in stretches.process(block)):
-            bad = missing(stretch.data)
-            u, y, x = held(stretch.data, bad)
+            bad = missing(stretch.data[:SIGNALS])
+            u, y, x = held(stretch.data[:SIGNALS], bad)
             begin = np.arange(stretch.first, stretch.last) * window - stretch.start
             centre, speed, even = way(x, begin, window, lines.rate_hz)
             cut = begin[:, np.newaxis] + np.arange(window)
             use = even & ~bad[cut].any(axis=1)
-            yield u[cut[use]] @ transform, y[cut[use]] @ transform, centre[use], speed[use]
+            covariate = window_means(stretch.data[SIGNALS:], begin, window)
+            yield u[cut[use]] @ transform, y[cut[use]] @ transform, centre[use], speed[use], covariate[use]
 
 
 def _all_seen(

@@ -21,7 +21,8 @@ from livebode.nouns import Lines
 
 Floats = NDArray[np.float64]
 
-_SIGNALS = 3  # torque, velocity, position; the covariates are behind them
+SIGNALS = 3
+"""Torque, velocity, position; the covariates are behind them."""
 _UNEVEN = 0.1  # of a window's travel, against the window before it
 _SPEED_MARGIN = 0.1
 _OWN = len(DIRECTIONS)
@@ -56,10 +57,10 @@ class ModelEvidence:
     def process(self, stretch: Stretch, offset: Offset) -> Evidence:
         """Evidence of every window of the stretch, in order."""
         lines, machine = self._lines, self._machine
-        bad = missing(stretch.data[:_SIGNALS])
-        u, y, x = held(stretch.data[:_SIGNALS], bad)
+        bad = missing(stretch.data[:SIGNALS])
+        u, y, x = held(stretch.data[:SIGNALS], bad)
         begin = np.arange(stretch.first, stretch.last) * lines.window - stretch.start
-        covariate = window_means(stretch.data[_SIGNALS:], begin, lines.window)
+        covariate = window_means(stretch.data[SIGNALS:], begin, lines.window)
         offset, rest_of_shift = self._shifted(offset, covariate)
         velocity, slopes = self._replay(u, x, offset)
         rest = y - without_drift(velocity, y, lines.window)
@@ -112,16 +113,16 @@ class ModelEvidence:
 
     def way(self, stretch: Stretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
         """Position, speed and status of every window, but for disturbances that the noise shows."""
-        bad = missing(stretch.data[:_SIGNALS])
+        bad = missing(stretch.data[:SIGNALS])
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
-        covariate = window_means(stretch.data[_SIGNALS:], begin, self._lines.window)
-        return self._way(held(stretch.data[:_SIGNALS], bad)[2], begin, stretch, bad, covariate)
+        covariate = window_means(stretch.data[SIGNALS:], begin, self._lines.window)
+        return self._way(held(stretch.data[:SIGNALS], bad)[2], begin, stretch, bad, covariate)
 
     def residual(self, stretch: Stretch, offset: Offset) -> tuple[Floats, Floats]:
         """The measured velocity less the model's, without slow drift, and the shaft's position, (samples,) each."""
-        u, y, x = held(stretch.data[:_SIGNALS], missing(stretch.data[:_SIGNALS]))
+        u, y, x = held(stretch.data[:SIGNALS], missing(stretch.data[:SIGNALS]))
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
-        offset, _ = self._shifted(offset, window_means(stretch.data[_SIGNALS:], begin, self._lines.window))
+        offset, _ = self._shifted(offset, window_means(stretch.data[SIGNALS:], begin, self._lines.window))
         rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
         return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
 
