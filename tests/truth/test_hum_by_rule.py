@@ -84,10 +84,10 @@ def test_frequencies_and_amplitudes_of_hum_are_found_in_a_recording_without_exci
 
 
 def test_noise_of_any_slope_is_no_hum() -> None:
-    """400 recordings of 20 multiples, each taken for hum by chance less than once in 1e8."""
+    """200 recordings of 20 multiples, each taken for hum by chance less than once in 1e8."""
     rng = np.random.default_rng(5)
     for pole in (-0.9, 0.0, 0.9, 0.999):
-        for _ in range(100):
+        for _ in range(50):
             assert find_hum({"y": lfilter([1.0], [1.0, -pole], rng.standard_normal(4000))}, 1000.0) == []
 
 

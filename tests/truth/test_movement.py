@@ -39,7 +39,7 @@ MOVING = {
     "a slow feed": 1e-3 * T + 1e-6 * NOISE,
     "strokes by a coarse encoder": 1e-3 * np.round(100 * np.sin(2 * np.pi * T / 3)),
 }
-PLACES = [(0.0, 1.0), (50.0, 1.0), (-0.4, 1.0), (5e4, 1e3)]  # offset and unit
+PLACES = [(0.0, 1.0), (50.0, 1.0), (-5e4, 1e3)]  # offset and unit
 
 
 def tracked(x: np.ndarray, hop: int = 40) -> tuple[Tracker, np.ndarray]:
