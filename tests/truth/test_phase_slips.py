@@ -14,8 +14,8 @@ from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
 from livebode.nouns import Lines
 from livebode.records import Run
+from livebode.records.grouped_events import each_event
 from livebode.session.aligned import AlignedLog
-from livebode.session.event_groups import each_event
 from livebode.sources import open_log
 from tests.command import livebode, write_parquet
 

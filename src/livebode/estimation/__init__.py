@@ -2,9 +2,20 @@
 
 from livebode.estimation.line_stage import response_unit
 from livebode.estimation.movement import Movement
+from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra_tracker import SpectraTracker
 from livebode.estimation.tracker import Tracker
 from livebode.estimation.welch import welch
 
-__all__ = ["Movement", "Settings", "SpectraTracker", "Tracker", "response_unit", "welch"]
+__all__ = [
+    "Movement",
+    "RippleOrder",
+    "RippleSpeed",
+    "Settings",
+    "SpectraTracker",
+    "Tracker",
+    "response_unit",
+    "ripple_power",
+    "welch",
+]

@@ -130,6 +130,7 @@ class LineStage:
         centre: Floats,
         channels: Sequence[Channel],
         repeating: Repeating | None = None,
+        ripple: Floats | None = None,
     ) -> Responses:
         """Responses of consecutive spectra.
 
@@ -145,12 +146,20 @@ class LineStage:
             Names and units of the signals.
         repeating
             What the periods before show of errors that repeat with the excitation; None where there are no samples.
+        ripple
+            Largest power of a ripple that is added to the input, at each line, (rows, lines); None where none is known.
         """
         with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
-            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating)
+            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating, ripple)
 
     def _responses(
-        self, rows: Rows, place: NDArray[np.int64], centre: Floats, unit: str, repeating: Repeating | None
+        self,
+        rows: Rows,
+        place: NDArray[np.int64],
+        centre: Floats,
+        unit: str,
+        repeating: Repeating | None,
+        ripple: Floats | None,
     ) -> Responses:
         s = self._settings
         spectrum = self._hann.combine(rows.spectrum, place) if self._hann else rows.spectrum
@@ -164,7 +173,7 @@ class LineStage:
         moment = np.concatenate([centre, first[np.newaxis]])
         spectra = np.concatenate([pair, reference[np.newaxis]])
         moments = self._moments.update(series, spectra, powers, moment, usable)
-        estimate = self._estimate(pair, powers, moments, moving, repeating)
+        estimate = self._estimate(pair, powers, moments, moving, repeating, ripple)
         if s.average:
             begun = moments.weight > 0  # until then there is no mean, only the window's own moment
             first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
@@ -241,7 +250,13 @@ class LineStage:
         return unbiased(moments.input_coherence, moments)
 
     def _estimate(
-        self, pair: Complex, powers: Floats, moments: Moments, moving: NDArray[np.bool_], repeating: Repeating | None
+        self,
+        pair: Complex,
+        powers: Floats,
+        moments: Moments,
+        moving: NDArray[np.bool_],
+        repeating: Repeating | None,
+        ripple: Floats | None,
     ) -> Estimate:
         """Value, sigma, distortion and weight (rows, lines), and the degrees of freedom (rows,)."""
         s, f = self._settings, self._settings.lines.frequency_hz
@@ -255,6 +270,8 @@ class LineStage:
         if repeating is not None:
             distortion = np.where(moving[:, np.newaxis], np.nan, repeating.distortion)
             sigma, dof = contained(sigma, dof, distortion, repeating.dof)
+        if ripple is not None:
+            sigma = np.hypot(sigma, np.abs(value) * np.sqrt(ripple / powers[3]))
         slope = np.ones_like(value)
         if s.method.through_loop:
             value, slope = s.loop.plant(value, f)
