@@ -366,7 +366,7 @@ class Tracking:
             self._step(follower.finish)
             tally.handed_out = tally.stop
         check_excitation(follower, tally.check.variance)
-        check_some_valid(tally.responses, tally.valid_lines, follower.counts, window)
+        check_some_valid(tally.responses, tally.valid_lines, follower)
 
     def finish(self) -> Outcome:
         """Draw the pictures and put the record in its place."""

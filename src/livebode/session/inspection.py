@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
 from livebode.nouns import Block
-from livebode.session.plan import beginning
+from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.sources import Log, open_log
 
 
@@ -44,6 +45,12 @@ class Inspection:
     missing: int
     excitation: Excitation | None
 
+    @property
+    def live_hop(self) -> int:
+        """Default hop of a live run whose window is the excitation's period, in samples."""
+        assert self.excitation is not None
+        return nearest_hop(self.excitation.period, self.log.rate_hz / LIVE_RESPONSES_PER_S)
+
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
         log, found = self.log, self.excitation
@@ -68,6 +75,7 @@ class Inspection:
                 "crest_factor": found.crest_factor,
                 "rms": found.rms,
                 "peak": found.peak,
+                "live_hop": self.live_hop,
                 "frequency_hz": found.lines.frequency_hz.tolist(),
                 "amplitude": found.amplitude.tolist(),
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
