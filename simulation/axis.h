@@ -64,7 +64,7 @@ enum {
     LB_AXIS_DISTURBANCE         /* N m on the motor's shaft, not in the logged torque */
 };
 
-/* At rest with the cart at position_m. */
+/* At rest with the motor at position_m / radius_m and no span elongated: the cart is at position_m, but for eccentricity. */
 void lb_axis_rest(const lb_axis_config *config, double position_m, lb_axis_state *state);
 
 /* Time derivative of the plant's state under a torque; now[LB_AXIS_INPUTS] is one column of the input. */

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -31,6 +30,8 @@ schedule = "t"
 [lines]
 frequencies = "50,100,200"
 window = 100
+[tracking]
+hop = 50
 [fit]
 model = "two-mass"
 output = "velocity"
@@ -65,16 +66,19 @@ def test_text_is_the_words_named(data: st.DataObject, words: list[str]) -> None:
     assert found.equals(pa.array([words[i] for i in at], pa.string()))
 
 
-@pytest.mark.parametrize("kept", ["", "[record]\nsamples = true\nsegment_s = 1.0\n"])
-def test_a_run_does_not_import_pandas(kept: str, tmp_path: Path) -> None:
+def test_neither_a_run_nor_one_that_records_samples_imports_pandas(tmp_path: Path) -> None:
     assert importlib.util.find_spec("pandas") is not None
     write_parquet(tmp_path / "log.parquet", signals())
-    (tmp_path / "axis.toml").write_text(AXIS + kept)
+    (tmp_path / "plain.toml").write_text(AXIS)
+    (tmp_path / "recorded.toml").write_text(AXIS + "[record]\nsamples = true\nsegment_s = 1.0\n")
     code = (
-        "import atexit, sys; atexit.register(lambda: print('pandas' in sys.modules));"
-        "from livebode.cli import main; main()"
+        "import sys; from livebode.cli import app\n"
+        "for name in ('plain', 'recorded'):\n"
+        "    app(['run', f'{sys.argv[1]}/{name}.toml', '--out', f'{sys.argv[1]}/{name}'], standalone_mode=False)\n"
+        "print('pandas' in sys.modules)"
     )
-    run = [sys.executable, "-c", code, "run", tmp_path / "axis.toml", "--out", tmp_path / "run"]
+    run = [sys.executable, "-c", code, tmp_path]
     done = subprocess.run(run, capture_output=True, text=True, check=True)
-    assert (tmp_path / "run" / ("parameters" if kept else "parameters.parquet")).exists()
+    assert (tmp_path / "plain" / "parameters.parquet").exists()
+    assert (tmp_path / "recorded" / "parameters").exists()
     assert done.stdout.splitlines()[-1] == "False"

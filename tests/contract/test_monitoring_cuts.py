@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", s
 FAULT = TensionLoss(start_s=6.0, loss=0.03)
 
 
+@cache
 def baseline(by_model: bool) -> Baseline:
     responses = Tracker(SETTINGS).process(recorded((0.3,) * 12, seed=40))
     at = places(LINES.window, SETTINGS.step)

@@ -162,6 +162,17 @@ def test_an_eccentric_pulley_moves_the_cart_off_by_its_share_of_the_radius() -> 
     assert off == pytest.approx(0.01 * 0.019 * (1 - np.cos(block["position"])), abs=4e-5)
 
 
+@pytest.mark.parametrize("masses", [2, 3])
+@pytest.mark.parametrize("start_m", [0.35, 0.8, 1.217])
+def test_an_axis_with_an_eccentric_pulley_starts_at_rest(masses: int, start_m: float) -> None:
+    """Without torque and friction nothing moves: every pulley is where the belt without elongation puts it."""
+    free = Drive(velocity_gain_n_m_s=0.0, position_gain_per_s=0.0)
+    still = Standstill(position_m=start_m)
+    axis = BeltAxis(mechanics=Mechanics(masses=masses, eccentricity=0.01), drive=free, motion=still, seconds=0.1)
+    _, truth = SimulatedAxis(axis).run()
+    assert np.array_equal(truth.states, np.repeat(truth.states[:, :1], len(truth), axis=1))
+
+
 def test_friction_and_torque_noise_act_behind_the_logged_torque() -> None:
     """Viscous friction that falls to half takes half of the torque; noise of 0.1 N m moves a free motor."""
     drag, half = (

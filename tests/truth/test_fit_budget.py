@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,10 +27,15 @@ class Time:
         return allowed
 
 
+@pytest.fixture(autouse=True)
+def no_budgets_of_other_tests() -> None:
+    """All budgets of a process share its time, those too that wait for the collector."""
+    gc.collect()
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.floats(1e-4, 3.0), st.integers(1, 50), st.integers(1, 3))
 def test_the_share_is_held_whatever_a_fit_costs(row_s: float, rows: int, axes: int) -> None:
-    gc.collect()
     times = [Time() for _ in range(axes)]
     budgets = [time.budget() for time in times]
     for budget in budgets:
@@ -46,7 +52,6 @@ def test_the_share_is_held_whatever_a_fit_costs(row_s: float, rows: int, axes: i
 
 
 def test_cheap_fits_are_all_made() -> None:
-    gc.collect()
     time = Time()
     budget = time.budget()
     for _ in range(1000):
@@ -55,7 +60,6 @@ def test_cheap_fits_are_all_made() -> None:
 
 
 def test_none_is_made_while_the_run_is_far_behind() -> None:
-    gc.collect()
     time = Time()
     budget = time.budget()
     for _ in range(100):
@@ -66,7 +70,6 @@ def test_none_is_made_while_the_run_is_far_behind() -> None:
 
 
 def test_a_fit_that_costs_more_than_all_credit_is_tried_now_and_then() -> None:
-    gc.collect()
     time = Time()
     budget = time.budget()
     made = 0

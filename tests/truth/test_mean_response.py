@@ -26,7 +26,7 @@ TRUTH = Plant().response(LINES.frequency_hz)
 
 
 @cache
-def runs(hop: int, louder: float = 1.0) -> list[Responses]:
+def runs(hop: int, louder: float) -> list[Responses]:
     """Runs in closed loop; in the second half the noise may be louder."""
     w, settled = multisine(LINES), 4 * LINES.window
     settings = Settings(lines=LINES, output="y", input="u", excitation="w", hop=hop)
@@ -39,13 +39,19 @@ def runs(hop: int, louder: float = 1.0) -> list[Responses]:
     return [Tracker(settings).process(block) for block in blocks]
 
 
+@cache
+def means_of(hop: int, louder: float) -> list[Response]:
+    """The mean of each run."""
+    return [mean_response(responses)[0] for responses in runs(hop, louder)]
+
+
 def error(means: list[Response]) -> np.ndarray:
     return np.abs(np.array([m.value for m in means]) - TRUTH)
 
 
 def coverage(hop: int, louder: float) -> tuple[float, float]:
     """Shares of errors within the bounds for 63 % and 98 %."""
-    means = [mean_response(responses)[0] for responses in runs(hop, louder)]
+    means = means_of(hop, louder)
     within = [float(np.mean(error(means) <= np.array([m.bound(c) for m in means]))) for c in (1, 2)]
     rms = float(np.sqrt((error(means) ** 2).mean()))
     print(f"hop {hop}, noise x {louder:g}: {within[0]:.3f}, {within[1]:.3f}, rms error {rms:.5f}")
@@ -60,7 +66,7 @@ def test_bounds_hold_what_they_promise_under_the_same_noise(hop: int) -> None:
 
 
 def test_overlap_makes_sigma_no_smaller() -> None:
-    sigma = {hop: np.mean([mean_response(r)[0].sigma for r in runs(hop)], axis=0) for hop in (400, 100, 20)}
+    sigma = {hop: np.mean([mean.sigma for mean in means_of(hop, 1.0)], axis=0) for hop in (400, 100, 20)}
     np.testing.assert_allclose(sigma[100], sigma[400], rtol=0.1)
     np.testing.assert_allclose(sigma[20], sigma[400], rtol=0.1)
 
@@ -75,7 +81,7 @@ def test_bounds_hold_where_noise_grows_or_fades(louder: float) -> None:
 @pytest.mark.parametrize("periods", [3, 5])
 def test_bounds_hold_after_a_few_periods(periods: int) -> None:
     """Away from the resonance sigma is right; the few degrees of freedom are counted carefully, so bounds are wide."""
-    means = [mean_response(responses[: 4 * periods])[0] for responses in runs(100)]
+    means = [mean_response(responses[: 4 * periods])[0] for responses in runs(100, 1.0)]
     rms = np.sqrt((error(means) ** 2).mean(axis=0))
     sigma = np.sqrt(np.mean([m.sigma**2 for m in means], axis=0))
     away = LINES.frequency_hz != 60

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.fft
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

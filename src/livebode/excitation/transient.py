@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -67,6 +67,6 @@ def _far(distance: Floats, rounding: float | Floats) -> Flags:
     # Equal periods have the distance 0; adding the rounding keeps the logarithm.
     log = np.log(distance + rounding + np.finfo(np.float64).tiny)
     middle = np.median(log)
-    spread = np.median(np.abs(log - middle)) / ndtri(0.75)
-    sigmas = -ndtri(FALSE_ALARM / len(log))
+    spread = np.median(np.abs(log - middle)) / scipy.special.ndtri(0.75)
+    sigmas = -scipy.special.ndtri(FALSE_ALARM / len(log))
     return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))

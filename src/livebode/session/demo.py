@@ -53,11 +53,16 @@ def demo_settings() -> Settings:
 
 def demo_baseline(seed: int) -> Baseline:
     """The model of the healthy axis, learned from its strokes at two speeds."""
+    # Learning goes through its runs eight times: they are simulated once.
     healthy = [
-        SimulatedAxis(demo_axis(LEARNED_S / len(_SPEEDS_M_PER_S), seed + i, speed_m_per_s=speed))
+        list(
+            SimulatedAxis(demo_axis(LEARNED_S / len(_SPEEDS_M_PER_S), seed + i, speed_m_per_s=speed)).blocks(
+                ["u", "velocity", "x"], block_samples=WINDOW
+            )
+        )
         for i, speed in enumerate(_SPEEDS_M_PER_S)
     ]
-    runs = [partial(axis.blocks, ["u", "velocity", "x"], block_samples=WINDOW) for axis in healthy]
+    runs = [partial(iter, blocks) for blocks in healthy]
     machine = learn_machine(runs, _lines(), input="u", output="velocity", schedule="x", radius_m=1.0)
     signals: dict[str, str | None] = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
     return Baseline(_lines(), HOP, signals, "joint", "plant", (), machine)

@@ -71,9 +71,11 @@ class Plant:
     def __init__(self, settings: Settings, position_m: float) -> None:
         self.settings = settings
         self.state = [0.0] * settings["states"]
-        for i in range(0, settings["states"] - 2, 2):
-            self.state[i] = position_m / settings["radius_m"]
-        self.state[-2] = self._pulley(self.state[0], 0.0)[0]
+        self.state[0] = position_m / settings["radius_m"]
+        travel, angle, _, _ = self._pulley(self.state[0], 0.0)
+        self.state[-2] = travel
+        if settings["states"] == 6:
+            self.state[2] = angle  # no span is elongated, not even by rounding
 
     def read(self) -> tuple[float, float, float]:
         """Angle and velocity of the motor, and the cart's position."""
@@ -108,17 +110,18 @@ class Plant:
     def _at(self, x: float) -> float:
         return float(self.settings["frozen_position_m"] if self.settings["frozen"] else x)
 
-    def _pulley(self, phi: float, omega: float) -> tuple[float, float, float]:
-        """Belt that the motor's pulley has moved, its arm, and the belt's speed there."""
+    def _pulley(self, phi: float, omega: float) -> tuple[float, float, float, float]:
+        """Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its
+        arm, and the belt's speed there."""
         r, e = self.settings["radius_m"], self.settings["eccentricity"]
         if e == 0:
-            return r * phi, r, r * omega
-        arm = r * (1 + e * sin(phi))
-        return r * (phi + e * (1 - cos(phi))), arm, arm * omega
+            return r * phi, phi, r, r * omega
+        arm, angle = r * (1 + e * sin(phi)), phi + e * (1 - cos(phi))
+        return r * angle, angle, arm, arm * omega
 
     def _two_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
         s, at = self.settings, self._at(state[2])
-        travel, arm, speed = self._pulley(state[0], state[1])
+        travel, _, arm, speed = self._pulley(state[0], state[1])
         shape = 1 / at + 1 / (2 * s["pulley_distance_m"] - at)
         k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at) * shape
         b = s["damping_shape"] * now.damping * sqrt(shape)
@@ -128,7 +131,7 @@ class Plant:
 
     def _three_masses(self, now: Now, torque: float, state: Sequence[float]) -> list[float]:
         s, r, at, l3 = self.settings, self.settings["radius_m"], self._at(state[4]), self.settings["pulley_distance_m"]
-        travel, arm, speed = self._pulley(state[0], state[1])
+        travel, _, arm, speed = self._pulley(state[0], state[1])
         s1, s2, s3 = 1 / at, 1 / (l3 - at), 1 / l3
         shape = s1 + 1 / (2 * l3 - at)
         k = s["specific_stiffness_n"] * now.stiffness * weakening(s, at)
@@ -146,7 +149,7 @@ class Plant:
         if now.gap_m == 0:
             return state[4], state[5]
         r = self.settings["radius_m"]
-        travel, _, speed = self._pulley(state[0], state[1])
+        travel, _, _, speed = self._pulley(state[0], state[1])
         free = (s1 * travel + s2 * (r * state[2])) / (s1 + s2)
         free_rate = (s1 * speed + s2 * (r * state[3])) / (s1 + s2)
         slack, rate = play(now.gap_m, free - state[4], free_rate - state[5])
