@@ -11,6 +11,7 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.estimation.settings import default_hop
 from livebode.nouns import InputError
 from livebode.records import to_json
 
@@ -151,6 +152,9 @@ def _show_excitation(found: Inspection, console: Console) -> None:
             soft_wrap=True,
         )
     console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
+    hops = ((default_hop(excitation.period), "a run"), (found.live_hop, "live"))
+    each = "; ".join(f"{who} {lines.rate_hz / hop:.4g} (hop {hop})" for hop, who in hops)
+    console.print(f"responses/s by default, with this period as window: {each}", soft_wrap=True)
     table = Table(box=None, header_style="bold")
     for heading in ("line Hz", "amplitude", "SNR at output dB"):
         table.add_column(heading, justify="right")

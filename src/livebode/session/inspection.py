@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
 from livebode.nouns import Block, Lines
-from livebode.session.plan import beginning
+from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.session.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
 
@@ -46,6 +47,12 @@ class Inspection:
     excitation: Excitation | None
     quiet: Quiet | None = None
 
+    @property
+    def live_hop(self) -> int:
+        """Default hop of a live run whose window is the excitation's period, in samples."""
+        assert self.excitation is not None
+        return nearest_hop(self.excitation.period, self.log.rate_hz / LIVE_RESPONSES_PER_S)
+
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
         log, found = self.log, self.excitation
@@ -72,6 +79,7 @@ class Inspection:
                 "crest_factor": found.crest_factor,
                 "rms": found.rms,
                 "peak": found.peak,
+                "live_hop": self.live_hop,
                 "frequency_hz": found.lines.frequency_hz.tolist(),
                 "amplitude": found.amplitude.tolist(),
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
