@@ -1,8 +1,8 @@
 """How the tests share a machine.
 
-One thread of linear algebra for each test process, whose neighbours have the other cores: threads of small products wait
-for each other, and keep a core busy while they do. What is set already is kept. One process more than there are cores,
-because many tests wait for something: a machine that sends at its pace, a browser, a process that starts.
+One thread of linear algebra for each test process, whose neighbours have the other cores: threads of small products
+wait for each other, and keep a core busy while they do. What is set already is kept. One process more than there are
+cores, because many tests wait for something: a machine that sends at its pace, a browser, a process that starts.
 """
 
 import os
