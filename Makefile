@@ -42,8 +42,10 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.bandwidth
+	$(BIN)/python -m bench.repeating
 	$(BIN)/python -m bench.live
 	$(BIN)/python -m bench.overload
+	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.dashboard
 
 peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
@@ -78,7 +80,7 @@ damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
 	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
-	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -s tests/fault/test_live_killed.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/fault/test_live_killed.py  # they mostly wait
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak

@@ -22,8 +22,8 @@ from bench.job import LINES, RATE_HZ, WINDOW
 from livebode.excitation import multisine
 from livebode.nouns import Block, Channel
 from livebode.records import Run
+from livebode.records.grouped_events import event_counts
 from livebode.session import Audience, Axis, Destination, Orders, run_live
-from livebode.session.event_groups import each_event
 from livebode.sources.live import Batch, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))
@@ -97,7 +97,7 @@ def measured(seconds: float, folder: Path) -> dict[str, float]:
         "of them fitted": sum(found.summary["fit"]["statuses"].values()),
         "lines of events": len(events),
         "groups of events": len({event.details.get("group", id(event)) for event in events}),
-        "events": sum(1 for event in events for _ in each_event(event)),
+        "events": sum(event_counts(event).total() for event in events),
         "backlog at the end, s": waited_s,
         "stop, s": stop_s,
     }

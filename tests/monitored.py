@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring.accuracy import Accuracy
+from livebode.motion import Curve, MovingModel
+from livebode.motion.model import basis
 from livebode.nouns import Block, Event
-from livebode.simulation import SimulatedAxis
+from livebode.simulation import Mechanics, SimulatedAxis
 from studies.monitoring_axis import CHANNELS, HIGH_M, LINES, LOW_M, RADIUS_M, RandomStrokes, axis, healthy_runs
 
 NAMES = ("u", "velocity", "x")
@@ -61,3 +64,33 @@ def changed(block: Block, edit: Callable[[np.ndarray], None]) -> Block:
     data = block.data.copy()
     edit(data)
     return Block(data, block.channels, block.rate_hz, block.start)
+
+
+def ideal() -> Machine:
+    """The study's axis as it is, learned from nothing: two masses along the way, white noise, no scatter."""
+    mechanics, splines = Mechanics(), 12
+    at = np.linspace(LOW_M, HIGH_M, 200)
+    spans = 1 / at + 1 / (2 * mechanics.pulley_distance_m - at)
+    nominal = mechanics.nominal_position_m
+    stiffness = spans / (1 / nominal + 1 / (2 * mechanics.pulley_distance_m - nominal))
+    weights = np.linalg.lstsq(basis(at, LOW_M, HIGH_M, splines), np.log(stiffness))[0]
+    # The motor's shaft feels them, as with `learn`: a radius of 1 m.
+    arm = 2 * np.log(mechanics.radius_m)
+    model = MovingModel(
+        mechanics.inertia_kg_m2,
+        mechanics.load_kg * mechanics.radius_m**2,
+        1.0,
+        Curve(LOW_M, HIGH_M, weights + np.log(mechanics.stiffness_n_per_m) + arm),
+        Curve(LOW_M, HIGH_M, weights / 2 + np.log(mechanics.damping_n_s_per_m) + arm),
+    )
+    power = LINES.window * 0.1**2
+    held, free = ([0.005, 0.005, 0.05, 0.01], [0.01, 0.01, 0.2, 0.04])
+    return Machine(
+        model,
+        np.full(len(LINES), power),
+        np.full(len(LINES.quiet), power),
+        *(Accuracy(np.ones(4), np.zeros(4), np.array(smallest)) for smallest in (held, free)),
+        0.1,
+        0.4,
+        np.full(28, 10),
+    )

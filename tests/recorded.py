@@ -12,8 +12,8 @@ import numpy as np
 from livebode.estimation import Settings, Tracker
 from livebode.nouns import Block, Channel, Event, Responses
 from livebode.records import Run
+from livebode.records.grouped_events import each_event
 from livebode.session.axis import RecordSection
-from livebode.session.event_groups import each_event
 from livebode.session.tracking import Outcome, record
 from tests.command import LINES, RATE_HZ, signals
 

@@ -212,6 +212,7 @@ def test_a_live_run_without_stamps_has_the_time_of_day_and_a_recording_its_own(b
         assert tab.page.locator("#time-from").inner_text().endswith(" s")
         assert tab.js("tracking.made.axes[0].label()") == "time in s"
         now(hub, at_s=0.5, ago_s=0.0)
+        hub.set_clock([(0.0, time.time() - 7200), (10.0, time.time())])
         tab.page.locator("#time-from", has_text="CE").wait_for()
         tab.until("tracking.made.axes[0].label().startsWith('time, CE')")
         assert tab.wrong == []

@@ -19,8 +19,8 @@ import pytest
 from livebode.estimation import Tracker
 from livebode.nouns import Block, Event, InputError
 from livebode.records import Run, RunDirectory
+from livebode.records.grouped_events import each_event
 from livebode.session.axis import RecordSection
-from livebode.session.event_groups import each_event
 from livebode.session.tracking import record
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 from tests.recorded import (
@@ -280,7 +280,7 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     [
         ("FROM responsess", "Did you mean"),
         ("SELEC 1", "syntax error"),
-        ("FROM parameters", "this run has events, responses, samples"),
+        ("FROM parameters", "this run has events, single_events, responses, samples"),
         ("FROM read_csv('/etc/passwd')", "disabled by configuration"),
         ("COPY responses TO '{run}/x.csv'", "disabled by configuration"),
         ("ATTACH '{run}/x.db'", "disabled by configuration"),
@@ -311,7 +311,7 @@ def test_an_empty_or_interrupted_query_ends_in_a_sentence(tmp_path: Path) -> Non
     for sql in ("", "  ;", "/* nothing */"):
         done = livebode("query", tmp_path / "run", sql)
         assert (done.code, done.out) == (2, "")
-        assert "the query is empty; write SQL on events, responses, samples" in done.err
+        assert "the query is empty; write SQL on events, single_events, responses, samples" in done.err
     command = [str(Path(sys.executable).with_name("livebode")), "query", str(tmp_path / "run")]
     # What runs the tests may ignore the signal, and what it starts with it.
     process = subprocess.Popen(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import struct
+import time
 import warnings
 from dataclasses import dataclass
 from itertools import pairwise
@@ -73,6 +75,7 @@ def rows_of(found: Journal, table: str) -> list[int]:
     return [(sample + 1) // 10 for batch in found.rows.get(table, []) for sample in batch["sample"].to_pylist()]
 
 
+@settings(deadline=None)
 @given(st.integers(0, len(WHOLE) - 1), st.integers(1, 255))
 def test_a_changed_byte_costs_what_its_frame_held_and_is_counted(
     tmp_path_factory: pytest.TempPathFactory, at: int, change: int
@@ -85,15 +88,19 @@ def test_a_changed_byte_costs_what_its_frame_held_and_is_counted(
     assert found.commit == commit(last)
     for table in "ab":
         assert rows_of(found, table) == [k for k in range(1, last + 1) if (table, k) != (hit.table, hit.commit)]
-    assert [place.rows for place in found.damages] == [{hit.table: 1} if hit.table else {}]
+    behind = {"a": 1, "b": 1} if last < COMMITS else {}
+    assert [place.rows for place in found.damages] == [{hit.table: 1} if hit.table else behind]
     if hit.commit is not None:
         k = hit.commit
-        # Where a commit is what is damaged, the one behind it follows.
-        end = k if hit.table else k + 1
+        # Where a commit is what is damaged, the one behind it follows; of the last the rows before it tell the end.
+        end = k if hit.table or k == COMMITS else k + 1
         assert found.damages[0].begin == (10 * (k - 1), k - 1)
-        assert found.damages[0].end == (None if end > COMMITS else (10 * end, end))
+        assert found.damages[0].end == pytest.approx((10 * end, end))
+        # What a frame was is not known where its header is damaged.
+        assert found.damages[0].at_least == (last < COMMITS and at < hit.start + 16)
 
 
+@settings(deadline=None)
 @given(st.integers(0, len(WHOLE)))
 def test_a_torn_journal_ends_at_its_last_commit_and_is_not_damaged(
     tmp_path_factory: pytest.TempPathFactory, at: int
@@ -107,6 +114,7 @@ def test_a_torn_journal_ends_at_its_last_commit_and_is_not_damaged(
     assert found.damages == []
 
 
+@settings(deadline=None)
 @given(st.integers(PIECES[0].end, len(WHOLE) - 40), st.integers(1, 5000))
 def test_a_lost_stretch_of_a_journal_is_counted(tmp_path_factory: pytest.TempPathFactory, at: int, length: int) -> None:
     found = read(tmp_path_factory.getbasetemp() / "stretch", WHOLE[:at] + bytes(length) + WHOLE[at + length :])
@@ -115,6 +123,76 @@ def test_a_lost_stretch_of_a_journal_is_counted(tmp_path_factory: pytest.TempPat
     if found.commit == commit(COMMITS):
         lost = {table: COMMITS - len(rows_of(found, table)) for table in "ab"}
         assert total(found.damages)["rows"] == {table: n for table, n in lost.items() if n}
+
+
+def test_rows_behind_a_damaged_end_are_counted_as_far_as_they_are_known(tmp_path: Path) -> None:
+    data = bytearray(WHOLE)
+    for piece in PIECES[-2:]:
+        data[piece.start + 30] ^= 1
+    (place,) = read(tmp_path, bytes(data)).damages
+    assert (dict(place.rows), place.at_least, place.end) == ({"a": 1}, True, (60, pytest.approx(6.0)))
+    assert place.sentence == "at least 1 rows of a are lost, of samples 50 to 59 (1 s)"
+    data = bytearray(WHOLE)
+    data[PIECES[-1].start + 30] ^= 1
+    torn = journal_of(COMMITS + 1)[0][len(WHOLE) :]
+    (place,) = read(tmp_path, bytes(data) + torn[: len(torn) - 1]).damages
+    assert (dict(place.rows), place.at_least) == ({"a": 1, "b": 1}, False)
+
+
+@pytest.mark.parametrize("attack", ["compressed", "null", "shared", "sparse"])
+def test_a_journal_that_expands_is_refused_in_a_sentence(tmp_path: Path, attack: str) -> None:
+    rows, columns = (1000, 50) if attack == "shared" else (1 << 20, 2)
+    schema = pa.schema([("sample", pa.null() if attack == "null" else pa.int64()) for _ in range(columns)])
+    zeros = pa.nulls(rows) if attack == "null" else pa.array(np.zeros(rows, dtype=np.int64))
+    batch = pa.record_batch([zeros] * columns, schema=schema)
+    options = pa.ipc.IpcWriteOptions(compression="zstd" if attack == "compressed" else None)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, schema, options=options) as writer:
+        writer.write_batch(batch)
+    reader = pa.ipc.MessageReader.open_stream(sink.getvalue())
+    reader.read_next_message()
+    message = reader.read_next_message().serialize().to_pybytes()
+    if attack == "shared":  # every column's buffer is made the first one's
+        for column in range(1, columns):
+            before, own, behind = message.rpartition(struct.pack("<qq", 8 * rows * column, 8 * rows))
+            message = before + struct.pack("<qq", 0, 8 * rows) * bool(own) + behind
+        message = message.replace(struct.pack("<q", 8 * rows * columns), struct.pack("<q", 8 * rows), 1)
+        message = message[: -8 * rows * (columns - 1)]
+        assert pa.ipc.read_record_batch(pa.py_buffer(message), schema).nbytes > 30 * len(message)
+    data = head({"a": Table(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
+    (tmp_path / "open").mkdir()
+    with (tmp_path / name_of(1)).open("wb") as file:
+        file.write(data)
+        if attack == "sparse":
+            file.truncate(64 << 30)
+    with pytest.raises(InputError, match=r"longer than|does not hold what a run writes"):
+        Journal.read(tmp_path, 1)
+
+
+@pytest.mark.parametrize("name", ["run.json", "run-copy.json"])
+def test_a_damaged_file_is_told_once_and_a_clock_that_went_back_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def stop(done: int, _: int | None) -> None:
+        if done > 600:
+            raise StopError
+
+    run, told = tmp_path / "run", list[Event]()
+    with pytest.raises(StopError):
+        record_machine(machine(SAMPLES), run, progress=stop)
+    data = bytearray((run / name).read_bytes())
+    data[len(data) // 2] ^= 1
+    (run / name).write_bytes(data)
+    now = time.time
+    monkeypatch.setattr(time, "time", lambda: now() - 3600)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        record_machine(machine(SAMPLES), run, tell=told.append)
+    damaged = [event.message for event in told if event.kind == "record-damaged"]
+    assert len(damaged) + len(warned) == (name == "run.json")
+    (continued,) = [event for event in told if event.kind == "record-continued"]
+    assert "this computer's clock was set back meanwhile" in continued.message
+    assert continued.details["away_s"] is None
 
 
 def test_the_next_journal_tells_what_a_damaged_end_held(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from tests.peers.plain import TcpPeer
 
 CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"), Channel("n"))
 BATCH = 20
-_SECONDS_MAX = 120
+_REPEATED = 20 * RATE_HZ
+"""Samples after which w, u and y repeat: whole periods of the excitation."""
 
 
 def data(samples: int) -> np.ndarray:
@@ -54,14 +55,16 @@ class Machine(TcpPeer):
         self._sender.join()
 
     def _send(self) -> None:
-        every = data(_SECONDS_MAX * RATE_HZ)
+        every = data(_REPEATED)
         while self._link is None and not self._done.wait(0.01):
             pass
         began = time.monotonic()
         while not self._done.is_set():
             due = int((time.monotonic() - began) * RATE_HZ * self._times)
-            for start in range(self.sent, min(due, every.shape[1]) - BATCH, BATCH):
-                batch = Batch(start, every[:, start : start + BATCH].copy(), CHANNELS, float(RATE_HZ), 9)
+            for start in range(self.sent, due - BATCH, BATCH):
+                sent = every[:, np.arange(start, start + BATCH) % _REPEATED]
+                sent[-1] = np.arange(start, start + BATCH)
+                batch = Batch(start, sent, CHANNELS, float(RATE_HZ), 9)
                 with contextlib.suppress(OSError):  # livebode has ended
                     self._link.sendall(encode_samples(batch, double=True))
                 self.sent = start + BATCH

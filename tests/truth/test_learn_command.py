@@ -190,7 +190,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("{", "is not a baseline"),
         ("[]", "is not a baseline"),
         ('{"format": "livebode baseline", "version": 99}', "version 99"),
-        ('{"format": "livebode baseline", "version": 3}', "damaged"),
+        ('{"format": "livebode baseline", "version": 4}', "damaged"),
     ):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=word):

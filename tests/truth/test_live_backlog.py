@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import threading
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from livebode.records import Run
-from livebode.session import Axis, Destination, Orders, run_live
-from livebode.session.event_groups import each_event
-from livebode.sources.live import SourceSettings
+from livebode.records.grouped_events import each_event
 from livebode.sources.live.inbox import INBOX_S_MAX, Inbox
-from tests.fault.test_session_standstill import Stuck, hurried
+from tests.live_session import LiveSession, Stuck, hurried
 from tests.peers.peer import RATE_HZ, batches, until
 from tests.peers.plain import TcpPeer
 
@@ -22,34 +19,21 @@ BATCHES = 60
 
 
 def test_fits_are_left_out_and_no_sample_is_lost(tmp_path: Path) -> None:
-    stuck, orders = Stuck(), Orders()
-    with TcpPeer(tmp_path) as peer:
-        axis = Axis.of(
-            {
-                "source": SourceSettings(**peer.settings).model_dump(exclude_unset=True),
-                "signals": {"output": "y", "input": "w"},
-                "lines": {"frequencies": "50:500:50", "window": 400},
-                "tracking": {"estimator": "direct"},
-                "fit": {"model": "two-mass-gain"},
-            },
-            "test",
-        )
-        session = threading.Thread(
-            target=run_live, args=(axis, Destination(tmp_path / "run", lambda *_: None, audience=stuck), orders)
-        )
-        session.start()
+    stuck, lines = Stuck(), {"frequencies": "50:500:50", "window": 400}
+    with (
+        TcpPeer(tmp_path) as peer,
+        LiveSession(tmp_path, peer, stuck, lines=lines, fit={"model": "two-mass-gain"}) as session,
+    ):
         peer.wait_ready()
         for batch in batches(12, first=0):
             peer.send(batch)
         assert stuck.held.wait(30)
-        source = orders.source
+        source = session.orders.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)
         until(lambda: source.health.waiting_s > 29.0, "half a minute to wait")
         stuck.released.set()
         until(lambda: not source.health.waiting_s, "the queue to be empty")
-        orders.end()
-        session.join()
     run = Run.open(tmp_path / "run")
     assert run.found["hop"] == RATE_HZ / 20
     assert run.summary["counts"]["missing"] == run.summary["source"]["lost"] == 0

@@ -10,17 +10,20 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.nouns import Channel
+from livebode.nouns import Channel, Event
 from livebode.records import Run
+from livebode.session import Audience
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.command import RATE_HZ, livebode, signals, write_parquet
-from tests.peers.peer import PATIENCE_S, free_port, until
+from tests.live_session import LiveSession
+from tests.peers.peer import PATIENCE_S, batches, free_port, until
 from tests.peers.plain import TcpPeer
 
 CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
@@ -150,6 +153,27 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
     said = err.decode().splitlines()
     assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
     assert sum("the sender began anew at its sample 0" in line for line in said) == 1
+
+
+def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):
+    """A connection that is lost, and what a person acknowledges, wait for no sample."""
+
+    class Person(Audience):
+        said: ClassVar = [Event("acknowledged", 0, 0.0, "seen")]
+
+        def drain_events(self):
+            return [self.said.pop()] if self.said and disconnected() else []
+
+    def disconnected() -> bool:
+        return any(event.kind == "disconnected" for event in session.events())
+
+    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, Person()) as session:
+        peer.wait_ready()
+        for batch in batches(40, first=0):
+            peer.send(batch)
+        until(session.events, "the record to begin")
+        peer.interrupt()
+        until(lambda: "acknowledged" in [event.kind for event in session.events()], "both to be recorded")
 
 
 def listens(sender: socket.socket, frame: bytes) -> bool:

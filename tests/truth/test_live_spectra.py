@@ -209,7 +209,7 @@ def test_a_run_goes_on_after_lost_frames_and_after_its_end(tmp_path: Path) -> No
         peer.wait_ready()
         for batch in given:
             peer.send(replace(batch, epoch=10))
-        ended(process, b"livebode: the record goes on at sample 12000")
+        ended(process, b"livebode: the record continues at sample 12000")
     rows = table(out)
     sample = rows["sample"][:: len(LINES)]
     assert np.all(np.diff(sample) > 0)

@@ -14,7 +14,7 @@ from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
 from livebode.nouns import Lines
 from livebode.records import Run
-from livebode.session.event_groups import each_event
+from livebode.records.grouped_events import each_event
 from tests.command import livebode, write_parquet
 
 RATE_HZ, WINDOW = 4000.0, 400

@@ -49,7 +49,7 @@ def export_command(
     elif mean:
         from livebode.fitting import mean_response
 
-        parts = iter([mean_response(record.batches())])
+        parts = iter([mean_response(record.steady_batches())])
     else:
         parts = record.batches()
     written = export.save(path, lambda path: export.FORMATS[to](path, parts, record.summary), force=force)

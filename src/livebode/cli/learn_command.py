@@ -13,7 +13,7 @@ from livebode.nouns import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
-    from livebode.monitoring import Baseline
+    from livebode.monitoring import Baseline, Machine
 
 _LATE_SAMPLES = 0.05  # less is not worth a sentence
 _MACHINE = ("stiffness", "load", "damping", "inertia")
@@ -67,6 +67,8 @@ def _found(baseline: Baseline) -> dict[str, Any]:
             "ripple_cycles_per_m": machine.ripple.cycles_per_m.round(2).tolist(),
             "ripple_n_m": (2**0.5 * machine.ripple.amplitude_n_m).round(6).tolist(),
             "delay_samples": round(machine.delay_s * baseline.lines.rate_hz, 3),
+            "covariates": _covariates(machine),
+            "between_runs_percent": _between_runs(machine),
             "changes_from_percent": dict(zip(_MACHINE, (100 * machine.held.smallest).round(2).tolist())),
         }
     return found
@@ -87,7 +89,7 @@ def _sentences(found: dict[str, Any]) -> str:
     way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
         f"{text}\nThe model of the machine knows the way {way} at speeds {speeds} a second, and is good for changes "
-        f"from: {changes}.{_ripple(model)}"
+        f"from: {changes}.{_ripple(model)}{_dependence(model)}"
     )
 
 
@@ -100,6 +102,41 @@ def _ripple(model: dict[str, Any]) -> str:
         text += f"\nTorque ripple over the position: {orders} a metre. It is allowed for."
     if abs(late) >= _LATE_SAMPLES:
         text += f"\nThe output is {late:.2f} samples late behind the torque. The model has this delay."
+    return text
+
+
+def _covariates(machine: Machine) -> list[dict[str, Any]]:
+    """Range of each covariate, and its influence in percent per unit."""
+    c = machine.covariates
+    return [
+        {"name": name, "from": float(low), "to": float(high), "percent_per_unit": dict(zip(_MACHINE, slope.tolist()))}
+        for name, low, high, slope in zip(c.names, c.low, c.high, (100 * c.slope.T).round(4))
+    ]
+
+
+def _between_runs(machine: Machine) -> dict[str, float]:
+    """What healthy runs differ by (standard deviation); empty where they do not differ."""
+    if (between := machine.between) is None:
+        return {}
+    seen = between.dominant(machine.held.smallest)
+    percent = (100 * between.spread * abs(between.direction)).round(2).tolist()
+    return {name: size for name, size, part in zip(_MACHINE, percent, seen) if part}
+
+
+def _dependence(model: dict[str, Any]) -> str:
+    """What the model depends on, and what differs between the runs without a known reason."""
+    text = ""
+    for c in model["covariates"]:
+        slopes = ", ".join(f"{what} {percent:+.3g} %" for what, percent in c["percent_per_unit"].items())
+        way = _between(c["from"], c["to"])
+        text += f"\nPer unit of {c['name']} (learned {way}): {slopes}. Other values are not judged."
+    if differ := model["between_runs_percent"]:
+        sizes = ", ".join(f"{what} by {percent:g} %" for what, percent in differ.items())
+        text += (
+            f"\nThe runs differ from each other: {sizes} (standard deviation). Such a change is seen within a run, and "
+            "from the beginning only beyond three times that. If a temperature explains it, name its channel in "
+            "[monitoring] covariates of the runs."
+        )
     return text
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.fitting import Fit
 from livebode.nouns import Model, Responses
+from livebode.nouns.clock import RunClock, moment, moments_by
 from livebode.session import Draw, Outcome
 
 _ALARMS_SHOWN = 8
@@ -54,7 +55,8 @@ def show(outcome: Outcome) -> None:
     if "fit" in outcome.summary:
         _show_statuses(outcome.summary["fit"])
     if outcome.fit is not None:
-        show_fit(outcome.fit, f"newest fit, at {outcome.fit.parameters.time_s[0]:.6g} s")
+        with moments_by(RunClock.of(outcome.summary)):
+            show_fit(outcome.fit, f"newest fit, at {moment(outcome.fit.parameters.time_s[0], 2)}")
     if "loop" in outcome.summary:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:

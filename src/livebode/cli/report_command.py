@@ -24,12 +24,13 @@ def report_command(
 
     A report in the run's own directory is replaced. The PDF needs the extra `pdf`.
     """
+    from livebode.nouns.clock import RunClock, moments_by
+    from livebode.records import Run
     from livebode.session.reporting.material import Judged
     from livebode.session.reporting.run_report import run_report
 
     judged = None
     if on is not None:
-        from livebode.records import Run
         from livebode.session.axis import FitSection
         from livebode.session.said import said
         from livebode.session.validation import validate_run
@@ -37,6 +38,8 @@ def report_command(
         section = FitSection.model_validate(said(Run.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
-    document = run_report(directory, judged, made=datetime.now(UTC))
-    for line in write_documents(document, out or directory / "report", force=force or out is None):
+    with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)):
+        document = run_report(directory, judged, made=datetime.now(UTC))
+        written = write_documents(document, out or directory / "report", force=force or out is None)
+    for line in written:
         print(line)

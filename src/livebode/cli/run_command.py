@@ -68,6 +68,10 @@ def run_command(
         str | None,
         typer.Option(metavar="WORDS", help="How often one may come, such as 'one in 30 days of motion' (unless said)."),
     ] = None,
+    covariate: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CHANNEL", help="Channel that a baseline may depend on, such as a temperature."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
     accept_roles: Annotated[
@@ -106,7 +110,7 @@ def run_command(
             "accept_roles": accept_roles or None,
             "all_periods": all_periods or None,
         },
-        "monitoring": {"baseline": baseline, "false_alarms": false_alarms},
+        "monitoring": {"baseline": baseline, "false_alarms": false_alarms, "covariates": covariate or None},
     }
     said = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in said.items() if values} | ({"record": {}} if go_on else {})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +42,8 @@ class Hub(Audience):
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self.followed_s = 0.0
         """`time.monotonic()` of the newest samples, or of the run's beginning."""
-        self.clock_s: float | None = None
-        """Seconds since 1970 at the run's time 0, by this computer's clock at the first Block of a live source."""
+        self.clock: Sequence[tuple[float, float]] = ()
+        """Which time of day the run's seconds are, as `RunClock` keeps it."""
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
         self._lock = threading.Lock()
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
@@ -58,9 +58,12 @@ class Hub(Audience):
         with self._lock:  # what waits is of a run before, whose lines may be others
             self._rows, self._values = deque(), 0
         self.directory, self.health, self.ended = directory, health, None
-        self.followed_s, self.clock_s = time.monotonic(), None
+        self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
         self.begun = summary
+
+    def set_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
+        self.clock = tuple(pieces)
 
     def write(self, responses: Responses) -> None:
         self._keep(responses, responses.value.size)
@@ -88,10 +91,7 @@ class Hub(Audience):
         self.intervals_s.append(now_s - self.followed_s)
         self.followed_s = now_s
         if isinstance(block, LiveBlock):
-            delay_s = self.followed_s - block.arrived_s
-            self.delays_s.append(delay_s)
-            if self.clock_s is None:
-                self.clock_s = time.time() - delay_s - (block.origin_s + block.stop / block.rate_hz)
+            self.delays_s.append(self.followed_s - block.arrived_s)
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self.ended = summary

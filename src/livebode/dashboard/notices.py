@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from livebode.nouns import Event
+from livebode.records.grouped_events import event_counts, group_of
 
 ACKNOWLEDGED = "acknowledged"
 CAUSES_MAX = 500
@@ -51,13 +52,12 @@ class Notice:
         """One more, or as many as the event says that there were."""
         if self.seen >= self.count:
             self.kinds = set()
-        self.kinds |= {event.kind, *(str(repeat[0]) for repeat in event.details.get("repeats", ()))}
+        self.kinds |= event_counts(event).keys()
         self.id, self.kind, self.message = event_id(event), event.kind, event.message[:_PLAIN_MAX]
-        group, count = event.details.get("group"), event.details.get("count")
-        if isinstance(group, str) and isinstance(count, int):
-            if group != self._group:  # the same cause again, after a pause
-                self._group, self._before = group, self.count
-            self.count = max(self.count, self._before + count)
+        if (group := group_of(event)) is not None:
+            if group[0] != self._group:  # the same cause again, after a pause
+                self._group, self._before = group[0], self.count
+            self.count = max(self.count, self._before + group[1])
         else:
             self.count += 1
         self.last_s = max(self.last_s, event.time_s)
@@ -89,7 +89,6 @@ class Notices:
         if key in self._known:
             return
         cause = cause_of(event)
-        self.counts[event.kind] = self.counts.get(event.kind, 0) + 1
         if event.kind in ("change", "change-corrected"):
             self.changed.add(str(event.details.get("what", "machine")))
         elif event.kind == "change-cleared":
@@ -100,7 +99,9 @@ class Notices:
             began_s = float(first_s) if isinstance(first_s, int | float) else event.time_s
             notice = Notice(cause, key, event.kind, "", began_s, event.time_s)
             self._shown[cause] = notice
+        before = notice.count
         notice.take(event)
+        self.counts[event.kind] = self.counts.get(event.kind, 0) + notice.count - before
         notice.changed = self.version
         self._shown.move_to_end(cause)
         self._known[key] = cause, notice.count
@@ -120,9 +121,11 @@ class Notices:
 
     def _acknowledged(self, event: Event) -> None:
         found = self.of(str(event.details.get("event")))
-        if found is None:
+        # Earlier versions named the events of a group otherwise.
+        known = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
+        if known is None:
             return
-        notice, count = found[0], event.details.get("count")
+        notice, count = known, event.details.get("count")
         # In runs recorded before causes were grouped each event was acknowledged alone.
         seen = max(notice.seen, count) if isinstance(count, int) else notice.seen + 1
         notice.seen, notice.changed = min(seen, notice.count), self.version
@@ -136,16 +139,16 @@ def cause_of(event: Event) -> str:
     >>> cause_of(Event("change", 7, 1.0, "changed", {"what": "stiffness"}))
     'change: stiffness'
     """
-    group = event.details.get("group")
-    if isinstance(group, str):
-        return group.partition("@")[0]
+    if (group := group_of(event)) is not None:
+        return group[0].partition("@")[0]
     subjects = [str(event.details[name]) for name in _SUBJECTS if name in event.details]
     return ": ".join([event.kind, *subjects[:1]])[:200]
 
 
 def event_id(event: Event) -> str:
-    """A name for an event that is the same whenever the record is read."""
-    text = f"{event.kind}\0{event.sample}\0{event.time_s!r}\0{event.message}"
+    """A name for an event that is the same whenever the record is read; of a group's, for it and all before."""
+    group = group_of(event)
+    text = f"{event.kind}\0{event.sample}\0{event.time_s!r}\0{event.message}" if group is None else f"{group}"
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 

@@ -23,6 +23,7 @@ from livebode.dashboard.recent import Recent
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
 from livebode.nouns import Event, InputError, Quantity, Responses
+from livebode.nouns.clock import RunClock
 from livebode.records import Run, to_json
 from livebode.session.overview import Overview
 from livebode.session.said import said
@@ -226,18 +227,18 @@ class State:
             "last_s": self.last_s,
             "live": self.live,
             "growing": self.growing,
-            "clock_s": self.clock_s,
+            "clock": self.clock,
         }
 
     @property
-    def clock_s(self) -> float | None:
-        """Seconds since 1970 at the run's time 0; None where the run has no clock but its own.
+    def clock(self) -> list[tuple[float, float]]:
+        """Which time of day the run's seconds are, as `RunClock` keeps it; empty where they are of no clock.
 
         What happens before a run begins is dated.
         """
         if self.quantities is None or self.last_s > _SINCE_1970_S:
-            return 0.0
-        return None if self.hub is None else self.hub.clock_s
+            return [(0.0, 0.0)]
+        return list(self.hub.clock) if self.hub is not None else RunClock.of(dict(self._summary)).pieces
 
     def health(self) -> dict[str, Any]:
         """How source and tracking are doing."""

@@ -15,6 +15,7 @@ from livebode.dashboard.state import State
 from livebode.dashboard.trends import Rows
 from livebode.nouns import Event, Responses
 from livebode.records import Run
+from livebode.records.grouped_events import still_waiting
 
 
 class Viewed:
@@ -57,8 +58,9 @@ class Viewed:
         state.read()
 
     def _new_events(self) -> list[Event]:
-        events = self._run.events()
-        new, self._events = events[self._events :], len(events)
+        waiting, lines = self._run.waiting_events(), list(self._run.event_lines())
+        new = list(still_waiting(lines, waiting))[self._events :]
+        self._events = len(lines)
         for damage in self._run.damages:
             if damage not in (*self._damages, *new):
                 new.append(damage)

@@ -1,9 +1,19 @@
 """From samples to frequency responses: the online tracker and the offline reference."""
 
 from livebode.estimation.line_stage import response_unit
+from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra_tracker import SpectraTracker
 from livebode.estimation.tracker import Tracker
 from livebode.estimation.welch import welch
 
-__all__ = ["Settings", "SpectraTracker", "Tracker", "response_unit", "welch"]
+__all__ = [
+    "RippleOrder",
+    "RippleSpeed",
+    "Settings",
+    "SpectraTracker",
+    "Tracker",
+    "response_unit",
+    "ripple_power",
+    "welch",
+]

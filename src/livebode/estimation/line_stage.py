@@ -130,6 +130,7 @@ class LineStage:
         centre: Floats,
         channels: Sequence[Channel],
         repeating: Repeating | None = None,
+        ripple: Floats | None = None,
     ) -> Responses:
         """Responses of consecutive spectra.
 
@@ -145,12 +146,20 @@ class LineStage:
             Names and units of the signals.
         repeating
             What the periods before show of errors that repeat with the excitation; None where there are no samples.
+        ripple
+            Largest power of a ripple that is added to the input, at each line, (rows, lines); None where none is known.
         """
         with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
-            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating)
+            return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating, ripple)
 
     def _responses(
-        self, rows: Rows, place: NDArray[np.int64], centre: Floats, unit: str, repeating: Repeating | None
+        self,
+        rows: Rows,
+        place: NDArray[np.int64],
+        centre: Floats,
+        unit: str,
+        repeating: Repeating | None,
+        ripple: Floats | None,
     ) -> Responses:
         s = self._settings
         spectrum = self._hann.combine(rows.spectrum, place) if self._hann else rows.spectrum
@@ -164,15 +173,17 @@ class LineStage:
         moment = np.concatenate([centre, first[np.newaxis]])
         spectra = np.concatenate([pair, reference[np.newaxis]])
         moments = self._moments.update(series, spectra, powers, moment, usable)
-        estimate = self._estimate(pair, powers, moments, moving, repeating)
+        estimate = self._estimate(pair, powers, moments, moving, repeating, ripple)
         if s.average:
             begun = moments.weight > 0  # until then there is no mean, only the window's own moment
             first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
         # An average goes on through windows that it leaves out.
         seen = rows.whole if s.average else rows.clean
         valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)
+        distortion = np.where(valid, estimate.distortion, np.nan)
         if repeating is not None:
-            valid &= ~(repeating.invalid & ~moving[:, np.newaxis])
+            against = repeating.invalid & ~moving[:, np.newaxis]
+            distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
         several = valid & np.isfinite(moments.dof)[:, np.newaxis]
         return Responses(
             lines=s.lines,
@@ -189,7 +200,7 @@ class LineStage:
             unit=unit,
             input_coherence=np.where(several, self._input_coherence(moments), np.nan),
             weight=np.where(valid, estimate.weight, complex(np.nan, np.nan)),
-            distortion=np.where(valid, estimate.distortion, np.nan),
+            distortion=distortion,
         )
 
     def _seen(self, signals: dict[Role, Complex]) -> tuple[Complex, Complex, Floats]:
@@ -239,7 +250,13 @@ class LineStage:
         return unbiased(moments.input_coherence, moments)
 
     def _estimate(
-        self, pair: Complex, powers: Floats, moments: Moments, moving: NDArray[np.bool_], repeating: Repeating | None
+        self,
+        pair: Complex,
+        powers: Floats,
+        moments: Moments,
+        moving: NDArray[np.bool_],
+        repeating: Repeating | None,
+        ripple: Floats | None,
     ) -> Estimate:
         """Value, sigma, distortion and weight (rows, lines), and the degrees of freedom (rows,)."""
         s, f = self._settings, self._settings.lines.frequency_hz
@@ -253,6 +270,8 @@ class LineStage:
         if repeating is not None:
             distortion = np.where(moving[:, np.newaxis], np.nan, repeating.distortion)
             sigma, dof = contained(sigma, dof, distortion, repeating.dof)
+        if ripple is not None:
+            sigma = np.hypot(sigma, np.abs(value) * np.sqrt(ripple / powers[3]))
         slope = np.ones_like(value)
         if s.method.through_loop:
             value, slope = s.loop.plant(value, f)

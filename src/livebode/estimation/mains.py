@@ -26,51 +26,84 @@ class Mains:
 
     A tone on a line cannot be told from the response there. Harmonics on bins without excitation tell it, and so does
     a period without excitation. A tone at one line alone, always there, cannot be seen in a periodic recording.
+
+    Attributes
+    ----------
+    lines
+        Which lines are at a multiple of each mains frequency, shape (frequencies, lines).
+    bins
+        The bins whose power is needed, ascending; empty where no line is at a multiple.
     """
 
     def __init__(self, lines: Lines) -> None:
-        at = np.asarray(lines.bins)
+        at, highest = np.asarray(lines.bins), (lines.window - 1) // 2
         self.lines = np.zeros((len(MAINS_HZ), len(at)), dtype=np.bool_)
-        self._tones: list[NDArray[np.int64]] = []
+        free = []
         for i, mains_hz in enumerate(MAINS_HZ):
-            self.lines[i] = np.isin(at, _on_bins(mains_hz, lines, (lines.window - 1) // 2))
-            free = np.setdiff1d(_on_bins(mains_hz, lines, _HARMONICS), at)
-            self._tones.append(free if self.lines[i].any() else free[:0])
-        self._excited = at
+            self.lines[i] = np.isin(at, _on_bins(mains_hz, lines, highest))
+            tones = np.setdiff1d(_on_bins(mains_hz, lines, _HARMONICS), at)
+            free.append(tones if self.lines[i].any() else tones[:0])
+        self._any = np.asarray(self.lines.any(axis=0))
         # Distortion is at multiples of the lines' common divisor, and of odd lines at odd or at even ones alone:
         # at these distances it is like that at the harmonic.
-        self._beside = _BESIDE * int(np.lcm(2, gcd(*lines.bins)))
-        self._highest = (lines.window - 1) // 2
+        distances = _BESIDE * int(np.lcm(2, gcd(*lines.bins)))
+        barred = np.concatenate([at, *free])
+        self._free = [_Neighbours(tones, distances, barred, highest) for tones in free]
+        barred = np.concatenate(free)
+        self._excited = _Neighbours(at if self._any.any() else at[:0], 2 * _BESIDE, barred, highest)
+        groups = [*self._free, self._excited]
+        self.bins = np.unique(np.concatenate([group.bins for group in groups]))
+        for group in groups:
+            group.place_in(self.bins)
 
     @property
     def any(self) -> bool:
-        return bool(self.lines.any())
+        return bool(self._any.any())
 
     def seen(self, output: Floats) -> NDArray[np.bool_]:
-        """Which lines may hold hum, (lines,), by the power of the mean output at all bins from 0 on."""
-        least = _MATTERS * output[self._excited].max()
-        found = [
-            self._stand_out(output, tones, self._excited, self._beside) & (output[tones] > least)
-            for tones in self._tones
-        ]
-        return np.asarray(sum(self.lines[i] & bool(f.any()) for i, f in enumerate(found)) > 0)
+        """Which lines may hold hum, (lines,), by the power of the mean output at `bins`."""
+        if not self.any:
+            return self._any
+        least = _MATTERS * output[self._excited.tones].max()
+        found = [bool((group.stand_out(output) & (output[group.tones] > least)).any()) for group in self._free]
+        return np.asarray((self.lines & np.array(found)[:, np.newaxis]).any(axis=0))
 
-    def seen_alone(self, output: Floats) -> NDArray[np.bool_]:
-        """The same by a period without excitation, in which the lines themselves show it."""
-        none = np.zeros(0, dtype=np.int64)
-        return np.asarray(self.lines.any(axis=0) & self._stand_out(output, self._excited, none, 2 * _BESIDE))
+    def alone(self, output: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        """In a period without excitation: the power at each line, and whether it is that of a tone there.
 
-    def _stand_out(
-        self, output: Floats, tones: NDArray[np.int64], excited: NDArray[np.int64], distances: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
+        `output` is the power at `bins`; shapes (lines,).
+        """
+        if not self.any:
+            return np.zeros(self._any.size), self._any
+        return output[self._excited.tones], self._any & self._excited.stand_out(output)
+
+
+class _Neighbours:
+    """Bins at which a tone may be, and those beside each with which it is compared."""
+
+    def __init__(
+        self, tones: NDArray[np.int64], distances: NDArray[np.int64], barred: NDArray[np.int64], highest: int
+    ) -> None:
         beside = tones[:, np.newaxis] + distances
-        usable = (beside > 0) & (beside <= self._highest) & ~np.isin(beside, excited)
-        usable &= ~np.isin(beside, np.concatenate(self._tones))
-        power = np.where(usable, output[beside.clip(0, self._highest)], 0.0)
-        count = usable.sum(axis=1)
-        level = power.sum(axis=1) / np.maximum(count, 1)
-        stands_out = count * (_CHANCE ** (-1 / np.maximum(count, 1)) - 1)
-        return np.asarray((count >= len(_BESIDE) // 2) & (output[tones] > stands_out * level))
+        self._usable = (beside > 0) & (beside <= highest) & ~np.isin(beside, barred)
+        self.tones, self._beside = tones, beside.clip(0, highest)
+        count = self._usable.sum(axis=1)
+        self._count = np.maximum(count, 1)
+        self._enough = count >= distances.size // 2
+        self._times = count * (_CHANCE ** (-1 / self._count) - 1)
+
+    @property
+    def bins(self) -> NDArray[np.int64]:
+        return np.concatenate([self.tones, self._beside.ravel()])
+
+    def place_in(self, bins: NDArray[np.int64]) -> None:
+        """From here on powers are given at these bins only."""
+        self.tones, self._beside = np.searchsorted(bins, self.tones), np.searchsorted(bins, self._beside)
+
+    def stand_out(self, power: Floats) -> NDArray[np.bool_]:
+        """Which bins have more power than chance gives them beside their neighbours, (tones,)."""
+        level = np.where(self._usable, power[self._beside], 0.0).sum(axis=1) / self._count
+        return np.asarray(self._enough & (power[self.tones] > self._times * level))
 
 
 def _on_bins(mains_hz: float, lines: Lines, harmonics: int) -> NDArray[np.int64]:

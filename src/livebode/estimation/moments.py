@@ -51,6 +51,11 @@ class Moments:
         return pair
 
     @property
+    def reference(self) -> Complex:
+        """Mean of the reference, shape (rows, lines)."""
+        return np.asarray(self.means[4] + 1j * self.means[5])
+
+    @property
     def coherence(self) -> Floats:
         """γ² = |S_ry|²/(S_rr·S_yy), Nevaranta 2016, eq. (18), shape (rows, lines); 1 for a single window."""
         return np.asarray((self.means[0] ** 2 + self.means[1] ** 2) / (self.means[6] * self.means[7]))

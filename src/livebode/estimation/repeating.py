@@ -15,6 +15,7 @@ from livebode.estimation.mains import Mains
 from livebode.estimation.moments import Moments, PeriodMoments
 from livebode.estimation.movement import Movement
 from livebode.estimation.settings import Settings
+from livebode.estimation.silence import SilentHum
 from livebode.estimation.spectra import Rows, after
 from livebode.estimation.steps import step_of
 from livebode.nouns import Block, Channel, Event
@@ -23,10 +24,13 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _PERIODS_MIN = 2
+_JUDGED_PER_S = 10  # times at most; short periods come more often than anybody needs a verdict
 _DISTORTED = 0.5  # of |G|: from where on the value is not that of a linear machine
 _STEPS = 0.5  # amplitude in steps of the sensor below which a line may not be seen at all
+_OTHER = 0.1  # of the excitation's power: from where on a period does not repeat the ones before
 _EXCITED = 1e-12
 _KINDS = ("distorted", "hum", "steps")
+_HUM = _KINDS.index("hum")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +46,9 @@ class RepeatingErrors:
     """Watches whole periods of the signals for what repeats with the excitation without being a linear response.
 
     One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out, and periods in
-    which the machine moves, do not count; a start, a gap and a movement begin the mean over periods again. What is
-    found counts from the next window on, and is never averaged away.
+    which the machine moves, do not count; a start, a gap, a pause or another phase of the excitation and a movement
+    begin the mean over periods again. What is found counts from the next window on, and is never averaged away; behind
+    a gap or a pause it counts until the next verdict.
 
     Parameters
     ----------
@@ -68,20 +73,22 @@ class RepeatingErrors:
         self._movement = Movement(1)
         self._forget()
         self._now = np.full(len(lines), np.nan), np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
-        self._hum = np.zeros(len(lines), dtype=np.bool_)
+        self._silence = SilentHum(len(lines))
+        self._judged_every = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
         self._told = np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
         self._events: list[Event] = []
 
     def _forget(self) -> None:
         self._moments = PeriodMoments(1, len(self._bins), 1.0, own=True)
-        self._output = np.zeros(self._settings.lines.window // 2 + 1, dtype=np.complex128)
+        self._output = np.zeros(self._mains.bins.size, dtype=np.complex128)
         self._periods = 0
 
-    _STATE = ("_samples", "_position", "_output", "_hum", "_told")
+    _STATE = ("_samples", "_position", "_output", "_told")
     _NUMBERS = ("_at", "_whole", "_largest", "_step", "_periods")
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        parts = {f"moments.{name}": array for name, array in self._moments.state().items()} | self._movement.state()
+        parts = {f"moments.{name}": array for name, array in self._moments.state().items()}
+        parts |= self._movement.state() | self._silence.state()
         arrays = {name: getattr(self, name).copy() for name in self._STATE}
         numbers = np.array([float(getattr(self, name)) for name in self._NUMBERS])
         return arrays | parts | {"numbers": numbers, "distortion": self._now[0].copy(), "invalid": self._now[1].copy()}
@@ -94,6 +101,7 @@ class RepeatingErrors:
         self._at, self._periods, self._whole = int(self._at), int(self._periods), bool(self._whole)
         self._moments.load({name.removeprefix("moments."): a for name, a in state.items() if name.startswith("mom")})
         self._movement.load(state)
+        self._silence.load(state)
         self._now = state["distortion"].astype(np.float64), state["invalid"].astype(np.bool_)
 
     def drain(self) -> list[Event]:
@@ -117,7 +125,7 @@ class RepeatingErrors:
         self._at = sample % self._settings.lines.window
         self._whole = False
         self._forget()
-        self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
+        self._silence.interrupt()
 
     def process(
         self,
@@ -163,31 +171,54 @@ class RepeatingErrors:
             self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
         elif self._whole:
             with np.errstate(all="ignore"):
-                self._take(block.channels)
-            self._tell(sample, block.origin_s + sample / block.rate_hz)
+                gone = self._take(block.channels)
+            self._tell(sample, block.origin_s + sample / block.rate_hz, gone)
         self._samples[:, 0] = self._samples[:, -1]
         self._at, self._whole = 0, True
 
-    def _take(self, channels: Sequence[Channel]) -> None:
-        """The period that is complete."""
-        signals = np.where(self._differenced[:, np.newaxis], np.diff(self._samples), self._samples[:, 1:])
+    def _take(self, channels: Sequence[Channel]) -> NDArray[np.bool_]:
+        """The period that is complete; returns the lines whose hum is no longer there."""
+        signals = self._samples[:, 1:]
+        if self._differenced.any():
+            signals = np.where(self._differenced[:, np.newaxis], np.diff(self._samples), signals)
         every = np.fft.rfft(signals)
         spectra = dict(zip(self._settings.roles, every[:, self._bins] * self._after))
         method = self._settings.method
         reference = spectra[method.reference]
         level = float(power(reference[self._lines]).max())
         self._largest = max(self._largest, level)
+        output = every[0, self._mains.bins]
         if level <= _EXCITED * self._largest:
-            self._hum |= self._mains.seen_alone(power(every[0]))
-            return
+            return self._pause(power(output))
+        self._silence.end()
+        if method.reference == "excitation" and self._differs(reference[self._lines]):
+            self._forget()
         three = np.stack([spectra["output"], spectra[method.denominator], reference])[:, np.newaxis]
         powers = np.stack([power(reference), power(spectra["output"]), *2 * [np.zeros(len(self._bins))]])
         moments = self._moments.update(0, three, powers[:, np.newaxis], np.zeros((3, 1)), np.array([True]))
         self._periods += 1
-        self._output += (every[0] - self._output) / self._periods
+        self._output += (output - self._output) / self._periods
         self._step = step_of(signals[0]) if self._step == 0 or self._periods == 1 else self._step
-        if self._periods >= _PERIODS_MIN:
+        late = self._periods - _PERIODS_MIN
+        if late >= 0 and late % self._judged_every == 0:
             self._judge(moments, channels)
+        return np.zeros(len(self._settings.lines), dtype=np.bool_)
+
+    def _differs(self, excitation: Complex) -> bool:
+        """Whether this period's excitation, at the lines, is another one than that of the mean: it began, or leapt."""
+        mean = self._moments.now.reference[0, self._lines]
+        return bool(self._periods and power(excitation - mean).sum() > _OTHER * power(mean).sum())
+
+    def _pause(self, output: Floats) -> NDArray[np.bool_]:
+        """A period without excitation, behind which it may begin at another phase."""
+        if self._periods:
+            self._forget()
+        gone = self._silence.take(*self._mains.alone(output))
+        distortion, invalid = self._now
+        invalid = invalid.copy()
+        invalid[_HUM] &= ~gone
+        self._now = distortion, invalid
+        return gone
 
     def _judge(self, moments: Moments, channels: Sequence[Channel]) -> None:
         numerator, denominator = moments.pair[:, 0, self._lines]
@@ -198,7 +229,7 @@ class RepeatingErrors:
             instrument = self._settings.method.reference == "excitation"
             variance = self._distortion.variance(moments, self._lines, self._beside, instrument, of_steps)
             distortion = np.sqrt(variance) / np.abs(denominator)
-        hum = self._hum | self._mains.seen(power(self._output))
+        hum = self._silence.lines | self._mains.seen(power(self._output))
         distorted = distortion > _DISTORTED * np.abs(numerator / denominator)
         self._counts = 2 * np.abs(numerator) / window / step
         # Noise larger than the steps carries any amplitude over them.
@@ -215,7 +246,12 @@ class RepeatingErrors:
         velocity = unit.endswith("/s") or not unit
         return self._step * (np.abs(1 - 1 / lines.z) if velocity else np.ones(len(lines)))
 
-    def _tell(self, sample: int, time_s: float) -> None:
+    def _tell(self, sample: int, time_s: float, gone: NDArray[np.bool_]) -> None:
+        for at in np.flatnonzero(gone & self._told[_HUM]):
+            self._told[_HUM, at] = False
+            f = self._settings.lines.frequency_hz[at]
+            message = f"hum of the mains at {f:g} Hz is no longer seen without excitation; the line is valid again"
+            self._events.append(Event("hum-gone", sample, time_s, message, {"line_hz": float(f)}))
         invalid = self._now[1]
         for i, at in zip(*np.nonzero(invalid & ~self._told)):
             self._told[i, at] = True

@@ -7,6 +7,7 @@ from math import isqrt
 from typing import Literal
 
 from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
+from livebode.estimation.ripple import RippleOrder
 from livebode.nouns import InputError, Lines, Loop, Quantity
 
 DETECTION_LINES_MIN = 4
@@ -53,6 +54,8 @@ class Settings:
     dtype
         "float64", or "float32" for what the kernel gives on a drive without double precision: samples are rounded to it
         as they come, and the DFT's tables and sums are in it. An error that grows with a constant offset on a channel.
+    ripple
+        Orders of a torque that repeats with the schedule, as cogging does. Where one meets a line, sigma contains it.
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Settings:
     hann: bool = False
     spikes: tuple[str, ...] = ()
     dtype: Literal["float64", "float32"] = "float64"
+    ripple: tuple[RippleOrder, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_words()
@@ -100,9 +104,14 @@ class Settings:
                     raise InputError(
                         f"{option} names {name!r}, which is none of the signals in use: {', '.join(known)}"
                     )
+        self._check_together()
+        self._check_loop()
+
+    def _check_together(self) -> None:
+        if self.ripple and self.schedule is None:
+            raise InputError("a ripple repeats with the schedule; name the channel of the position")
         if self.hann and self.noise == "quiet":
             raise InputError("a Hann window spreads the lines over the quiet bins; take the noise from periods")
-        self._check_loop()
 
     def _check_words(self) -> None:
         for name, known in (
@@ -149,7 +158,7 @@ class Settings:
         """
         logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
         names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
-        options = ("noise", "differenced", "hann", "spikes", "dtype")
+        options = ("noise", "differenced", "hann", "spikes", "dtype", "ripple")
         return repr((*(getattr(self, name) for name in names + options), logged))
 
     def channel(self, role: Role) -> str | None:

@@ -11,6 +11,7 @@ from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
+from livebode.estimation.ripple import RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
@@ -62,6 +63,7 @@ class Tracker(AroundLines[Watch]):
             settings.dtype,
         )
         self._centre = Centre(window)
+        self._speed = RippleSpeed(settings.lines) if settings.ripple else None
         self._repeating = RepeatingErrors(settings) if repeating else None
         self._watch = Watch(window)
         self._parts = {
@@ -69,6 +71,7 @@ class Tracker(AroundLines[Watch]):
             "lines": self._lines,
             "centre": self._centre,
             **({"repeating": self._repeating} if self._repeating else {}),
+            **({"speed": self._speed} if self._speed else {}),
             "watch": self._watch,
         }
 
@@ -114,6 +117,8 @@ class Tracker(AroundLines[Watch]):
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()
+            if self._speed is not None:
+                self._speed.restart()
             if self._repeating is not None:
                 self._repeating.restart(block.start)
         rows = self._spectra.process(channels)
@@ -122,6 +127,9 @@ class Tracker(AroundLines[Watch]):
         centre = np.stack([centre_s, self._centre.at(schedule, rows.sample - block.start)])
         repeating = None if self._repeating is None else self._repeating.process(channels, rows, schedule, block)
         place = (rows.sample + 1) % s.lines.window
-        responses = self._lines.process(rows, place, centre, block.channels, repeating)
+        ripple = None
+        if self._speed is not None:
+            ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
+        responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
         self._nothing = responses[0:0]
         return responses

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _DISTORTION_DOF = 4.0  # of detection lines behind a distortion: four, if they are all on one side of a line
+_FIRST_VERDICT = 3  # windows that may be valid before what repeats is known: three periods, of which two are whole
 
 
 def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
@@ -39,8 +41,9 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     become noisy. For the same reason no bound of the mean is made from them. What repeats does not average out: the
     newest known `distortion` of each line is added to sigma² as it is.
 
-    A line that was valid at first only, for fewer responses than it was invalid while others were valid, and for two
-    windows at least, has a reason against it that was found later; it is not valid in the mean.
+    An infinite `distortion` is a reason against a line. Where the newest known one is infinite, the line is not valid
+    in the mean, unless it was valid for longer than invalid for that reason, as in motion, where nothing is known of
+    what repeats. The three windows that a first verdict takes do not count.
 
     Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
     and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
@@ -61,7 +64,7 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     Raises
     ------
     InputError
-        If no line is ever valid.
+        If no line is ever valid, or there is a reason against each.
     """
     mean = RunningMean()
     for part in [responses] if isinstance(responses, Responses) else responses:
@@ -83,6 +86,7 @@ class RunningMean:
     def __init__(self) -> None:
         self.rows, self.averages = 0, False
         self._newest: Responses | None = None
+        self._verdict: _Verdict | None = None
 
     def _begin(self, like: Responses) -> None:
         n = len(like.lines)
@@ -90,14 +94,15 @@ class RunningMean:
         self._overlap = _Overlap(like.lines.window, n)
         self._least, self._dof = np.full(n, np.inf), 0.0
         self._coherence, self._input_coherence = _Mean(n), _Mean(n)
-        self._distortion = np.full(n, np.nan)
-        self._since, self._last = np.zeros((2, n), dtype=np.int64)
         self._moment, self._schedule, self._scheduled = 0.0, 0.0, 0
         self._first = np.iinfo(np.int64).max
 
     def add(self, part: Responses) -> None:
         """The next responses."""
         used = part.valid & np.isfinite(part.value)
+        if self._verdict is None:
+            self._verdict = _Verdict(part.lines.window, len(part.lines))
+        self._verdict.add(used, part)
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
             return
@@ -110,7 +115,6 @@ class RunningMean:
         self._pair.add(used, part.value * weight, weight)
         self._overlap.add(part.sample + 1, used.astype(np.float64))
         known = used & np.isfinite(part.sigma)
-        self._follow_newest(used, part)
         self._least = np.minimum(self._least, np.where(known, part.sigma, np.inf).min(axis=0))
         self._dof = float(np.max(part.dof, initial=self._dof, where=known.any(axis=1)))
         self._coherence.add(used, part.coherence)
@@ -122,28 +126,22 @@ class RunningMean:
         self._scheduled += int(placed.sum())
         self._first = min(self._first, int(part.first[0]))
 
-    def _follow_newest(self, used: NDArray[np.bool_], part: Responses) -> None:
-        """At each line the newest distortion, the newest valid sample, and how many responses came since."""
-        after, known = np.argmax(used[::-1], axis=0), used.any(axis=0)
-        self._since = np.where(known, after, self._since + len(used))
-        self._last = np.where(known, part.sample[len(used) - 1 - after], self._last)
-        finite = used & np.isfinite(part.distortion)
-        newest = np.take_along_axis(part.distortion, len(used) - 1 - np.argmax(finite[::-1], axis=0)[np.newaxis], 0)[0]
-        self._distortion = np.where(finite.any(axis=0), newest, self._distortion)
-
     def response(self) -> Responses:
-        """The mean so far; InputError where no line was ever valid."""
-        newest = self._newest
-        if newest is None:
+        """The mean so far; InputError where no line was ever valid, or there is a reason against each."""
+        newest, verdict = self._newest, self._verdict
+        if newest is None or verdict is None:
             raise InputError("none of the responses is valid at any line; track more periods")
-        return newest if self.averages else self._mean_of_all(newest)
-
-    def _mean_of_all(self, newest: Responses) -> Responses:
-        pair = self._pair
-        lost = (self._since > pair.count) & (newest.sample[0] - self._last >= 2 * newest.lines.window)
-        valid = (pair.count > 0) & ~lost
+        known = newest.valid[0] if self.averages else self._pair.count > 0
+        valid = known & ~verdict.against
         if not valid.any():
-            raise InputError("none of the responses is valid at any line at the end; the run's events say why")
+            raise InputError(
+                "no line is valid: what repeats with the excitation (distortion, hum of the mains, steps of a sensor) "
+                "is too large at each; the run's events give the reason for each line"
+            )
+        return _without(newest, ~valid) if self.averages else self._mean_of_all(newest, verdict.distortion, valid)
+
+    def _mean_of_all(self, newest: Responses, distortion: Floats, valid: NDArray[np.bool_]) -> Responses:
+        pair = self._pair
         count = np.where(valid, pair.count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             windows = count**2 / self._overlap.total()
@@ -151,7 +149,7 @@ class RunningMean:
             value = pair.numerator / pair.denominator
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
-        added = np.where(np.isfinite(self._distortion) & valid, self._distortion, 0.0)
+        added = np.where(np.isfinite(distortion) & valid, distortion, 0.0)
         together = np.hypot(scatter, added)
         dof = windows[several].min() - 1 if several.any() else self._dof or np.nan
         if several.any() and added.any():
@@ -172,8 +170,47 @@ class RunningMean:
             quantity=newest.quantity,
             unit=newest.unit,
             input_coherence=self._input_coherence.value[np.newaxis],
-            distortion=np.where(valid, self._distortion, np.nan)[np.newaxis],
+            distortion=np.where(valid & np.isfinite(distortion), distortion, np.nan)[np.newaxis],
         )
+
+
+def _without(one: Responses, lines: NDArray[np.bool_]) -> Responses:
+    """The same with these lines invalid."""
+    nothing = complex(np.nan, np.nan)
+    return replace(
+        one,
+        value=np.where(lines, nothing, one.value),
+        sigma=np.where(lines, np.nan, one.sigma),
+        weight=np.where(lines, nothing, one.weight),
+        valid=one.valid & ~lines,
+    )
+
+
+class _Verdict:
+    """At each line the newest known distortion, and whether a reason against the line outweighs when it was valid."""
+
+    def __init__(self, window: int, lines: int) -> None:
+        self._window, self._stop = window, 0
+        self.distortion = np.full(lines, np.nan)
+        self._valid, self._against = np.zeros(lines), np.zeros(lines)  # in samples
+
+    def add(self, used: NDArray[np.bool_], part: Responses) -> None:
+        if not len(part):
+            return
+        against = np.isinf(part.distortion)
+        step = np.diff(part.sample + 1, prepend=self._stop or int(part.sample[0]) + 1 - self._window)
+        step, self._stop = np.minimum(step, self._window), int(part.sample[-1]) + 1
+        self._valid += step @ used
+        self._against += step @ against
+        known = against | (used & ~np.isnan(part.distortion))
+        newest = len(known) - 1 - np.argmax(known[::-1], axis=0)
+        of_part = np.take_along_axis(part.distortion, newest[np.newaxis], 0)[0]
+        self.distortion = np.where(known.any(axis=0), of_part, self.distortion)
+
+    @property
+    def against(self) -> NDArray[np.bool_]:
+        late = self._valid <= self._against + _FIRST_VERDICT * self._window
+        return np.asarray(np.isinf(self.distortion) & late)
 
 
 class _Mean:

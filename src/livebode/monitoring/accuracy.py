@@ -39,6 +39,16 @@ class Accuracy:
         """How far a healthy machine may lie off the model."""
         return 2 * self.scatter
 
+    def at_least(self, other: Accuracy) -> Accuracy:
+        """The coarser of both in each component."""
+        pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
+        return Accuracy(*(np.maximum(one, two) for one, two in pairs))
+
+    def widened(self, by: Floats | float) -> Accuracy:
+        """With a further error of the baseline of this standard deviation, (components,)."""
+        scatter = np.hypot(self.scatter, by)
+        return Accuracy(self.inflation, scatter, np.maximum(self.smallest, _APART * scatter))
+
 
 def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats | float = 0.0) -> Accuracy:
     """From healthy windows in order, shape (windows, components) each; `smallest` as asked for, (components,).

@@ -75,6 +75,20 @@ class Baseline:
             self._check_hop(settings.step)
 
     @property
+    def covariates(self) -> tuple[str, ...]:
+        """Channels that its machine depends on beside torque, velocity and position."""
+        return self.machine.covariates.names if self.machine is not None else ()
+
+    def check_covariates(self, names: tuple[str, ...]) -> None:
+        """InputError where a run names other covariates than these; naming none takes them from here."""
+        if names and set(names) != set(self.covariates):
+            learned, here = (", ".join(some) or "no covariates" for some in (self.covariates, names))
+            raise InputError(
+                f"the baseline was learned with {learned}, and [monitoring] covariates of this run are {here}; take "
+                "the same, or learn a baseline from such runs"
+            )
+
+    @property
     def apart(self) -> int:
         """Samples from one row of its tables to the next."""
         return max(self.lines.window, self.hop)

@@ -15,14 +15,18 @@ from numpy.typing import NDArray
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.baseline import ROLES, Baseline
 from livebode.monitoring.baseline_part import Part
+from livebode.monitoring.between_runs import BetweenRuns
+from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.ripple import Ripple
+from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.table import Table
 from livebode.motion import Curve, MovingModel
 from livebode.nouns import InputError, Lines
 
 _FORMAT = "livebode baseline"
-_VERSION = 3
+_VERSION = 4
+_COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3}  # and their dimensions
 
 
 def save(baseline: Baseline, path: Path) -> None:
@@ -134,6 +138,8 @@ def _machine_plain(machine: Machine) -> dict[str, Any]:
         "windows": machine.windows.tolist(),
         "delay_s": machine.delay_s,
         "ripple": {name: _list(getattr(machine.ripple, name)) for name in Ripple.__dataclass_fields__},
+        "covariates": _covariates_plain(machine.covariates) if len(machine.covariates) else None,
+        "between": _between_plain(machine.between) if machine.between is not None else None,
     }
 
 
@@ -158,6 +164,8 @@ def _machine(data: Part, lines: Lines) -> Machine:
         data.array("windows", 1, least=0).astype(np.int64),
         _ripple(data.part("ripple")),
         data.number("delay_s"),
+        Covariates() if data.value("covariates") is None else _covariates(data.part("covariates")),
+        None if data.value("between") is None else _between(data.part("between")),
     )
 
 
@@ -166,6 +174,34 @@ def _ripple(data: Part) -> Ripple:
     if ripple.cycles_per_m.size != ripple.amplitude_n_m.size:
         raise data.wrong("amplitude_n_m", f"not {ripple.cycles_per_m.size} numbers")
     return ripple
+
+
+def _covariates_plain(covariates: Covariates) -> dict[str, Any]:
+    arrays = {name: _list(getattr(covariates, name)) for name in _COVARIATE_ARRAYS}
+    return {"names": list(covariates.names)} | arrays
+
+
+def _covariates(data: Part) -> Covariates:
+    names = data.texts("names")
+    arrays = {name: data.array(name, dimensions) for name, dimensions in _COVARIATE_ARRAYS.items()}
+    for name, array in arrays.items():
+        shape = (len(DIRECTIONS), *(len(names),) * (array.ndim - 1)) if array.ndim > 1 else (len(names),)
+        if array.shape != shape:
+            raise data.wrong(name, f"not an array of shape {shape}")
+    if np.any(arrays["high"] <= arrays["low"]):
+        raise data.wrong("high", "not above low")
+    return Covariates(names, **arrays)
+
+
+def _between_plain(between: BetweenRuns) -> dict[str, Any]:
+    return {"direction": _list(between.direction), "spread": between.spread}
+
+
+def _between(data: Part) -> BetweenRuns:
+    direction = data.array("direction", 1)
+    if direction.size != len(DIRECTIONS) or not direction.any():
+        raise data.wrong("direction", f"not {len(DIRECTIONS)} numbers of which one is not 0")
+    return BetweenRuns(direction, data.number("spread", 0))
 
 
 def _table_plain(table: Table) -> dict[str, Any]:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
-"""Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed."""
+COVARIATE, NO_COVARIATE = "covariate", "no covariate"
+"""Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
+covariate is outside of the learned range, or has no value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,8 @@ class Evidence:
         (rows, 2·orders, 2·orders). Score and information above are with the ripple allowed for.
     ripple_gain
         Power of an order of 1 N m at the lines, (rows, orders, lines).
+    covariate
+        Mean of each covariate over the window, NaN where it has no value, (rows, covariates).
     """
 
     score: Floats
@@ -56,6 +60,7 @@ class Evidence:
     ripple_score: Floats
     ripple_information: Floats
     ripple_gain: Floats
+    covariate: Floats
 
     def __len__(self) -> int:
         return len(self.sample)
@@ -64,7 +69,7 @@ class Evidence:
     def judged(self) -> NDArray[np.bool_]:
         return np.asarray(self.status == JUDGED)
 
-    def rows(self, chosen: NDArray[np.bool_]) -> Evidence:
+    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Evidence:
         """Some of the windows."""
         return Evidence(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 

@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy, accuracy
+from livebode.monitoring.between_runs import KNOWN, between_runs
+from livebode.monitoring.covariates import Covariates, jackknife, parts_of, with_range
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine, cells
+from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
 from livebode.monitoring.model_evidence import ModelEvidence, held, missing, wave, way
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.order_search import find_orders
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
-from livebode.motion import Curve, MovingModel
 from livebode.motion.fit import Fit, Rows
-from livebode.motion.model import basis
 from livebode.nouns import Block, InputError, Lines
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,6 @@ _SPLINES = 12, 6  # of ln Keff(x), ln bs(x)
 _FLAT_M = 1e-2  # a way shorter than that has no curves
 _SLOWEST = 0.25  # of the fastest speed: slower, dry friction may hold the cart between the excitation's strokes
 _ROWS_MIN, _ROWS_MAX = 60, 4000
-_SMOOTH = 1e-4
 # Of stiffness, load, damping, inertia; friction of a slow cart looks a little like the last two.
 _SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
 # While a change stands, another is seen from so much more on.
@@ -44,20 +44,28 @@ _EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
 
 
 def learn_machine(
-    runs: Sequence[Run], lines: Lines, *, input: str, output: str, schedule: str, radius_m: float
+    runs: Sequence[Run],
+    lines: Lines,
+    *,
+    input: str,
+    output: str,
+    schedule: str,
+    radius_m: float,
+    covariates: Sequence[str] = (),
 ) -> Machine:
     """The Machine that all runs share.
 
     Two masses are fitted to single windows first, as `MotionCorrection` does; then the model is driven through every
     run, and corrected by what it leaves unexplained, until nothing is left (Gauss–Newton on the output's error). The
     runs should hold every speed, both directions and the whole way: what they do not hold is not known.
+    `covariates` name channels, such as a temperature, that the four parameters may depend on linearly.
 
     Raises
     ------
     InputError
-        If the runs hold too little steady motion, or no two masses fit them.
+        If the runs hold too little steady motion, no two masses fit them, or a covariate is constant.
     """
-    names = input, output, schedule
+    names = input, output, schedule, *covariates
     rows, speed = _first_look(runs, lines, names)
     low, high = float(rows.position_m.min()), float(rows.position_m.max())
     splines = _SPLINES if high - low > _FLAT_M else (1, 1)
@@ -73,32 +81,58 @@ def learn_machine(
         slowest_m_per_s=slowest,
         fastest_m_per_s=fastest,
         windows=cells(rows.position_m, low, high),
+        covariates=Covariates.unknown(tuple(covariates)),
     )
+    if covariates:
+        seen = Evidence.join(_all_seen(runs, machine, lines, names))
+        machine = replace(machine, covariates=with_range(tuple(covariates), seen.covariate))
     machine = _fitted(runs, machine, lines, names, passes=2)
     for _ in range(_SEARCHES):
         orders = find_orders((run() for run in runs), machine, lines, names)
         if set(orders) == set(machine.ripple.cycles_per_m):
             break
         machine = replace(machine, ripple=Ripple.of(orders))
-        machine = _with_noise(machine, _all_seen(runs, machine, lines, names))
+        machine = _with_noise(machine, Evidence.join(_all_seen(runs, machine, lines, names)))
         machine = _fitted(runs, machine, lines, names, passes=2)
     machine = _fitted(runs, machine, lines, names)
-    return _judged(_all_seen(runs, machine, lines, names), machine)
+    parts = _all_seen(runs, machine, lines, names)
+    machine = _with_uncertainty(parts, machine, lines.rate_hz)
+    if (between := between_runs(parts, _SMALLEST)) is not None:
+        machine, parts = _fitted_apart(runs, replace(machine, between=between), lines, names)
+    return _judged(Evidence.join(parts), machine)
 
 
 def _fitted(
-    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, str, str], passes: int = _PASSES
+    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...], passes: int = _PASSES
 ) -> Machine:
     """The model, noise and ripple that all runs share (Gauss–Newton on the output's error)."""
     for _ in range(passes):
-        seen = _all_seen(runs, machine, lines, names)
-        machine = _with_noise(machine, seen)
-        step = _step(seen, machine.model, lines.rate_hz)
-        model, late_s = _moved(machine.model, step[:-1]), float(step[-1]) / lines.rate_hz
-        machine = replace(machine, model=model, delay_s=machine.delay_s + late_s)
+        parts = _all_seen(runs, machine, lines, names)
+        machine = _with_noise(machine, Evidence.join(parts))
+        step = step_of(normal(parts, machine, lines.rate_hz), machine)
+        machine = moved(machine, step, lines.rate_hz)
         if np.max(np.abs(step)) < _CONVERGED:
             break
     return machine
+
+
+def _fitted_apart(
+    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...]
+) -> tuple[Machine, list[Evidence]]:
+    """The Machine whose runs have an offset each, and what it leaves of them.
+
+    Without that, what differs from run to run would be taken for what differs from place to place, because no two runs
+    go to all places equally often.
+    """
+    assert machine.between is not None
+    own = np.zeros(len(runs))
+    for _ in range(_PASSES):
+        parts = _all_seen(runs, machine, lines, names, own)
+        step, own = joint_step(parts, machine, own, lines.rate_hz)
+        machine = moved(machine, step, lines.rate_hz)
+        if np.max(np.abs(step)) < _CONVERGED:
+            break
+    return machine, _all_seen(runs, machine, lines, names, own)
 
 
 def _with_noise(machine: Machine, seen: Evidence) -> Machine:
@@ -112,7 +146,7 @@ def _with_noise(machine: Machine, seen: Evidence) -> Machine:
     return replace(machine, ripple=ripple.only(matters), noise_power=noise)
 
 
-def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> tuple[Rows, Floats]:
+def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[Rows, Floats]:
     """Responses of single steady windows that are fast enough, and their speeds."""
     u, y, centre, speed = (np.concatenate(part) for part in zip(*_spectra(runs, lines, names)))
     fastest = np.max(np.abs(speed), initial=0.0)
@@ -127,10 +161,10 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) 
     return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use]
 
 
-def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> Iterator[tuple[NDArray[Any], ...]]:
+def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> Iterator[tuple[NDArray[Any], ...]]:
     transform, window = wave(lines.bins, lines.window), lines.window
     for run in runs:
-        stretches = Stretches(names, window, lines.rate_hz)
+        stretches = Stretches(names[:3], window, lines.rate_hz)
         for stretch in (s for block in run() for s in stretches.process(block)):
             bad = missing(stretch.data)
             u, y, x = held(stretch.data, bad)
@@ -141,13 +175,19 @@ def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, str, str]) -> 
             yield u[cut[use]] @ transform, y[cut[use]] @ transform, centre[use], speed[use]
 
 
-def _all_seen(runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, str, str]) -> Evidence:
-    return Evidence.join([_seen(run, machine, lines, names) for run in runs])
+def _all_seen(
+    runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...], own: Floats | None = None
+) -> list[Evidence]:
+    """Of each run, which differs from the model by so much of what differs between runs."""
+    if machine.between is None or own is None:
+        return [_seen(run, machine, lines, names, Offset()) for run in runs]
+    offsets = [Offset(machine.between.direction * amount) for amount in own]
+    return [_seen(run, machine, lines, names, offset) for run, offset in zip(runs, offsets)]
 
 
-def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, str, str]) -> Evidence:
+def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offset: Offset) -> Evidence:
     """What the model leaves of a run, judged windows alone."""
-    source, stretches, offset = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz), Offset()
+    source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)
     parts = [source.process(stretch, offset) for block in run() for stretch in stretches.process(block)]
     parts += [source.process(stretch, offset) for stretch in stretches.finish()]
     if not parts:
@@ -156,61 +196,39 @@ def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, str, str])
     return seen.rows(seen.judged)
 
 
-def _design(model: MovingModel, position_m: Floats) -> Floats:
-    """From the model's unknowns to the logarithms of stiffness, load, damping, inertia, (rows, 4, unknowns)."""
-    k, b = len(model.log_stiffness.weights), len(model.log_damping.weights)
-    design = np.zeros((position_m.size, len(DIRECTIONS), 2 + k + b))
-    design[:, 1, 0] = design[:, 3, 1] = 1.0
-    design[:, 0, 2 : 2 + k] = basis(position_m, model.low_m, model.high_m, k)
-    design[:, 2, 2 + k :] = basis(position_m, model.low_m, model.high_m, b)
-    return design
-
-
-def _step(seen: Evidence, model: MovingModel, rate_hz: float) -> Floats:
-    """Of the model's unknowns, and of the delay in samples."""
-    design = _design(model, seen.position_m)
-    gradient = np.append(np.einsum("rju,rj->u", design, seen.score), seen.late_score.sum() / rate_hz)
-    matrix = np.zeros((gradient.size, gradient.size))
-    matrix[:-1, :-1] = np.einsum("rju,rjk,rkv->uv", design, seen.information, design, optimize=True)
-    matrix[-1, :-1] = np.einsum("rju,rj->u", design, seen.late_information[:, :-1]) / rate_hz
-    matrix[:-1, -1] = matrix[-1, :-1]
-    matrix[-1, -1] = seen.late_information[:, -1].sum() / rate_hz**2
-    k = len(model.log_stiffness.weights)
-    unknowns = np.concatenate([np.zeros(2), model.log_stiffness.weights, model.log_damping.weights, np.zeros(1)])
-    pull = np.zeros_like(matrix)
-    for part in (slice(2, 2 + k), slice(2 + k, -1)):
-        differences = np.diff(np.eye(unknowns[part].size), n=3, axis=0)
-        pull[part, part] = _SMOOTH * np.trace(matrix[part, part]) / unknowns[part].size * differences.T @ differences
-    step = np.linalg.solve(matrix + pull, gradient - pull @ unknowns)
-    step[:-1] = step[:-1].clip(-0.2, 0.2)
-    step[-1] = step[-1].clip(-1.0, 1.0)
-    return np.asarray(step)
-
-
-def _moved(model: MovingModel, step: Floats) -> MovingModel:
-    k = len(model.log_stiffness.weights)
-    low, high = model.low_m, model.high_m
-    return replace(
-        model,
-        load_kg=float(model.load_kg * np.exp(step[0])),
-        inertia_kg_m2=float(model.inertia_kg_m2 * np.exp(step[1])),
-        log_stiffness=Curve(low, high, model.log_stiffness.weights + step[2 : 2 + k]),
-        log_damping=Curve(low, high, model.log_damping.weights + step[2 + k :]),
-    )
+def _with_uncertainty(parts: Sequence[Evidence], machine: Machine, rate_hz: float) -> Machine:
+    """With the covariance of the covariates' slopes, from the fit with one run left out each."""
+    covariates, c = machine.covariates, len(machine.covariates)
+    if not c:
+        return machine
+    seen = Evidence.join(parts)
+    gradient, matrix = normal_of(seen, machine, rate_hz)
+    slopes = []
+    for part in parts_of([len(run) for run in parts]):
+        without = normal_of(seen.rows(part), machine, rate_hz)
+        step = step_of((gradient - without[0], matrix - without[1]), machine)
+        slopes.append(step[-1 - len(DIRECTIONS) * c : -1])
+    scale = np.tile(1 / covariates.half_range, len(DIRECTIONS))
+    own = (jackknife(np.array(slopes)) * np.outer(scale, scale)).reshape(len(DIRECTIONS), c, len(DIRECTIONS), c)
+    return replace(machine, covariates=replace(covariates, covariance=np.einsum("jcjd->jcd", own)))
 
 
 def _judged(seen: Evidence, machine: Machine) -> Machine:
     """The Machine with its noise, and with what neighbouring windows and whole stretches have in common."""
-    held = seen.score, np.einsum("rjj->rj", seen.information)
+    held = accuracy(seen.score, np.einsum("rjj->rj", seen.information), _SMALLEST)
+    if (between := machine.between) is not None:
+        score, information = between.projected(seen.score, seen.information, _SMALLEST)
+        held = held.at_least(accuracy(score, np.einsum("rjj->rj", information), _SMALLEST))
+        held = held.widened(KNOWN * np.abs(between.direction))
     # With all others free: the score that is left of a direction, and its information.
     inverse = np.linalg.inv(seen.information)
     information = 1 / np.einsum("rjj->rj", inverse)
-    free = information * np.einsum("rjk,rk->rj", inverse, seen.score), information
-    low, high = machine.model.low_m, machine.model.high_m
+    score = information * np.einsum("rjk,rk->rj", inverse, seen.score)
+    unsure = machine.covariates.uncertainty() if len(machine.covariates) else 0.0
     return replace(
         machine,
         quiet_power=seen.quiet_power.mean(axis=0),
-        held=accuracy(*held, _SMALLEST),
-        free=accuracy(*free, _FURTHER * _SMALLEST),
-        windows=cells(seen.position_m, low, high),
+        held=held.widened(unsure),
+        free=accuracy(score, information, _FURTHER * _SMALLEST).widened(unsure),
+        windows=cells(seen.position_m, machine.model.low_m, machine.model.high_m),
     )

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.between_runs import BetweenRuns
+from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MovingModel
 
@@ -38,6 +40,10 @@ class Machine:
         Torque that repeats with the motor's angle, as it was found.
     delay_s
         Of the measured velocity behind the torque, beyond what two masses behind a zero-order hold have.
+    covariates
+        What the parameters depend on, such as a temperature; the model is that of their mean.
+    between
+        The direction in which the learned runs differ, which no covariate explains; None where they do not.
     """
 
     model: MovingModel
@@ -50,6 +56,8 @@ class Machine:
     windows: NDArray[np.int64]
     ripple: Ripple = field(default_factory=Ripple)
     delay_s: float = 0.0
+    covariates: Covariates = field(default_factory=Covariates)
+    between: BetweenRuns | None = None
 
     @property
     def way_m(self) -> float:

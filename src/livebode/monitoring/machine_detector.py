@@ -14,6 +14,7 @@ from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.naming import Change, Segment, begin_of, candidates, far, lead
 from livebode.monitoring.offset import Offset
+from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, corrected, far_away, unknown
 from livebode.monitoring.standing import Standing
@@ -61,6 +62,7 @@ class MachineDetector:
         self._further = Charts(free.smallest, free.allowed, threshold)
         self._cells = Charts(np.repeat(held.smallest[:1], size), np.repeat(held.allowed[:1], size), threshold)
         self.standing = Standing(machine, threshold)
+        self._own = RunOffset(machine.between, held, threshold)
         self._recent = Recent(_LOOK_WINDOWS)
         self._pending, self._taken = -1, 0
         self._unknown: set[str] = set()
@@ -68,8 +70,14 @@ class MachineDetector:
         self.judged = 0
         """Windows judged so far."""
 
+    @property
+    def offset(self) -> Offset:
+        """What the model is to be driven with: the changes that stand, and what this run has of its own."""
+        standing = self.standing.offset
+        return Offset(standing.logarithms + self._own.replayed, standing.places)
+
     def process(self, seen: Evidence) -> list[Event]:
-        """Events of these windows, whose evidence was made with `standing.offset` as it is now."""
+        """Events of these windows, whose evidence was made with `offset` as it is now."""
         events: list[Event] = []
         for i in range(len(seen)):
             status = str(seen.status[i])
@@ -77,9 +85,9 @@ class MachineDetector:
                 events += self._window(seen, i)
             elif status not in _STAYS and status not in self._unknown:
                 self._unknown.add(status)
-                where, speed = float(seen.position_m[i]), float(seen.speed_m_per_s[i])
-                events.append(unknown(status, self._machine, where, speed, int(seen.sample[i]), float(seen.time_s[i])))
+                events.append(unknown(self._machine, seen, i))
         self.standing.settle()
+        self._own.settle(self._oldest(), idle=self._pending < 0 and not self.standing.alarms)
         return events + self._said(int(seen.sample[-1]), float(seen.time_s[-1]))
 
     def finish(self) -> list[Event]:
@@ -96,13 +104,16 @@ class MachineDetector:
             return [far_away(self.standing.alarms[-1], sample, time_s)]
         new = self.standing.announced(known)
         wrong = self.standing.corrected() if new and known else []
-        return [changed(a, sample, time_s) for a in new] + [corrected(a, told, sample, time_s) for a, told in wrong]
+        events = [changed(a, sample, time_s, within_run=self._own.within_run(a.change.direction)) for a in new]
+        return events + [corrected(a, told, sample, time_s) for a, told in wrong]
 
     def _window(self, seen: Evidence, i: int) -> list[Event]:
-        position_m, score, information = float(seen.position_m[i]), seen.score[i], seen.information[i]
-        sample, time_s = int(seen.sample[i]), float(seen.time_s[i])
+        position_m, sample, time_s = float(seen.position_m[i]), int(seen.sample[i]), float(seen.time_s[i])
         self.judged += 1
-        offset = self.standing.offset.logarithms
+        known = seen.information[i]
+        around = seen.score[i] + known @ self.offset.logarithms
+        score = around - known @ self._reference.logarithms
+        score, information = (part[0] for part in self._own.judged(score[np.newaxis], known[np.newaxis]))
         gone = self.standing.step(score, information, position_m)
         if gone:
             self._reset()
@@ -110,7 +121,9 @@ class MachineDetector:
         if self.standing.hides(position_m):
             return events
         mark, self._taken = self._taken, self._taken + 1
-        self._recent.add(score + information @ offset, information, (position_m, float(sample), time_s))
+        self._recent.add(around, known, (position_m, float(sample), time_s))
+        if not self.standing.alarms:
+            self._own.step(around, known, mark, time_s)
         if self.standing.directions:
             rest = Segment(score[np.newaxis], information[np.newaxis], np.array([position_m]))
             rest = rest.without(self.standing.directions)
@@ -125,10 +138,18 @@ class MachineDetector:
         self._look()
         return events
 
+    @property
+    def _reference(self) -> Offset:
+        """What evidence is judged from."""
+        return Offset(self.standing.offset.logarithms + self._own.reference)
+
     def _look(self) -> None:
         """Name the change that the charts have found, if they have."""
         if self._pending < 0:
             found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.raised.any()]
+            if self._own.chart.raised.any():
+                self._own.fix()
+                found.append(self._own.chart.since[self._own.chart.raised])
             if not found:
                 return
             self._pending = int(np.concatenate(found).min())
@@ -139,8 +160,8 @@ class MachineDetector:
     def _name(self, final: bool) -> None:
         first = max(self._pending - self._taken, -len(self._recent.moment))
         moments, standing = self._recent.moment[first:], self.standing.directions
-        beyond = self._recent.segment(first, self.standing.offset)
-        segment = beyond.without(standing)
+        beyond = self._recent.segment(first, self._reference)
+        segment = self._own.segment(beyond).without(standing)
         known = self._machine.free if standing else self._machine.held
         found = candidates(segment, known, self._machine.way_m, local=not standing)
         best = found[0]
@@ -161,7 +182,7 @@ class MachineDetector:
         """From now on these changes stand, since the likeliest of them began."""
         began = begin_of(segment, max(changes, key=lambda change: change.evidence))
         way = segment.position_m[began:]
-        seen = self._recent.segment(began - len(moments), Offset())
+        seen = self._own.segment(self._recent.segment(began - len(moments), Offset(self._own.reference)))
         since = int(moments[began][1]), moments[began][2]
         for change in changes:
             self.standing.add(change, rival, since, (float(way.min()), float(way.max())), seen)
@@ -179,7 +200,13 @@ class MachineDetector:
         self._first.reset()
         self._further.reset()
         self._cells.reset()
+        self._own.chart.reset()
         self._pending = -1
+
+    def _oldest(self) -> int:
+        """Mark of the first window since which a chart is not at zero: from there on a change may be in them."""
+        since = np.concatenate([chart.since[chart.sums > 0] for chart in (self._first, self._cells)])
+        return int(since.min(initial=self._taken))
 
     def state(self) -> dict[str, NDArray[Any]]:
         parts = {f"{name}.{key}": array for name, part in self._parts().items() for key, array in part.state().items()}
@@ -195,4 +222,4 @@ class MachineDetector:
 
     def _parts(self) -> dict[str, Any]:
         charts = {"first": self._first, "further": self._further, "cells": self._cells}
-        return charts | {"recent": self._recent, "standing": self.standing}
+        return charts | {"recent": self._recent, "standing": self.standing, "own": self._own}

@@ -29,9 +29,10 @@ class MachineMonitor:
     """
 
     def __init__(self, machine: Machine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
-        self._stretches = Stretches(names, lines.window, lines.rate_hz)
+        self._stretches = Stretches((*names, *machine.covariates.names), lines.window, lines.rate_hz)
         self._evidence = ModelEvidence(machine, lines)
-        self.detector = MachineDetector(machine, threshold(mean_s, lines.window / lines.rate_hz, CHARTS))
+        charts = CHARTS + (2 if machine.between is not None else 0)
+        self.detector = MachineDetector(machine, threshold(mean_s, lines.window / lines.rate_hz, charts))
 
     def process(self, block: Block, look: Look | None = None) -> list[Event]:
         """Events of the windows that this Block completes; InputError where a channel is missing.
@@ -66,7 +67,7 @@ class MachineMonitor:
     def _judged(self, stretches: list[Stretch], look: Look | None) -> list[Event]:
         events: list[Event] = []
         for stretch in stretches:
-            seen = self._evidence.process(stretch, self.detector.standing.offset)
+            seen = self._evidence.process(stretch, self.detector.offset)
             if look is not None:
                 look(seen)
             events += self.detector.process(seen)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring import evidence as word
+from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.offset import Offset
@@ -18,6 +21,7 @@ from livebode.nouns import Lines
 
 Floats = NDArray[np.float64]
 
+_SIGNALS = 3  # torque, velocity, position; the covariates are behind them
 _UNEVEN = 0.1  # of a window's travel, against the window before it
 _SPEED_MARGIN = 0.1
 _OWN = len(DIRECTIONS)
@@ -39,7 +43,8 @@ class ModelEvidence:
     baseline's, or higher by as much as the quiet bins have become louder.
 
     With an Offset, E is what is left once the model is changed by it. A ripple of the Machine is allowed for,
-    whatever its phase (see `ripple.allowed_for`).
+    whatever its phase (see `ripple.allowed_for`). What its covariates explain is no change: the model moves with their
+    mean over the stretch, and the windows' own values count to first order.
     """
 
     def __init__(self, machine: Machine, lines: Lines) -> None:
@@ -51,17 +56,19 @@ class ModelEvidence:
     def process(self, stretch: Stretch, offset: Offset) -> Evidence:
         """Evidence of every window of the stretch, in order."""
         lines, machine = self._lines, self._machine
-        bad = missing(stretch.data)
-        u, y, x = held(stretch.data, bad)
+        bad = missing(stretch.data[:_SIGNALS])
+        u, y, x = held(stretch.data[:_SIGNALS], bad)
+        begin = np.arange(stretch.first, stretch.last) * lines.window - stretch.start
+        covariate = window_means(stretch.data[_SIGNALS:], begin, lines.window)
+        offset, rest_of_shift = self._shifted(offset, covariate)
         velocity, slopes = self._replay(u, x, offset)
         rest = y - without_drift(velocity, y, lines.window)
-        begin = np.arange(stretch.first, stretch.last) * lines.window - stretch.start
         cut = begin[:, np.newaxis] + np.arange(lines.window)
         unexplained = rest[cut] @ wave((*lines.bins, *lines.quiet), lines.window)
         slope = slopes[:, cut] @ wave(lines.bins, lines.window)
         power = unexplained.real**2 + unexplained.imag**2
         quiet = power[:, len(lines) :]
-        centre, speed, status = self._way(x, begin, stretch, bad)
+        centre, speed, status = self._way(x, begin, stretch, bad, covariate)
         level = self._levels(quiet, status)
         weight = 2 / (machine.noise_power * level[:, np.newaxis])
         e = unexplained[:, : len(lines)]
@@ -74,6 +81,7 @@ class ModelEvidence:
             np.einsum("jwl,wl,wl->wj", slope.conj(), e, weight).real,
             known, ripple_score, cross, gram, machine.ripple.spread,
         )  # fmt: skip
+        score = score - np.einsum("wjk,wk->wj", information[:, :, :_OWN], rest_of_shift)
         return Evidence(
             score=score[:, :_OWN],
             information=information[:, :_OWN, :_OWN],
@@ -89,17 +97,31 @@ class ModelEvidence:
             ripple_score=ripple_score,
             ripple_information=gram,
             ripple_gain=(np.abs(ripple[0::2]) ** 2 + np.abs(ripple[1::2]) ** 2).swapaxes(0, 1),
+            covariate=covariate,
         )
+
+    def _shifted(self, offset: Offset, covariate: Floats) -> tuple[Offset, Floats]:
+        """The offset with what the covariates explain on average, and the rest of that of each window, (windows, 4)."""
+        covariates = self._machine.covariates
+        if not len(covariates):
+            return offset, np.zeros((len(covariate), _OWN))
+        known = covariates.known(covariate)[:, np.newaxis]
+        shift = np.where(known, covariates.shift(np.where(known, covariate, covariates.mean)), 0.0)
+        common = shift.sum(axis=0) / max(np.count_nonzero(known), 1)
+        return replace(offset, logarithms=offset.logarithms + common), np.where(known, shift - common, 0.0)
 
     def way(self, stretch: Stretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
         """Position, speed and status of every window, but for disturbances that the noise shows."""
-        bad = missing(stretch.data)
+        bad = missing(stretch.data[:_SIGNALS])
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
-        return self._way(held(stretch.data, bad)[2], begin, stretch, bad)
+        covariate = window_means(stretch.data[_SIGNALS:], begin, self._lines.window)
+        return self._way(held(stretch.data[:_SIGNALS], bad)[2], begin, stretch, bad, covariate)
 
     def residual(self, stretch: Stretch, offset: Offset) -> tuple[Floats, Floats]:
         """The measured velocity less the model's, without slow drift, and the shaft's position, (samples,) each."""
-        u, y, x = held(stretch.data, missing(stretch.data))
+        u, y, x = held(stretch.data[:_SIGNALS], missing(stretch.data[:_SIGNALS]))
+        begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
+        offset, _ = self._shifted(offset, window_means(stretch.data[_SIGNALS:], begin, self._lines.window))
         rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
         return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
 
@@ -113,7 +135,7 @@ class ModelEvidence:
         return np.array([without_drift(row, still, self._lines.window) for row in velocity])
 
     def _way(
-        self, x: Floats, begin: NDArray[np.int64], stretch: Stretch, bad: NDArray[np.bool_]
+        self, x: Floats, begin: NDArray[np.int64], stretch: Stretch, bad: NDArray[np.bool_], covariate: Floats
     ) -> tuple[Floats, Floats, NDArray[np.str_]]:
         """Position and speed at the windows' centres, and which windows are judged."""
         window, machine = self._lines.window, self._machine
@@ -128,6 +150,8 @@ class ModelEvidence:
             word.UNEVEN: ~even,
             word.FAST: np.abs(speed) > (1 + _SPEED_MARGIN) * machine.fastest_m_per_s,
             word.PLACE: ~machine.known(centre),
+            word.NO_COVARIATE: ~np.isfinite(covariate).all(axis=1),
+            word.COVARIATE: ~machine.covariates.known(covariate),
         }
         return centre, speed, np.select(list(reasons.values()), list(reasons), word.JUDGED)
 

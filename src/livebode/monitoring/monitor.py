@@ -105,6 +105,7 @@ class Monitor:
         summary = {
             "false_alarms": self.false_alarms,
             "judged_by": "model" if self._machine else "tables",
+            "covariates": list(self._baseline.covariates),
             "judged_s": judged * self._step_s,
             "changes": self._counts["change"] + any(isinstance(s, dict) and s["what"] == "machine" for s in standing),
             "cleared": self._counts["change-cleared"],

@@ -18,7 +18,7 @@ from livebode.nouns import Block, Lines
 Floats = NDArray[np.float64]
 
 
-def find_orders(runs: Iterable[Iterable[Block]], machine: Machine, lines: Lines, names: tuple[str, str, str]) -> Floats:
+def find_orders(runs: Iterable[Iterable[Block]], machine: Machine, lines: Lines, names: tuple[str, ...]) -> Floats:
     """Orders in cycles a metre, the strongest first."""
     if machine.way_m == 0:
         return np.zeros(0)
@@ -30,7 +30,7 @@ def find_orders(runs: Iterable[Iterable[Block]], machine: Machine, lines: Lines,
 
 
 def _strokes(
-    run: Iterable[Block], machine: Machine, lines: Lines, names: tuple[str, str, str]
+    run: Iterable[Block], machine: Machine, lines: Lines, names: tuple[str, ...]
 ) -> Iterator[tuple[Floats, Floats]]:
     """Residual and position of windows in a row that are judged."""
     source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)

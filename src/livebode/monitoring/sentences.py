@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from math import exp, expm1
+from math import exp, expm1, isfinite
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from livebode.monitoring import evidence as word
 from livebode.monitoring.offset import FAR
@@ -13,8 +16,12 @@ from livebode.nouns.clock import moment
 
 if TYPE_CHECKING:
     from livebode.monitoring.alarms import Alarm
+    from livebode.monitoring.covariates import Covariates
+    from livebode.monitoring.evidence import Evidence
     from livebode.monitoring.machine import Machine
     from livebode.monitoring.naming import Change
+
+Floats = NDArray[np.float64]
 
 WHAT = {
     "stiffness": "the belt's stiffness",
@@ -24,9 +31,10 @@ WHAT = {
 }
 
 
-def changed(alarm: Alarm, sample: int, time_s: float) -> Event:
-    """Something changed, as is known at this sample and time."""
-    message = f"Since {moment(alarm.since_s)} {_amount(alarm.change, alarm.now, alarm.bound)} than in the baseline"
+def changed(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
+    """Something changed, as is known at this sample and time; `within_run`: from what this run was before."""
+    than = "before in this run" if within_run else "in the baseline"
+    message = f"Since {moment(alarm.since_s)} {_amount(alarm.change, alarm.now, alarm.bound)} than {than}"
     if (rival := alarm.rival) is not None:
         message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
     if alarm.change.place is None and abs(alarm.now) > FAR:
@@ -76,22 +84,37 @@ def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
     return Event("change-cleared", sample, time_s, message, about(alarm))
 
 
-def unknown(
-    status: str, machine: Machine, position_m: float, speed_m_per_s: float, sample: int, time_s: float
-) -> Event:
-    """The machine does what was not learned."""
+def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
+    """The machine does what was not learned in this window."""
+    status, position_m, speed_m_per_s = str(seen.status[row]), seen.position_m[row], seen.speed_m_per_s[row]
+    details = {"reason": status, "position_m": float(position_m), "speed_m_per_s": float(speed_m_per_s)}
     if status == word.FAST:
         message = (
             f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis goes at "
             f"{abs(speed_m_per_s):.3g}; such motion is not judged. Learn from a run that holds it."
         )
+    elif status in (word.COVARIATE, word.NO_COVARIATE):
+        message = _not_covered(machine.covariates, seen.covariate[row])
+        details |= dict(zip(machine.covariates.names, seen.covariate[row].tolist()))
     else:
         message = (
             f"The baseline does not know the axis at position {position_m:.3g}; it is not judged there. "
             "Learn from a run that goes there."
         )
-    details = {"reason": status, "position_m": position_m, "speed_m_per_s": speed_m_per_s}
-    return Event("baseline-unknown", sample, time_s, message, details)
+    return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
+
+
+def _not_covered(covariates: Covariates, value: Floats) -> str:
+    """The first covariate without a value, or outside of what was learned."""
+    for i, name in enumerate(covariates.names):
+        if not isfinite(value[i]):
+            return f"The covariate {name!r} has no value; the machine is not judged without it. Check that channel."
+    beside = np.maximum(covariates.low - value, value - covariates.high) / covariates.half_range
+    i = int(np.argmax(beside))
+    return (
+        f"The baseline knows {covariates.names[i]!r} from {covariates.low[i]:.4g} to {covariates.high[i]:.4g}, and it "
+        f"is {value[i]:.4g}; the machine is not judged there. Learn from a run that holds it."
+    )
 
 
 def about(alarm: Alarm) -> dict[str, Any]:

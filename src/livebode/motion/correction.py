@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_excitation
 from livebode.motion.residual import Scatter, residual
+from livebode.motion.ripple_watch import RippleWatch
 from livebode.motion.standstill import Standstill, without
 from livebode.motion.waiting import Waiting
 from livebode.nouns import Block, Channel, Event, InputError, Responses
@@ -125,13 +126,15 @@ class MotionCorrection:
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
         self._standstill = Standstill(settings)
+        self._ripple = RippleWatch(settings)
         self._from = 0
-        self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill] = {
+        self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill | RippleWatch] = {
             "recorded": self._recorded,
             "waiting": self._waiting,
             "learner": self._learner,
             "scatter": self._scatter,
             "standstill": self._standstill,
+            "ripple": self._ripple,
         }
 
     @property
@@ -148,8 +151,9 @@ class MotionCorrection:
         """As `Tracker.found`, and the model of the newest chunk: its masses, and its belt at eleven positions."""
         driven_by = "torque" if self._drive is None else "excitation"
         model = None if self.model is None else self.model.plain()
+        ripple = [asdict(order) for order in self._ripple.orders]
         return self._tracker.found() | {
-            "motion": {"driven_by": driven_by, "chunks": self._learner.chunks, "model": model}
+            "motion": {"driven_by": driven_by, "chunks": self._learner.chunks, "model": model, "ripple": ripple}
         }
 
     def excitation_power(self) -> Floats:
@@ -251,10 +255,14 @@ class MotionCorrection:
         value = self._value(now, tracked, chunk)
         valid = tracked.valid & seen.valid & np.isfinite(value)
         scale = np.abs(value / np.where(valid, tracked.value, 1.0)) if self._quotient else 1.0
+        self._ripple.take(left, chunk, now.model)
+        torque = chunk.torque(self.settings.lines, tracked.sample)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / torque
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, seen.sigma * scale, np.nan),
+            sigma=np.where(valid, np.hypot(seen.sigma * scale, ripple), np.nan),
             dof=seen.dof,
             valid=valid,
         )
@@ -284,7 +292,7 @@ class MotionCorrection:
         names = [name for name in rows if name]
         channels = tuple(map(Channel, names))
         block = Block(np.array([rows[n] for n in names]), channels, s.lines.rate_hz, start=chunk.start)
-        seen = Tracker(replace(s, schedule=None, spikes=()), repeating=False).process(block)
+        seen = Tracker(replace(s, schedule=None, spikes=(), ripple=()), repeating=False).process(block)
         return _rows_of(seen, tracked).value
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -77,11 +79,14 @@ class OrderSpectrum:
         self._points = 1 << max(int(np.ceil(np.log2(_PADDED * way_m / wanted_m))), 1)
         self._step_m = _PADDED * way_m / self._points
         self.cycles_per_m = np.arange(self._points // 2 + 1) / (_PADDED * way_m)
-        self._sum, self._whole = np.zeros((2, self.cycles_per_m.size))
+        self._sum, self._whole, self._torque = np.zeros((3, self.cycles_per_m.size))
         self._count = np.zeros(self.cycles_per_m.size, dtype=np.int64)
 
-    def add(self, residual: Floats, position_m: Floats) -> None:
-        """A steady stroke: what the model leaves, and where, shape (samples,) each."""
+    def add(self, residual: Floats, position_m: Floats, gain: Callable[[Floats], Floats] | None = None) -> None:
+        """A steady stroke: what the model leaves, and where, shape (samples,) each.
+
+        `gain` gives |G| at frequencies in Hz; with it the torque of each order is known too (`amplitudes`).
+        """
         even = _over_position(residual, position_m, self._step_m)
         width = self._points / max(even.size, 1)
         if even.size < _FLOOR or width > self.cycles_per_m.size / _FLOOR:
@@ -101,6 +106,24 @@ class OrderSpectrum:
         self._sum[use] += np.minimum(ratio, _CAP)
         self._whole[use] += ratio
         self._count += use
+        if gain is not None:
+            # Of a tone of amplitude a, windowed by w and averaged over steps, the power is (a·Σw/2·sinc)².
+            whole = blackmanharris(even.size).sum() / 2 * np.sinc(self.cycles_per_m[use] * self._step_m)
+            self._torque[use] += np.maximum(power[use] - noise[use], 0.0) / (whole * gain(frequency_hz[use])) ** 2
+
+    def amplitudes(self, orders: Floats) -> Floats:
+        """Root mean square over the strokes of each order's amplitude, N m, (orders,)."""
+        at = np.searchsorted(self.cycles_per_m, orders)
+        return np.asarray(np.sqrt(self._torque[at] / np.maximum(self._count[at], 1)))
+
+    _STATE = ("_sum", "_whole", "_torque", "_count")
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {name: getattr(self, name).copy() for name in self._STATE}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        for name in self._STATE:
+            getattr(self, name)[:] = state[name]
 
     def found(self) -> Floats:
         """Orders in cycles a metre, the strongest first, at most eight."""

@@ -40,7 +40,7 @@ class Scatter:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = replace(settings, schedule=None, spikes=())
+        self._settings = replace(settings, schedule=None, spikes=(), ripple=())
         self._memory = b""
 
     def once(self, velocity: Floats, chunk: Chunk) -> Responses:

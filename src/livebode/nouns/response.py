@@ -69,7 +69,8 @@ class Response:
         or |U|² for the direct estimator; NaN where not known.
     distortion
         What repeats with the excitation without being a linear response (friction, backlash, steps of an encoder) may
-        have done to the value, unit of `value`. It is contained in `sigma`; NaN where it cannot be measured.
+        have done to the value, unit of `value`. It is contained in `sigma`; NaN where it cannot be measured,
+        infinite at a line that is not valid because of what repeats (distortion, hum of the mains, steps of a sensor).
     """
 
     lines: Lines

@@ -37,7 +37,7 @@ def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Itera
             else:
                 pieces = list(in_line(line))
             for value in pieces:
-                event = _event(value)
+                event = to_event(value)
                 if event is None and not whole and not finished and len(line) < _LINE_BYTES_MAX:
                     return
                 if event is None:
@@ -48,8 +48,9 @@ def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Itera
                 yield event
 
 
-def _event(value: dict[str, Any] | bytes) -> Event | None:
-    if isinstance(value, bytes):
+def to_event(value: Any) -> Event | None:
+    """The event in this plain data; None where a run does not write such a one."""
+    if not isinstance(value, dict):
         return None
     try:
         event = Event(**value | {"time_s": math.nan if value["time_s"] is None else value["time_s"]})  # JSON has no NaN

@@ -43,8 +43,9 @@ def open_read(run: Path, name: str) -> BinaryIO:
 def read_bytes(run: Path, name: str, size_bytes_max: int | None = None) -> bytes:
     """All that a file of a run holds; InputError where it is longer than this."""
     with open_read(run, name) as file:
-        data = file.read(-1 if size_bytes_max is None else size_bytes_max + 1)
-    if size_bytes_max is not None and len(data) > size_bytes_max:
+        small = size_bytes_max is None or os.fstat(file.fileno()).st_size <= size_bytes_max
+        data = file.read(-1 if size_bytes_max is None else size_bytes_max + 1) if small else b""
+    if not small or (size_bytes_max is not None and len(data) > size_bytes_max):
         raise InputError(f"{str(run / name)!r} is longer than {size_bytes_max} bytes; a run does not write that")
     return data
 

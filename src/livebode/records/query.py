@@ -10,20 +10,25 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
-from livebode.nouns import InputError
+from livebode.nouns import Event, InputError
+from livebode.nouns.clock import RunClock, moment, moments_by
+from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, Run
 
 _TABLES = ("responses", "parameters", "samples")
-_EVENTS = pa.schema(
+_SINGLE_EVENTS = pa.schema(
     [
         ("kind", pa.string()),
         ("sample", pa.int64()),
         ("time_s", pa.float64()),
+        ("moment", pa.string()),
         ("message", pa.string()),
         ("details", pa.string()),
     ]
 )
+_COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
+_EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
 # Reads nothing but what it is given and writes nothing: a query that came by mail can be run.
 _CONFINED = (
     "SET memory_limit = '2GB'",
@@ -44,7 +49,7 @@ class Found:
 
 
 def query(run: Run, sql: str, rows_max: int) -> Found:
-    """The first rows that a query of the tables responses, parameters, samples and events gives.
+    """The first rows that a query of the tables responses, parameters, samples, events and single_events gives.
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
 
 
 def _known(run: Run) -> str:
-    return ", ".join(["events", *run.files(_TABLES)])
+    return ", ".join(["events", "single_events", *run.files(_TABLES)])
 
 
 def _show(run: Run, database: Any, asked: set[str]) -> None:
@@ -117,8 +122,17 @@ def _show(run: Run, database: Any, asked: set[str]) -> None:
         columns = "*" if table == "samples" else _nan_as_null(parts[0].schema)
         united = " UNION ALL ".join(f"SELECT {columns} FROM _{table}_{number}" for number in range(len(parts)))
         database.execute(f"CREATE VIEW {table} AS {united}")
-    events = [asdict(event) | {"details": to_json(event.details)} for event in run.each_event_and_damage()]
-    database.register("events", pa.Table.from_pylist(events, schema=_EVENTS))
+    lines = list(run.each_event_and_damage())
+    clock = RunClock.of(run.summary)
+    rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
+    database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
+    each = [_plain(one, clock) for event in lines for one in each_event(event)]
+    database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+
+
+def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
+    with moments_by(clock):
+        return asdict(event) | {"details": to_json(event.details), "moment": moment(event.time_s)}
 
 
 def _nan_as_null(schema: pa.Schema) -> str:

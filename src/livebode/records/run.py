@@ -15,6 +15,7 @@ import pyarrow as pa
 from livebode.arrow import to_numpy
 from livebode.nouns import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
 from livebode.records import event_lines
+from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
 from livebode.records.response_table import ADDED, SCHEMA
 from livebode.records.segments import reading
@@ -113,6 +114,13 @@ class Run:
         """All that can be read in order, in parts of bounded size; or the newest, from files of no more than this."""
         return self._in_parts(self.tables("responses", size_bytes_max))
 
+    def steady_batches(self) -> Iterator[Responses]:
+        """The same without those from a transient at the start of a live run; those that the run averaged are all."""
+        left_out = int(self.summary.get("left_out_samples") or 0)
+        averages = (self.summary.get("configuration", {}).get("tracking") or {}).get("average")
+        for part in self.batches():
+            yield part if averages or not left_out else part[np.flatnonzero(part.first >= left_out)]
+
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Those that speak for a span of time, ends included, in parts; segments outside of it are not read."""
         for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
@@ -188,11 +196,25 @@ class Run:
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
-        """What is in events.jsonl, with an event of kind "record-damaged" in the place of each damaged line."""
+        """What was recorded, with an event of kind "record-damaged" in the place of each damaged line.
+
+        Of a run that goes on, or was killed, with those at the end that are not in events.jsonl yet.
+        """
         return list(self.each_event())
 
     def each_event(self) -> Iterator[Event]:
         """The same one by one, however many they are."""
+        # Before the lines: what was written in between is then in both, and not in neither.
+        waiting = self.waiting_events()
+        yield from still_waiting(self.event_lines(), waiting)
+
+    def waiting_events(self) -> list[Event]:
+        """Those that will share a line of events.jsonl with others, as of the newest commit."""
+        plain = [] if self.finished or not reading.in_segments(self.path) else reading.waiting_events(self.path)
+        return [event for value in plain if (event := event_lines.to_event(value)) is not None]
+
+    def event_lines(self) -> Iterator[Event]:
+        """What is in events.jsonl."""
         try:
             yield from event_lines.events(self.path, self.tell, finished=self.finished)
         except OSError as error:

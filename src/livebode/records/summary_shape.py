@@ -63,6 +63,8 @@ class _Summary(_Part):
     loop: Section | None = None
     monitoring: Section | None = None
     record: _Record | None = None
+    left_out_samples: Count | None = None
+    clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None
     files: dict[str, list[Section]] = {}
 
 

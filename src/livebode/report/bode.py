@@ -247,7 +247,7 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
     if mean:
         handles, texts = handles[len(texts) // 2 :], ["5–95 % of the responses"] * (len(texts) // 2)
     at_s = summary.newest.time_s
-    newest = f"newest, at {moment(at_s)}" if abs(at_s) >= 1e5 else f"newest, at {at_s:.6g} s"
+    newest = f"newest, at {moment(at_s, 2)}"
     if np.isfinite(summary.newest_bound).any():
         newest += f", bound: {100 * PROBABILITY:.1f} % (3σ)"
     texts.append(f"average, bound: {100 * MEAN_PROBABILITY:g} %" if mean else newest)

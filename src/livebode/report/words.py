@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.nouns import Responses, counted
-from livebode.nouns.clock import moment
+from livebode.nouns.clock import moment, moment_of_start
 from livebode.report.style import shortened
 from livebode.report.ticks import frequency_label
 
@@ -43,6 +43,7 @@ def clock(time_s: np.ndarray) -> tuple[float, str]:
     finite = time_s[np.isfinite(time_s)]
     first, last = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     if abs(first) < _CLOCK_FROM_S or last - first > abs(first) / 10:
-        return 0.0, "time in s"
+        start = moment_of_start()
+        return 0.0, f"time in s after {start}" if start else "time in s"
     origin = float(np.floor(first))
     return origin, f"time in s after {moment(origin, 0)}"

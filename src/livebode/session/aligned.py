@@ -22,19 +22,43 @@ def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
     name, period = settings.excitation, settings.lines.window
     if settings.method.reference != "excitation" or name is None:
         return ()
-    found: list[Slip] = []
-    size, overlap = max(_PART // period, 4 * _OVERLAP) * period, _OVERLAP * period
-    held, first = np.zeros(0), 0
-    for part in _whole_parts(log, name, size):
-        held = np.concatenate([held, part])
-        for slip in find_slips(_bridged(held), period):
-            leap = Slip(first + slip.sample, slip.missing)
-            if not found or leap.sample > found[-1].sample + 2 * period:
-                found.append(leap)
+    search, size = SlipSearch(period), max(_PART // period, 4 * _OVERLAP) * period
+    return tuple(slip for part in _whole_parts(log, name, size) for slip in search.take(bridged(part)))
+
+
+class SlipSearch:
+    """Finds the leaps of a signal that comes in parts, each once.
+
+    Parameters
+    ----------
+    period
+        Of the signal, in samples.
+
+    Attributes
+    ----------
+    begins_at
+        Number of its first sample; 0 where not set before the first part.
+    """
+
+    def __init__(self, period: int) -> None:
+        self.begins_at: int | None = None
+        self._period, self._held = period, np.zeros(0)
+        self._first = 0
+        self._newest = -2 * period
+
+    def take(self, part: np.ndarray) -> list[Slip]:
+        """The leaps that this part shows, all of it finite."""
+        period, found, begins = self._period, list[Slip](), self.begins_at or 0
+        self._held = np.concatenate([self._held, part])
+        for slip in find_slips(self._held, period):
+            at = self._first + slip.sample
+            if at > self._newest + 2 * period:
+                self._newest = at
+                found.append(Slip(begins + at, slip.missing))
         # The next part begins on the grid of this one.
-        kept = held.size - max(held.size - overlap, 0) // period * period
-        first, held = first + held.size - kept, held[held.size - kept :]
-    return tuple(found)
+        done = max(self._held.size - _OVERLAP * period, 0) // period * period
+        self._first, self._held = self._first + done, self._held[done:]
+        return found
 
 
 def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
@@ -51,7 +75,8 @@ def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
         yield np.concatenate(parts)
 
 
-def _bridged(x: np.ndarray) -> np.ndarray:
+def bridged(x: np.ndarray) -> np.ndarray:
+    """The same, 0 where a sample is missing."""
     return np.where(np.isfinite(x), x, 0.0)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +31,9 @@ class Audience:
 
         It comes again behind a `finish` where an edited configuration makes another run go on with the next sample.
         """
+
+    def set_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
+        """Which time of day the run's seconds are, as `RunClock` keeps it; again when it is known better."""
 
     def write(self, responses: Responses) -> None:
         """New responses; of a run that is gone on with first the newest from before."""
@@ -63,6 +66,9 @@ class Relay(Audience):
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
         self._audience.begin(directory, summary, health)
+
+    def set_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
+        self._audience.set_clock(pieces)
 
     def write(self, responses: Responses) -> None:
         self._audience.write(responses)

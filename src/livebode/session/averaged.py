@@ -59,7 +59,7 @@ def averaged(run: Run) -> Averaged:
         If no line is ever valid, or the run cannot be read.
     """
     mean, overview, counted = RunningMean(), Overview(), _Counted(len(run.lines))
-    for part in run.batches():
+    for part in run.steady_batches():
         mean.add(part)
         overview.add(part)
         counted.add(part)

@@ -57,6 +57,7 @@ class TrackingSection(_Section):
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"
+    ripple: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = []
     accept_roles: bool = False
     all_periods: bool = False
 
@@ -70,9 +71,11 @@ class MotionSection(_Section):
 
 
 class MonitoringSection(_Section):
-    """[monitoring]: the baseline to tell changes against, and how often a false alarm may come, in words."""
+    """[monitoring]: the baseline to compare with, how often a false alarm may come, in words, and the channels that a
+    baseline's parameters may depend on."""
 
     baseline: File | None = None
+    covariates: Annotated[list[str], Field(max_length=4)] = []
     false_alarms: str = "one in 30 days of motion"
 
 

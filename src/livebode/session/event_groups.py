@@ -1,28 +1,33 @@
-"""One alarm per cause: events that repeat are reported in growing steps, and each of them is recorded exactly."""
+"""One alarm per cause: events that repeat are recorded one by one up to a rate, then in counted lines."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
+from collections import Counter
+from copy import deepcopy
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 from livebode.nouns import Event
 
 QUIET_S = 60.0
 """A cause that is silent for so long has ended; the next event of it begins another group."""
-REPORT_S_MAX = 600.0
-"""What repeats is reported at the latest after so long."""
+AT_ONCE = 20
+"""So many events of a group are reported one by one; those behind them share lines."""
+REPORT_S, STATE_S = 10.0, 1.0
+"""What shares a line is reported at the latest after so long, and a change of state after the shorter time."""
 REPEATS_MAX = 128
-"""Most events that wait for the next report."""
+"""Most events that share a line with sample, time and message of each."""
+EXACT_MAX, EXACT_PER_S = 1000.0, 1.0
+"""So many events of a group are exact at once, and so many each second in the long run; the others are only counted."""
 
 CAUSES = {
     kind: cause
     for cause, kinds in {
-        "loss": ("loss", "gap", "overflow"),
-        "connection": ("connected", "disconnected", "restart"),
+        "loss": ("loss", "gap", "overflow", "phase-slip"),
+        "connection": ("connected", "disconnected", "restart", "resumed"),
         "order": ("repeat", "reordered"),
-        "sender": ("malformed", "foreign", "layout-changed", "unit-changed"),
-        "clock": ("clock-jump", "wrong-rate"),
+        "sender": ("malformed", "foreign", "replaced", "layout-changed", "unit-changed"),
+        "clock": ("clock-jump", "wrong-rate", "computer-clock"),
         "signal": ("non-finite", "implausible", "spike", "not-whole"),
         "fit": ("fit-failed", "fit-resumed"),
         "backlog": ("backlog", "backlog-cleared"),
@@ -31,9 +36,8 @@ CAUSES = {
     for kind in kinds
 }
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
-_AT_ONCE = {"backlog", "backlog-cleared", "restart", "disconnected", "layout-changed", "unit-changed"}
+_STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", "layout-changed", "unit-changed"}
 """Changes of state: who waited for their report would take the state before for the present one."""
-_FIELDS = {"group", "count", "first_s", "last_s", "repeats"}
 
 
 @dataclass
@@ -45,32 +49,78 @@ class _Group:
     last_s: float
     reported_s: float
     count: int = 0
-    reported: int = 0
+    lines: int = 0
+    exact: float = EXACT_MAX
     kinds: list[str] = field(default_factory=list)
     waiting: list[Event] = field(default_factory=list)
+    counted: dict[str, int] = field(default_factory=dict)
+    newest: Event | None = None
+    """The newest event where it was only counted."""
+
+    @property
+    def waits(self) -> bool:
+        return bool(self.waiting) or self.newest is not None
+
+    def add(self, event: Event) -> None:
+        self.count += 1
+        self.exact = min(EXACT_MAX, self.exact + EXACT_PER_S * max(0.0, event.time_s - self.last_s))
+        self.last_s = max(self.last_s, event.time_s)
+        if self.exact >= 1:
+            self.exact -= 1
+            self.waiting.append(event)
+            self.newest = None
+        else:
+            self.counted[event.kind] = self.counted.get(event.kind, 0) + 1
+            self.newest = event
+
+    def due(self, time_s: float) -> bool:
+        if self.lines < AT_ONCE or len(self.waiting) >= REPEATS_MAX:
+            return True
+        changed = any(event.kind in _STATES for event in (*self.waiting, *filter(None, [self.newest])))
+        return time_s - self.reported_s >= (STATE_S if changed else REPORT_S)
+
+    def report(self) -> Event:
+        """One event for all that wait, which then do not wait any longer."""
+        exact, counted = self.waiting, Counter(self.counted)
+        if self.newest is not None:  # of the newest one everything is in the line anyway
+            counted[self.newest.kind] -= 1
+            exact = [*exact, self.newest]
+        self.waiting, self.counted, self.newest = [], {}, None
+        self.lines, self.reported_s = self.lines + 1, self.last_s
+        details: dict[str, Any] = {"group": self.name, "count": self.count}
+        details |= {"first_s": self.first_s, "last_s": self.last_s}
+        message = exact[-1].message
+        if len(exact) > 1 or counted.total():
+            details["repeats"] = [[e.kind, e.sample, e.time_s, e.message, e.details] for e in exact]
+            message += f" ({self.count} events of this cause in {self.last_s - self.first_s:.4g} s)"
+        if counted.total():
+            details["counted"] = {kind: number for kind, number in counted.items() if number}
+        return replace(exact[-1], message=message, details=exact[-1].details | details)
 
 
 class EventGroups:
-    """Adds to each event of a run the group that it belongs to, and reports repeats in growing steps.
+    """Adds to each event of a run the group that it belongs to, and bounds how fast a cause is reported.
 
-    A group is one cause (`CAUSES`) from its first event until it is silent for 60 s of the machine's time. Reported at
-    once are changes of state, the first event of each kind in a group, and the 2nd, 4th, 8th, … of the group; the
-    others wait for the next of these, for 600 s, for 128 of them, or for the end of the group or the run. What is
-    reported is the newest event, and those that waited are in its details. No event is lost: `each_event` gives them
-    back.
+    A group is one cause (`CAUSES`) from its first event until it is silent for 60 s of the machine's time. Its first 20
+    events are reported at once, one by one, and so is the first event of each kind. What comes then shares a line: the
+    newest event, with the others in its details, after 10 s (after 1 s where a state changed), with 128 of them, or at
+    the end of the group or the run. Until then they are `waiting`, which the record stores with every commit.
+
+    A flood is counted: of a group 1,000 events are reported with sample, time and message of each, and one more each
+    second. `livebode.records.grouped_events` reads events back one by one, or counts them.
 
     The details get ``group`` (name, unique in the run), ``count`` (events in the group up to this one), ``first_s``,
-    ``last_s`` (times of the first and the newest) and, where events waited, ``repeats``: kind, sample, time_s, message
-    and details of each of them and of the newest.
+    ``last_s`` (times of the first and the newest) and, where events share the line, ``repeats``: kind, sample, time_s,
+    message and details of each of them and of the newest, and ``counted``: how many of each kind were only counted.
 
     Examples
     --------
     >>> groups = EventGroups()
-    >>> found = [groups.take(Event("gap", n, n / 1e3, "a gap")) for n in range(8)]
-    >>> [event.details["count"] for events in found for event in events]
-    [1, 2, 4, 8]
-    >>> [event.sample for event in each_event(found[7][0])]
-    [4, 5, 6, 7]
+    >>> found = [groups.take(Event("gap", n, n / 1e3, "a gap")) for n in range(30)]
+    >>> sum(map(len, found)), found[19][0].details["count"]
+    (20, 20)
+    >>> [event.details["count"] for event in groups.waiting()]
+    [30]
     """
 
     def __init__(self) -> None:
@@ -86,14 +136,12 @@ class EventGroups:
         if group is None:
             group = _Group(f"{cause}@{event.sample}", event.time_s, event.time_s, event.time_s)
             self._groups[cause] = group
-        group.count += 1
-        group.last_s = max(group.last_s, event.time_s)
-        group.waiting.append(event)
+        group.add(event)
         new = event.kind not in group.kinds
         if new:
             group.kinds.append(event.kind)
-        if new or event.kind in _AT_ONCE or group.count >= 2 * group.reported or len(group.waiting) >= REPEATS_MAX:
-            found.append(_report(group))
+        if new or group.due(event.time_s):
+            found.append(group.report())
         return found
 
     def due(self, time_s: float, cause: str | None = None) -> list[Event]:
@@ -103,15 +151,19 @@ class EventGroups:
             if cause not in (None, name):
                 continue
             ended = time_s - group.last_s >= QUIET_S
-            if group.waiting and (ended or time_s - group.reported_s >= REPORT_S_MAX):
-                found.append(_report(group))
+            if group.waits and (ended or group.due(time_s)):
+                found.append(group.report())
             if ended:
                 del self._groups[name]
         return found
 
+    def waiting(self) -> list[Event]:
+        """What is not reported yet, as it would be now."""
+        return [deepcopy(group).report() for group in self._groups.values() if group.waits]
+
     def finish(self) -> list[Event]:
         """What still waits at the end of a run."""
-        found = [_report(group) for group in self._groups.values() if group.waiting]
+        found = [group.report() for group in self._groups.values() if group.waits]
         self._groups.clear()
         return found
 
@@ -121,33 +173,11 @@ class EventGroups:
 
     def load(self, state: dict[str, Any]) -> None:
         """Continue from a state."""
-        self._groups = {
-            cause: _Group(**group | {"waiting": [Event(**event) for event in group["waiting"]]})
-            for cause, group in state.items()
-        }
+        self._groups = {cause: _restored(group) for cause, group in state.items()}
 
 
-def each_event(event: Event) -> Iterator[Event]:
-    """Every event that a recorded one reports, as it was before it was grouped, in the order in which they happened."""
-    if "repeats" not in event.details:
-        yield replace(event, details={name: event.details[name] for name in event.details.keys() - _FIELDS})
-        return
-    for kind, sample, time_s, message, details in event.details["repeats"]:
-        yield Event(kind, sample, time_s, message, dict(details))
-
-
-def _report(group: _Group) -> Event:
-    waiting, group.waiting = group.waiting, []
-    newest = waiting[-1]
-    group.reported, group.reported_s = group.count, group.last_s
-    fields: dict[str, Any] = {
-        "group": group.name,
-        "count": group.count,
-        "first_s": group.first_s,
-        "last_s": group.last_s,
-    }
-    message = newest.message
-    if len(waiting) > 1:
-        fields["repeats"] = [[e.kind, e.sample, e.time_s, e.message, e.details] for e in waiting]
-        message += f" ({group.count} events of this cause in {group.last_s - group.first_s:.4g} s)"
-    return replace(newest, message=message, details=newest.details | fields)
+def _restored(state: dict[str, Any]) -> _Group:
+    known = {one.name: state[one.name] for one in fields(_Group) if one.name in state}
+    events = {"waiting": [Event(**event) for event in state["waiting"]]}
+    newest = state.get("newest")
+    return _Group(**known | events | {"newest": None if newest is None else Event(**newest)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,18 +21,23 @@ from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck, check_excitation, check_length, check_some_valid
+from livebode.session.clock_relation import ClockRelation
 from livebode.session.continuing import Before, StreamPosition
 from livebode.session.destination import Destination
 from livebode.session.fits import Fits
+from livebode.session.live_checks import LiveChecks
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.overview import Overview
 from livebode.session.pipeline import Pipeline
 from livebode.session.shedding import LoadShedding
 from livebode.session.tally import Tally
-from livebode.sources.live import Health, LiveSource
+from livebode.sources.live import Health, LiveBlock, LiveSource
 
 if TYPE_CHECKING:
     from livebode.session.segmented import SegmentedRun
+
+
+_SILENT_S = 0.2  # without a Block
 
 
 class Source(Protocol):
@@ -85,6 +91,8 @@ class Tracking:
         The run that it goes on from.
     noticed
         What is known of the recording as a whole before it is tracked.
+    relation
+        The clock of a live source, for as long as it is open.
     delivery
         Goes to the source's `blocks`.
     """
@@ -103,6 +111,7 @@ class Tracking:
         position: StreamPosition | None = None,
         before: Before | None = None,
         noticed: Sequence[Event] = (),
+        relation: ClockRelation | None = None,
         **delivery: Any,
     ) -> None:
         _keep_freed_memory()
@@ -112,6 +121,8 @@ class Tracking:
         if isinstance(source, LiveSource):
             self._shedding = LoadShedding(source, lambda: self._orders.ended)
         self._follower, settings = pipeline.follower, pipeline.follower.settings
+        if isinstance(source, LiveSource):
+            delivery["until"] = partial(self._until, delivery.get("until", lambda: False))
         self._blocks = source.blocks(pipeline.channels, **delivery)
         check = ChannelCheck(tuple(pipeline.signals), settings.channel(settings.method.reference) or "")
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
@@ -124,8 +135,11 @@ class Tracking:
         self._begun = summary.begun(about, self._follower, response_unit(source.channels, settings))
         self._overview = Overview()
         self._done: dict[str, Any] = {}
+        self._found_on_the_way: dict[str, Any] = {}
         self._newest: Fit | None = None
+        self._relation = relation or ClockRelation()
         self._origin_s = 0.0
+        self._stepped_s = time.monotonic()
         self.recorder = self._recorder(again, before)
         self._out = Outlet(self.recorder, to.audience, self._tally.groups)
 
@@ -146,6 +160,7 @@ class Tracking:
             again=again,
             ends=self.source.samples is not None,
             tell=self._said,
+            waiting=self._tally.groups.waiting,
             position=self._position,
             before=before,
         )
@@ -158,6 +173,8 @@ class Tracking:
         recorder = self.recorder.__enter__()
         if not isinstance(recorder, RunDirectory):
             self._orders.left = recorder.stopped
+            if recorder.clock:
+                self._relation.clock.pieces = recorder.clock
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -176,11 +193,13 @@ class Tracking:
 
     def follow(self) -> None:
         """Every Block through the pipeline into the record; InputError where there is none."""
-        fits, watching = self.pipeline.fits, self.pipeline.watching
+        fits = self.pipeline.fits
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
         self.to.audience.share(self._overview)
         self.to.audience.begin(self.to.directory, begun, _health(self.source))
-        blocks = self._blocks
+        if self._relation.clock.pieces:
+            self._set_clock()
+        blocks = self._clocked()
         if not isinstance(self.recorder, RunDirectory):
             for responses in self.recorder.before():
                 self._overview.add(responses)
@@ -188,9 +207,7 @@ class Tracking:
                 if fits is not None:
                     fits.take(responses[0:0], self._out)  # which tells it the lines
             blocks = self.recorder.feed(blocks)
-        if watching is not None:
-            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
-            blocks = watching.over(blocks, self._out.write_event, has_time)
+        blocks = self._watched(blocks)
         noticed = () if self._tally.stop else self._noticed  # a record that is continued has them
         for block in _told(blocks, self.to.audience):
             for event in noticed:
@@ -207,6 +224,50 @@ class Tracking:
         if not self._tally.stop:
             raise InputError("the recording holds no samples")
 
+    def _watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The same Blocks, which are checked and monitored on the way."""
+        if (checks := self._live_checks()) is not None:
+            blocks = checks.over(blocks, self._found)
+        if (watching := self.pipeline.watching) is not None:
+            has_time = (lambda: True) if self._shedding is None else self._shedding.monitors
+            blocks = watching.over(blocks, self._out.write_event, has_time)
+        return blocks
+
+    def _live_checks(self) -> LiveChecks | None:
+        axis, source = self.pipeline.axis, self.source
+        if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
+            return None
+        roles = isinstance(self.recorder, RunDirectory) or not self.recorder.continued
+        transient = not (self._tally.stop or axis.tracking.all_periods or axis.motion)
+        settings = self._follower.settings
+        return LiveChecks(settings, self.pipeline.channels, roles=roles, transient=transient)
+
+    def _found(self, event: Event) -> None:
+        """Record and show what the signals of a live run show."""
+        self.to.tell(event)
+        self._out.write_event(event)
+        if event.kind == "transient":
+            self._renew(left_out_samples=event.sample + event.details["samples"])
+
+    def _clocked(self) -> Iterator[Block]:
+        for block in self._blocks:
+            if isinstance(block, LiveBlock) and self._relation.take(block):
+                self._set_clock()
+            yield block
+
+    def _set_clock(self) -> None:
+        """Publish the clock of a live run."""
+        pieces = self._relation.clock.pieces
+        self.to.audience.set_clock(pieces)
+        self._renew(clock=list(pieces))
+
+    def _renew(self, **found: Any) -> None:
+        """Write what was found on the way to run.json, now and at the end."""
+        self._found_on_the_way |= found
+        if not isinstance(self.recorder, RunDirectory):
+            with suppress(InputError):  # where the disk is full, the end of the run writes it
+                self.recorder.renew(**found)
+
     def _step(self, step: Callable[[], Responses | None]) -> None:
         """Take one step of the follower, and publish its responses and what happened meanwhile."""
         before = time.perf_counter()
@@ -214,6 +275,21 @@ class Tracking:
         if responses is not None:
             self._tally.take(responses, time.perf_counter() - before)
             self._publish(responses)
+        self._write_events()
+        if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
+            self.recorder.keep(kept)
+
+    def _until(self, changing: Callable[[], bool]) -> bool:
+        """Asked by a live source before each Block and while it waits: events of a silent machine are recorded too."""
+        if self._tally.stop and time.monotonic() - self._stepped_s > _SILENT_S:
+            self._write_events()
+            if not isinstance(self.recorder, RunDirectory):
+                self.recorder.commit_while_silent()
+        return changing()
+
+    def _write_events(self) -> None:
+        """Publish what happened since the last call."""
+        self._stepped_s = time.monotonic()
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
         if self._shedding is not None:
             shed = self._shedding.drain_events(*self.position)
@@ -224,8 +300,6 @@ class Tracking:
         for event in events + self._orders.drain_events(*self.position):
             self._out.write_event(event)
         self._out.report_groups(self.position[1])
-        if (kept := self._orders.take_kept()) is not None and not isinstance(self.recorder, RunDirectory):
-            self.recorder.keep(kept)
 
     def _publish(self, responses: Responses) -> None:
         fits, watching = self.pipeline.fits, self.pipeline.watching
@@ -276,6 +350,7 @@ class Tracking:
         if watching is not None:
             self._done["monitoring"] = watching.finish(self._out.write_event)
         self._out.finish_groups()
+        self._done |= self._found_on_the_way
         if continued_in is not None:
             self._done["continued_in"] = continued_in
 

@@ -46,6 +46,11 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         say("learning the fitted parameters over the schedule")
         tables.append(_parameters(runs, axes[0].fit))
     machine, remark = _machine(runs, axes, say)
+    if machine is None and (covariates := axes[0].monitoring.covariates):
+        raise InputError(
+            f"covariates ({', '.join(covariates)}) need a model of the moving machine, and these runs give none: "
+            f"{remark}. Leave them out of [monitoring] to learn tables alone"
+        )
     return Baseline(
         lines,
         runs[0].found["hop"],
@@ -94,6 +99,7 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
         ("tracking options", mine.tracking, axis.tracking),
         ("motion options", mine.motion, axis.motion),
         ("fit options", mine.fit, axis.fit),
+        ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
     ):
         if one != other:
             raise InputError(
@@ -109,7 +115,7 @@ def _apart(run: Run) -> list[Apart]:
 def _rows(run: Run) -> list[Rows]:
     """Rows at each place of the period."""
     each = _apart(run)
-    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.batches()])
+    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
 
 
 def _joined(batches: list[list[Rows]]) -> list[Rows]:
@@ -123,7 +129,7 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
     rows = []
     for run in runs:
         fitter, each = fitter_of(section, run.found["unit"]), _apart(run)
-        fitted = (fitter.process(batch).only(names) for batch in run.batches())
+        fitted = (fitter.process(batch).only(names) for batch in run.steady_batches())
         rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
@@ -131,6 +137,7 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
 def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:
     """A model of the moving machine, or why there is none."""
     signals = axes[0].signals
+    covariates = axes[0].monitoring.covariates
     if signals.input is None or signals.schedule is None:
         return None, "a model of the machine needs the torque and a position to schedule by"
     if axes[0].tracking.quantity != "plant":
@@ -147,6 +154,7 @@ def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> t
                 output=signals.output,
                 schedule=signals.schedule,
                 radius_m=_RADIUS_M,
+                covariates=covariates,
             ),
             "",
         )
@@ -155,7 +163,7 @@ def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> t
 
 
 def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
-    names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule]
+    names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
 
     def blocks() -> Iterator[Block]:
         assert axis.source.log is not None

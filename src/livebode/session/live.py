@@ -10,8 +10,10 @@ from functools import partial
 from pathlib import Path
 
 from livebode.nouns import Event, InputError
+from livebode.nouns.clock import moments_by
 from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
+from livebode.session.clock_relation import ClockRelation
 from livebode.session.continuing import Before, StreamPosition, stream_position
 from livebode.session.destination import Destination
 from livebode.session.following import Outcome, Tracking
@@ -66,8 +68,14 @@ class _Succession:
     ) -> None:
         self._source, self._position, self._to = source, position, to
         self._orders, self._finishing = orders, finishing
+        self._relation = ClockRelation()
 
     def run(self, pipeline: Pipeline) -> Outcome:
+        """The first run, and all that follow it, until the end."""
+        with moments_by(self._relation.clock):
+            return self._run(pipeline)
+
+    def _run(self, pipeline: Pipeline) -> Outcome:
         from livebode.session.segmented import make_way  # needs a POSIX system
 
         directory, before, force = self._to.directory, None, self._to.force
@@ -113,6 +121,7 @@ class _Succession:
             orders=self._orders,
             position=self._position,
             before=before,
+            relation=self._relation,
             until=self._orders.changing,
         )
 
@@ -129,7 +138,7 @@ class _Succession:
 
         def finish() -> None:
             try:
-                with leaving:
+                with moments_by(self._relation.clock), leaving:
                     tracking.finish()
             except InputError as error:
                 self._to.tell(Event("record-unfinished", *tracking.position, str(error)))

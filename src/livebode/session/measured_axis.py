@@ -66,7 +66,7 @@ class MeasuredAxis:
         told, rate_hz = self._section, self._run.lines.rate_hz
         motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
         return measured_machine(
-            MeasuredResponse.of(mean_response(self._run.responses())), self._loop.build(rate_hz), rate_hz,
+            MeasuredResponse.of(mean_response(self._run.steady_batches())), self._loop.build(rate_hz), rate_hz,
             output=self._output(), radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
             notes=self._notes(), encoder_counts_per_turn=told.encoder_counts_per_turn,
         )  # fmt: skip

@@ -62,7 +62,8 @@ class Pipeline:
     def channels(self) -> list[str]:
         """All channels in use, each once."""
         schedule = self.follower.settings.schedule
-        return list(dict.fromkeys(self.signals + ([schedule] if schedule else [])))
+        covariates = self.watching.covariates if self.watching is not None else ()
+        return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates]))
 
     @property
     def parts(self) -> Mapping[str, Stateful]:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from livebode.estimation import Settings, SpectraTracker, Tracker
+from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.settings import nearest_hop
 from livebode.nouns import Block, InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
@@ -94,10 +94,24 @@ def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) 
         hann=tracking.hann,
         spikes=tuple(tracking.spikes),
         dtype=tracking.dtype,
+        ripple=_ripple(axis),
     )
     if not tracking.accept_roles:
         check_distinct(settings)
     return settings
+
+
+def _ripple(axis: Axis) -> tuple[RippleOrder, ...]:
+    """Orders that the configuration names, else those that its baseline has learned."""
+    if axis.tracking.ripple or axis.monitoring.baseline is None or axis.signals.schedule is None:
+        return tuple(RippleOrder(*order) for order in axis.tracking.ripple)
+    from livebode.monitoring import Baseline  # with the simulation
+
+    machine = Baseline.load(axis.monitoring.baseline).machine
+    if machine is None:
+        return ()
+    amplitudes = machine.ripple.amplitude_n_m * 2**0.5  # of sine and cosine each
+    return tuple(RippleOrder(float(k), float(a)) for k, a in zip(machine.ripple.cycles_per_m, amplitudes) if a > 0)
 
 
 def _lines(axis: Axis, log: Log) -> Lines:

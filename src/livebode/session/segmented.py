@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.nouns.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
@@ -24,6 +25,7 @@ from livebode.session.continuing import SOURCE, Before, StreamPosition, in_piece
 from livebode.session.orders import StoppedError
 from livebode.session.stateful import Stateful
 
+FOUND_ON_THE_WAY = "clock", "left_out_samples"
 _INTERVAL_S = 0.5
 _PIECE_S = 0.25  # with the interval three quarters of a second: what a kill costs at most
 _SEEN_AGAIN_BYTES = 256 << 20  # what a picture of a run that goes on is drawn from, beside what comes
@@ -55,6 +57,8 @@ class SegmentedRun:
         Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
     tell
         Called with what the record itself has to say, at once.
+    waiting
+        Events that are not handed to `write_event` yet, which are stored with every commit.
     position
         Of a live source, which is stored with every commit.
     before
@@ -74,13 +78,16 @@ class SegmentedRun:
         again: bool,
         ends: bool,
         tell: Callable[[Event], None],
+        waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
         before: Before | None = None,
     ) -> None:
         self.path = path
-        self._position = position
+        self._position, self._waiting = position, waiting
+        self._followed: Block | None = None
+        self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
-        self._continues = None if before is None else before.name
+        self._more: dict[str, Any] = {} if before is None else {"continues": before.name}
         self._summary, self._rate_hz = dict(summary), rate_hz
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
         self._force, self._again, self._ends, self._tell = force, again, ends, tell
@@ -132,11 +139,26 @@ class SegmentedRun:
 
     def before(self) -> Iterator[Responses]:
         """The newest responses of the run that is gone on with."""
-        if self._continued or self._continues:
+        if self._continued or "continues" in self._more:
             run = Run.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
             yield next(newest, None) or run.responses()  # none are told from no run by their lines
             yield from newest
+
+    @property
+    def continued(self) -> bool:
+        """Whether the run was there before."""
+        return self._continued
+
+    @property
+    def clock(self) -> list[tuple[float, float]]:
+        """Which time of day the run's seconds are, as `RunClock` keeps it and run.json says."""
+        return RunClock.of(self._more).pieces
+
+    def renew(self, **found: Any) -> None:
+        """Write to run.json what was found on the way."""
+        self._more |= found
+        self._store.renew(self._named(self._summary))
 
     def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
         """The Blocks that are still to be tracked; when one is asked for, all that came of the one before is recorded.
@@ -146,17 +168,24 @@ class SegmentedRun:
         InputError
             At the end, if the disk does not take the last ones.
         """
-        block: Block | None = None
         for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
             if self._samples:
                 self._store.write("samples", as_rows(block, self._samples))
             if self._position is not None:
                 self._position.take(block)
             yield block
+            self._followed, self._new = block, True
             if self._store.due(block.stop):
                 self._commit(block)
-        if block is not None:
-            self._commit(block)
+        if self._followed is not None:
+            self._commit(self._followed)
+
+    def commit_while_silent(self) -> None:
+        """Record what came of the last Block, and the events since, while the next one is waited for."""
+        if self._followed is None or not self._store.due(self._followed.stop):
+            return
+        if self._new or self._waiting() != self._waited:
+            self._commit(self._followed)
 
     def write(self, responses: Responses) -> None:
         """Append responses."""
@@ -172,6 +201,7 @@ class SegmentedRun:
     def write_event(self, event: Event) -> None:
         """Append an event."""
         self._store.write_event(event)
+        self._new = True
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
         """Draw the pictures, close what is open and write run.json; `ends` says that another run goes on instead."""
@@ -199,7 +229,8 @@ class SegmentedRun:
         return iter(blocks)
 
     def _commit(self, block: Block) -> None:
-        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states())
+        self._new, self._waited = False, self._waiting()
+        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states(), self._waited)
         self._hear()
 
     def _hear(self) -> None:
@@ -223,11 +254,11 @@ class SegmentedRun:
             )
         for name, part in self._parts.items():
             part.restore(states[name])
-        self._continues = before.get("continues")
+        self._more = {name: before[name] for name in ("continues", *FOUND_ON_THE_WAY) if name in before}
         self._store.renew(self._named(self._summary))
 
     def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
-        return summary if self._continues is None else {"continues": self._continues} | summary
+        return self._more | summary
 
 
 def _identity(summary: Mapping[str, Any]) -> list[Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
 from livebode.nouns import Responses
+from livebode.nouns.clock import moment
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
 from livebode.session.loop_report import loop_report
@@ -60,6 +61,6 @@ def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[
         return {}
     summary = {"fit": fits.summary(newest)}
     if newest is not None and fits.loop is not None:
-        words = f"newest fit, at {newest.parameters.time_s[0]:.6g} s"
+        words = f"newest fit, at {moment(newest.parameters.time_s[0], 2)}"
         summary["loop"] = loop_report(newest, words, responses, fits.loop).plain()
     return summary

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.estimation import Settings
 from livebode.excitation.blocks import cut, spectra
@@ -12,6 +15,8 @@ from livebode.nouns import Event, counted
 from livebode.session.aligned import AlignedLog
 from livebode.session.plan import beginnings
 from livebode.session.roles import ROLES
+
+Floats = NDArray[np.float64]
 
 _PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are looked at, at most
 _PERIODS_MIN = 8
@@ -28,7 +33,17 @@ def leading_transient(log: AlignedLog, settings: Settings) -> int:
     window = settings.lines.window
     names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
     channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
-    found = dict(zip(channels, beginnings(log, channels, min(_PERIODS * window, _SAMPLES_MAX))))
+    return transient_periods(
+        dict(zip(channels, beginnings(log, channels, min(_PERIODS * window, _SAMPLES_MAX)))), settings
+    )
+
+
+def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
+    """The same in signals by the names of their channels, of which the first 64 periods count."""
+    window = settings.lines.window
+    size = min(_PERIODS * window, _SAMPLES_MAX)
+    found = {name: x[:size] for name, x in signals.items()}
+    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
     count = found[names[0]].size // window
     if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule])):
         return 0
@@ -50,12 +65,12 @@ def _moves(schedule: np.ndarray) -> bool:
     return bool(known.size and np.ptp(known) > _STILL * np.max(np.abs(known)))
 
 
-def transient_event(periods: int, settings: Settings) -> Event:
-    """What is left out, in an Event at the beginning."""
+def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
+    """What is left out, in an Event at the beginning: sample `first`."""
     window = settings.lines.window
     which = "period differs" if periods == 1 else f"{periods} periods differ"
     message = (
         f"the first {which} from the steady state: {counted(periods * window, 'sample')} "
         f"({periods * window / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
     )
-    return Event("transient", 0, 0.0, message, {"periods": periods, "samples": periods * window})
+    return Event("transient", first, time_s, message, {"periods": periods, "samples": periods * window})

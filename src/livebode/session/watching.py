@@ -26,8 +26,12 @@ Write = Callable[[Event], None]
 class Watching:
     """Hands a run's samples and responses to a Monitor, if there is one, and keeps what it says."""
 
-    def __init__(self, monitor: Monitor | None, baseline: str | None, remark: str = "") -> None:
+    def __init__(
+        self, monitor: Monitor | None, baseline: str | None, remark: str = "", covariates: tuple[str, ...] = ()
+    ) -> None:
         self._monitor, self._baseline, self._remark = monitor, baseline, remark
+        self.covariates = covariates
+        """Channels that it needs beside those of the follower."""
         self._alarms: list[str] = []
 
     def over(
@@ -79,15 +83,19 @@ def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Wa
     Without `samples` its tables judge alone, for the model of the machine needs them.
     """
     section = axis.monitoring
+    covariates = tuple(section.covariates) if samples else ()
     if section.baseline is None:
         asked = section.false_alarms != MonitoringSection().false_alarms
-        return Watching(None, None, f" false_alarms = {section.false_alarms!r} has no effect without one." * asked)
+        remark = f" false_alarms = {section.false_alarms!r} has no effect without one." * asked
+        return Watching(None, None, remark, covariates)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
     baseline = Baseline.load(section.baseline)
+    baseline.check_covariates(covariates)
     left_out = not samples and baseline.machine is not None
     if left_out:
         baseline = replace(baseline, machine=None)
     monitor = Monitor(baseline, settings, section.false_alarms, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
-    return Watching(monitor, str(section.baseline), _NOT_FITTED * blind + _NO_SAMPLES * left_out)
+    remark = _NOT_FITTED * blind + _NO_SAMPLES * left_out
+    return Watching(monitor, str(section.baseline), remark, baseline.covariates)

@@ -7,22 +7,23 @@ const TIME = format({}),
   DAY = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short" }), // year-month-day
   ZONE = format({ timeZoneName: "short" });
 
-let clockS = null; // seconds since 1970 at the run's time 0
+let clock = []; // from which second of the run on, and seconds since 1970 at its second 0, as it is from there
 
 // Whether another clock is used from here on.
-export function setClock(originS) {
-  const before = clockS;
-  clockS = originS ?? null;
-  return before !== clockS;
+export function setClock(pieces) {
+  const before = clock;
+  clock = pieces;
+  return JSON.stringify(before) !== JSON.stringify(clock);
 }
 
-const dateOf = (timeS) => new Date(1000 * (timeS + clockS));
+const originS = (timeS) => (clock.findLast(([fromS]) => fromS <= timeS) ?? clock[0])[1];
+const dateOf = (timeS) => new Date(1000 * (timeS + originS(timeS)));
 const zoneOf = (date) => ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName").value;
 
 // For a sentence: "14:32:07 CEST", with its date where that is not today's; `fine` with hundredths.
 export function moment(timeS, fine = false) {
   if (!Number.isFinite(timeS)) return "–";
-  if (clockS === null) return seconds(timeS);
+  if (!clock.length) return seconds(timeS);
   const date = dateOf(timeS),
     day = DAY.format(date);
   const words = `${(fine ? HUNDREDTHS : TIME).format(date)} ${zoneOf(date)}`;
@@ -41,11 +42,11 @@ function seconds(timeS) {
 
 // For an axis of time, with marks that are so many seconds apart.
 export function ticks(splits, stepS) {
-  if (clockS === null) return splits.map((v) => Number(v.toFixed(6)).toString().replace("-", "−"));
+  if (!clock.length) return splits.map((v) => Number(v.toFixed(6)).toString().replace("-", "−"));
   return splits.map((v) => (stepS < 0.1 ? HUNDREDTHS : stepS < 1 ? TENTHS : TIME).format(dateOf(v + 1e-6)));
 }
 
 export function timeLabel(timeS) {
-  if (clockS === null) return "time in s";
+  if (!clock.length) return "time in s";
   return Number.isFinite(timeS) ? `time, ${zoneOf(dateOf(timeS))}` : "time";
 }

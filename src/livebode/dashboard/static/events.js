@@ -8,6 +8,8 @@ const ALARMS = new Set([
   "change-corrected",
   "baseline-unknown",
   "doubtful",
+  "roles-doubtful",
+  "phase-slip",
   "gap",
   "loss",
   "overflow",

@@ -67,7 +67,7 @@ const link = new Link({
   onNews: (news) => {
     if (news.facts && overtaken(news)) return;
     if (news.error) complain(news.error);
-    if (news.span && setClock(news.span.clock_s)) newClock();
+    if (news.span && setClock(news.span.clock)) newClock();
     if (news.facts) begin(news);
     if (news.span) timeline.take(news.span);
     if (news.health && page.facts?.begun) {

@@ -29,23 +29,27 @@ class Damage:
         the journal's beginning or end, so that one of the two commits is missing.
     rows
         How many rows of each table are lost. Empty where nothing is, or where it cannot be counted.
+    at_least
+        Whether more may be lost than is counted.
     """
 
     size_bytes: int
     begin: Moment | None
     end: Moment | None
     rows: Mapping[str, int] = field(default_factory=dict)
+    at_least: bool = False
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Damage:
         """From `to_json`; ValueError, TypeError or KeyError where it is not that."""
         begin, end = (None if (at := values[name]) is None else (int(at[0]), float(at[1])) for name in ("begin", "end"))
         rows = {str(table): int(number) for table, number in values["rows"].items()}
-        return cls(int(values["size_bytes"]), begin, end, rows)
+        return cls(int(values["size_bytes"]), begin, end, rows, values.get("at_least") is True)
 
     def to_json(self) -> dict[str, Any]:
         begin, end = (None if at is None else list(at) for at in (self.begin, self.end))
-        return {"size_bytes": self.size_bytes, "begin": begin, "end": end, "rows": dict(self.rows)}
+        rest = {"rows": dict(self.rows), "at_least": self.at_least}
+        return {"size_bytes": self.size_bytes, "begin": begin, "end": end, **rest}
 
     @property
     def sentence(self) -> str:
@@ -61,7 +65,9 @@ class Damage:
             return f"what its last {self.size_bytes} bytes held, from sample {self.begin[0]} on, is lost"
         if not rows:
             return "nothing is lost"
-        return f"{rows} are lost, of samples {self.begin[0]} to {self.end[0] - 1} ({self.end[1] - self.begin[1]:.4g} s)"
+        rows = "at least " * self.at_least + rows
+        seconds = f" ({self.end[1] - self.begin[1]:.4g} s)" if self.end[1] > self.begin[1] else ""
+        return f"{rows} are lost, of samples {self.begin[0]} to {self.end[0] - 1}{seconds}"
 
 
 def event_of(name: str, damages: Iterable[Damage], kept_as: str | None) -> Event:

@@ -7,9 +7,10 @@ import json
 import math
 import os
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
@@ -18,10 +19,13 @@ from livebode.records.inside import check_folder, read_bytes
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory
 from livebode.records.segments.frames import COMMIT, ROWS, TABLE, Frame, frames, to_frame
+from livebode.records.segments.plain_batch import check_schema, plain_batch
 from livebode.records.table import Table
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
+_SIZE_BYTES_MAX = 512 << 20  # sixteen times a full one: it grows while no segment can be closed
+_PLACE = "sample", "time_s", "unix_s", "events_bytes"
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class Commit:
         What goes on from there, as named bytes.
     rows
         How many rows of each table were recorded since the run began.
+    waiting
+        Events as plain data that are not in events.jsonl yet, since they will share a line.
     """
 
     sample: int
@@ -48,6 +54,7 @@ class Commit:
     events_bytes: int
     states: Mapping[str, bytes]
     rows: Mapping[str, int] = field(default_factory=dict)
+    waiting: Sequence[Any] = ()
 
     @property
     def position(self) -> tuple[int, int]:
@@ -55,7 +62,7 @@ class Commit:
         return self.sample, self.events_bytes
 
     def to_frame(self) -> bytes:
-        head = {name: getattr(self, name) for name in ("sample", "time_s", "unix_s", "events_bytes", "rows")}
+        head = {name: getattr(self, name) for name in (*_PLACE, "rows", "waiting")}
         text = json.dumps(head | {"states": {name: len(state) for name, state in self.states.items()}}).encode()
         return to_frame(COMMIT, _LENGTH.pack(len(text)), text, *self.states.values())
 
@@ -67,11 +74,14 @@ class Commit:
         whole = [head["sample"], head["events_bytes"], *head.get("rows", {}).values()]
         if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
             raise ValueError("a commit that a run does not write")
+        waiting = head.pop("waiting", [])
+        if not isinstance(waiting, list):
+            raise ValueError("events that a run does not write")
         states = {}
         for name, length in head.pop("states").items():
             states[name] = bytes(payload[at : at + length])
             at += length
-        return cls(**head, states=states)
+        return cls(**head, states=states, waiting=tuple(waiting))
 
 
 @dataclass
@@ -97,6 +107,7 @@ class Journal:
     damages: list[Damage] = field(default_factory=list)
     _behind: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
     _broken_bytes: int = 0
+    _counted: dict[str, list[pa.RecordBatch]] | None = None
 
     @classmethod
     def read(cls, run: Path, number: int, after: Callable[[], Commit | None] = lambda: None) -> Journal:
@@ -119,7 +130,7 @@ class Journal:
         OSError
             If it cannot be read.
         """
-        data = read_bytes(run, name_of(number))
+        data = read_bytes(run, name_of(number), _SIZE_BYTES_MAX)
         try:
             return cls()._over(frames(data), after)
         except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
@@ -129,14 +140,20 @@ class Journal:
         tables: dict[int, tuple[str, pa.Schema]] = {}
         for frame in found:
             if frame.payload is None or (frame.kind == ROWS and frame.table not in tables):
+                # Behind a damaged commit are only rows of one that was still being written.
+                first = not self._broken_bytes
                 self._broken_bytes += frame.end - frame.start
+                if first and frame.kind == COMMIT:
+                    self._counted = {name: list(batches) for name, batches in self._behind.items()}
+                else:
+                    self._counted = None
             elif frame.kind == TABLE:
                 named, _, layout = bytes(frame.payload).partition(b"\0")
                 tables[frame.table] = named.decode(), pa.ipc.read_schema(pa.py_buffer(layout))
+                check_schema(tables[frame.table][1])
             elif frame.kind == ROWS:
                 name, schema = tables[frame.table]
-                batch = pa.ipc.read_record_batch(pa.py_buffer(frame.payload), schema)
-                self._behind.setdefault(name, []).append(batch)
+                self._behind.setdefault(name, []).append(plain_batch(frame.payload, schema))
             elif frame.kind == COMMIT:
                 self._reach(Commit.of(frame.payload), frame.end)
         if self._broken_bytes:
@@ -159,13 +176,37 @@ class Journal:
 
     def _damaged(self, upto: Commit | None) -> None:
         since, rows = self.commit, dict[str, int]()
-        if since is not None and upto is not None:
-            whole = {name: sum(batch.num_rows for batch in batches) for name, batches in self._behind.items()}
-            lost = {name: n - since.rows.get(name, 0) - whole.get(name, 0) for name, n in upto.rows.items()}
-            rows = {name: n for name, n in lost.items() if n > 0}
-        begin, end = (None if commit is None else (commit.sample, commit.time_s) for commit in (since, upto))
-        self.damages.append(Damage(self._broken_bytes, begin, end, rows))
+        if since is not None and upto is None:
+            self.damages.append(self._end_damaged(since))
+        else:
+            if since is not None and upto is not None:
+                whole = _count(self._behind)
+                lost = {name: n - since.rows.get(name, 0) - whole.get(name, 0) for name, n in upto.rows.items()}
+                rows = {name: n for name, n in lost.items() if n > 0}
+            begin, end = (None if commit is None else (commit.sample, commit.time_s) for commit in (since, upto))
+            self.damages.append(Damage(self._broken_bytes, begin, end, rows))
         self._broken_bytes = 0
+
+    def _end_damaged(self, since: Commit) -> Damage:
+        """What is lost behind the last whole commit: the rows that are whole there, and what the damaged bytes held.
+
+        Where only the commit is damaged, these are all.
+        """
+        known = self._behind if self._counted is None else self._counted
+        begin = since.sample, since.time_s
+        last = [max(batch["sample"].to_numpy()) for batches in known.values() for batch in batches if batch.num_rows]
+        if not last:
+            return Damage(self._broken_bytes, begin, None)
+        end = 1 + int(max(last))
+        first = self.first or since
+        passed = since.sample - first.sample
+        step_s = (since.time_s - first.time_s) / passed if passed else 0.0
+        place = begin, (end, since.time_s + (end - since.sample) * step_s)
+        return Damage(self._broken_bytes, *place, _count(known), at_least=self._counted is None)
+
+
+def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:
+    return {name: sum(batch.num_rows for batch in of) for name, of in batches.items()}
 
 
 def head(tables: Mapping[str, Table], commit: Commit) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -13,6 +14,7 @@ from livebode.records.inside import is_folder
 from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
 from livebode.records.segments.journal import Journal
+from livebode.records.segments.last_commit import last_commit
 from livebode.records.segments.manifest import NAME, Manifest, Segment
 from livebode.records.segments.segment_file import open_segment
 
@@ -48,6 +50,15 @@ def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows
         for table, batches in journals[number].rows.items():
             rows.setdefault(table, []).extend(batches)
     return found.segments, rows
+
+
+def waiting_events(run: Path) -> list[Any]:
+    """Events of an unfinished run, as plain data, that its newest commit holds since they are in no line yet."""
+    try:
+        commit = last_commit(run)
+    except (InputError, OSError):  # `parts` reports it
+        return []
+    return [] if commit is None else list(commit.waiting)
 
 
 def tables(

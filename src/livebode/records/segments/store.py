@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -119,17 +120,20 @@ class Store:
         long = time.monotonic() - self._committed_s >= self.limits.interval_s
         return long or sample - self._committed >= self.limits.interval_samples
 
-    def commit(self, sample: int, time_s: float, states: Mapping[str, bytes]) -> bool:
+    def commit(self, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event] = ()) -> bool:
         """Make everything up to before this sample part of the record, with the states that go on from there.
 
-        Returns whether the disk took it.
+        Events that are `waiting` for a line of their own are in the record until the next commit. Returns whether the
+        disk took it.
         """
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
         try:
             self._settle(self._syncing.done())
             self._log.write(self._events)
-            commit = Commit(sample, time_s, time.time(), self._events.length, dict(states), dict(self._waiting.rows))
+            plain = [asdict(event) for event in waiting]
+            written = self._events.length, dict(states), dict(self._waiting.rows), plain
+            commit = Commit(sample, time_s, time.time(), *written)
             self._journal.append(b"".join([*self._waiting.unwritten(), commit.to_frame()]))
             parts = self._waiting.written()
             full = self._full(sample)
@@ -195,13 +199,19 @@ class Store:
         self._files.callback(self._close_open_journal)
         if found.sealed:
             self._begin_closing()
-        away_s = max(0.0, time.time() - found.commit.unix_s)
+        away_s = time.time() - found.commit.unix_s
+        pause = f"{away_s:.1f} s after it ended there"
+        if away_s < 0:
+            pause = (
+                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back meanwhile, so "
+                "that the length of the pause is not known; check its date and time"
+            )
         self._log.say(
             "record-continued",
             found.commit.sample,
             found.commit.time_s,
-            f"the record goes on at sample {found.commit.sample}, {away_s:.1f} s after it ended there",
-            away_s=away_s,
+            f"the record continues at sample {found.commit.sample}, {pause}",
+            away_s=away_s if away_s >= 0 else None,
             torn_bytes=found.torn_bytes,
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 from livebode.nouns.clock import moment
 from livebode.nouns.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.records import Run
-from livebode.session.event_groups import each_event
+from livebode.records.grouped_events import event_counts
 from livebode.session.reporting.changes import Change, Changes, changes, percent
 from livebode.session.reporting.comparison_verdict import verdict
 from livebode.session.reporting.difference import ALPHA, Compared, Difference, compare
@@ -170,10 +170,7 @@ class Comparison:
         return Section("Parameters and margins", tuple(parts))
 
     def _events(self) -> Section:
-        counts = [
-            Counter(e.kind for event in run.each_event_and_damage() for e in each_event(event))
-            for run in self.found.runs
-        ]
+        counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
         rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
         parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []

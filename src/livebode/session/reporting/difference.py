@@ -226,7 +226,7 @@ def _by_place(run: Run, span: tuple[float, float]) -> dict[tuple[int, bool], Res
     edges = np.linspace(*span, _PLACES + 1)
     means: dict[tuple[int, bool], RunningMean] = {}
     hop = int(run.found.get("hop", run.lines.window))
-    for part in run.batches():
+    for part in run.steady_batches():
         x = part.schedule
         inside = np.isfinite(x) & (x >= span[0]) & (x <= span[1])
         place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _PLACES - 1)

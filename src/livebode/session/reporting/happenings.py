@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from livebode.nouns import Event
 from livebode.nouns.clock import moment
 from livebode.nouns.document import Paragraph, Part, Table
-from livebode.session.event_groups import each_event
+from livebode.records.grouped_events import each_event, event_counts
 from livebode.session.reporting.wording import many
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
@@ -42,11 +42,13 @@ class EventSummary:
         for event in events:
             for one in each_event(event):
                 found._add(one)
+            for kind, count in event_counts(event).items():
+                found.kinds.setdefault(kind, Kind(event, event)).count += count
         return found
 
     def _add(self, event: Event) -> None:
         kind = self.kinds.setdefault(event.kind, Kind(event, event))
-        kind.newest, kind.count = event, kind.count + 1
+        kind.newest = event
         if event.kind not in ALARMS and not event.kind.startswith("record-"):
             return
         self.told += 1

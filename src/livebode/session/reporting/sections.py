@@ -145,6 +145,8 @@ def events(of: Material) -> Section:
     if monitoring.get("baseline"):
         words += f" Baseline {monitoring['baseline']}, judged by {monitoring.get('judged_by', '—')}; false alarms: "
         words += f"{monitoring.get('false_alarms', '—')}."
+        if covariates := monitoring.get("covariates"):
+            words += f" Covariates: {', '.join(covariates)}."
     return Section("Alarms and events", (Paragraph(words), *of.happenings.parts()))
 
 

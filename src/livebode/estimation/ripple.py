@@ -1,0 +1,93 @@
+"""Ripple: torque that repeats with the motor's angle, and what of it a window takes for the machine's response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError, Lines
+
+Floats = NDArray[np.float64]
+
+_MORE = 1.3  # times the amplitude: its error has one size, not that of noise, and the 63 % bound is to hold it
+
+
+@dataclass(frozen=True)
+class RippleOrder:
+    """One order of a ripple that is added to the input and not in the logged one.
+
+    Attributes
+    ----------
+    cycles
+        Per unit of the schedule: 24 a turn of a pulley of 19 mm are 201 a metre.
+    amplitude
+        In the input's unit.
+    """
+
+    cycles: float
+    amplitude: float
+
+    def __post_init__(self) -> None:
+        for name in ("cycles", "amplitude"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InputError(f"ripple: {name} = {getattr(self, name)} is not a positive number")
+
+
+def ripple_power(orders: tuple[RippleOrder, ...], lines: Lines, rate_per_s: Floats) -> Floats:
+    """Largest |D|² of the ripple at each line, D its spectrum over a window, (rows, lines).
+
+    A tone of amplitude T that is d bins beside a line has |D| = T·N/2·sinc(d) there. Where the speed changes within a
+    window, the smallest d counts. NaN rates have none.
+
+    Parameters
+    ----------
+    orders
+        What is known of the ripple.
+    lines
+        The lines, with window and rate.
+    rate_per_s
+        Speeds of the schedule at the window's beginning and end, (2, rows).
+
+    Examples
+    --------
+    >>> lines = Lines.parse("20:60:20", rate_hz=4000, window=400)
+    >>> power = ripple_power((RippleOrder(200.0, 0.1),), lines, np.array([[0.3], [0.3]]))
+    >>> (np.sqrt(power) / 200).round(3)
+    array([[0.  , 0.  , 0.13]])
+    """
+    bins, total = np.asarray(lines.bins), np.zeros((rate_per_s.shape[1], len(lines)))
+    for order in orders:
+        met = np.abs(np.nan_to_num(rate_per_s, nan=np.inf)) * order.cycles / lines.resolution_hz
+        least, most = met.min(axis=0)[:, np.newaxis], met.max(axis=0)[:, np.newaxis]
+        beside = np.maximum(np.maximum(least - bins, bins - most), 0.0)
+        leak = np.where(np.isfinite(beside), np.sinc(np.where(np.isfinite(beside), beside, 0.0)), 0.0)
+        total += (_MORE * order.amplitude * lines.window / 2 * leak) ** 2
+    return total
+
+
+class RippleSpeed:
+    """Speed of the schedule over the first and the second half of each window."""
+
+    def __init__(self, lines: Lines) -> None:
+        self._window, self._rate_hz = lines.window, lines.rate_hz
+        self._past = np.full(lines.window, np.nan)
+
+    def restart(self) -> None:
+        self._past[:] = np.nan
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"past": self._past.copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._past[:] = state["past"]
+
+    def at(self, schedule: Floats, position: NDArray[np.int64]) -> Floats:
+        """Speeds of the windows that end at these positions of the next stretch, per second, (2, rows)."""
+        known = np.concatenate([self._past, schedule])
+        self._past = known[known.size - self._window :]
+        last, half = position + self._window, self._window // 2
+        middle, first = known[last - half], known[last - self._window + 1]
+        late, early = half, self._window - 1 - half
+        return np.stack([(middle - first) / max(early, 1), (known[last] - middle) / late]) * self._rate_hz

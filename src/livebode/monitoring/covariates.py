@@ -1,0 +1,143 @@
+"""Covariates: measured channels, such as a temperature, that the parameters of a healthy machine depend on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.nouns import InputError
+
+Floats = NDArray[np.float64]
+
+COVARIATES_MAX = 4
+_MARGIN = 0.1  # of the learned range, beyond which a value is not known
+_CONSTANT = 1e-6  # of the mean: a smaller range is rounding
+_ALIKE = 0.99  # correlation from which two covariates cannot be told apart
+_PARTS = 5  # of each run, where there are fewer than three runs to compare
+_RUNS_MIN = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Covariates:
+    """How the logarithms of stiffness, load, damping and inertia depend on measured channels, linearly.
+
+    Attributes
+    ----------
+    names
+        Of the channels, (covariates,).
+    mean, low, high
+        Of the learned windows' means, in the channel's unit, (covariates,).
+    slope
+        Change of each logarithm per unit, (4, covariates).
+    covariance
+        Of the slopes' errors, (4, covariates, covariates).
+    """
+
+    names: tuple[str, ...] = ()
+    mean: Floats = field(default_factory=lambda: np.zeros(0))
+    low: Floats = field(default_factory=lambda: np.zeros(0))
+    high: Floats = field(default_factory=lambda: np.zeros(0))
+    slope: Floats = field(default_factory=lambda: np.zeros((4, 0)))
+    covariance: Floats = field(default_factory=lambda: np.zeros((4, 0, 0)))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @classmethod
+    def unknown(cls, names: tuple[str, ...]) -> Covariates:
+        """Of unknown range and without influence.
+
+        >>> Covariates.unknown(("temperature",)).shift(np.array([[300.0]]))
+        array([[0., 0., 0., 0.]])
+        """
+        n, zero = len(names), np.zeros(len(names))
+        return cls(names, zero, zero - np.inf, zero + np.inf, np.zeros((4, n)), np.zeros((4, n, n)))
+
+    @property
+    def half_range(self) -> Floats:
+        """Half of the learned range, (covariates,)."""
+        return np.asarray((self.high - self.low) / 2)
+
+    def shift(self, value: Floats) -> Floats:
+        """Expected change of each logarithm at these values, (windows, covariates) in and (windows, 4) out."""
+        return np.asarray((value - self.mean) @ self.slope.T)
+
+    def known(self, value: Floats) -> NDArray[np.bool_]:
+        """Whether these values, (windows, covariates), are in the learned range or a tenth of it beyond."""
+        margin = 2 * _MARGIN * self.half_range
+        return np.asarray(np.all((value >= self.low - margin) & (value <= self.high + margin), axis=1))
+
+    def uncertainty(self) -> Floats:
+        """Largest standard deviation of `shift` in the learned range, of each logarithm, (4,)."""
+        corners = np.array(list(product(*zip(self.low, self.high)))) - self.mean
+        return np.asarray(np.sqrt(np.einsum("pc,jcd,pd->pj", corners, self.covariance, corners).max(axis=0)))
+
+
+def window_means(data: Floats, begin: NDArray[np.int64], window: int) -> Floats:
+    """Mean of the finite samples of each covariate over windows, NaN where there is none, (windows, covariates).
+
+    >>> window_means(np.array([[1.0, 3.0, np.nan, 5.0, np.nan, np.nan]]), np.array([0, 2, 4]), 2).ravel()
+    array([ 2.,  5., nan])
+    """
+    finite = np.isfinite(data)
+    total = np.cumsum(np.pad(np.where(finite, data, 0.0), ((0, 0), (1, 0))), axis=1)
+    count = np.cumsum(np.pad(finite, ((0, 0), (1, 0))), axis=1)
+    many = count[:, begin + window] - count[:, begin]
+    sums = total[:, begin + window] - total[:, begin]
+    return np.asarray(np.where(many > 0, sums / np.maximum(many, 1), np.nan).T)
+
+
+def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
+    """Covariates with the range of these values of learned windows, (windows, covariates), and no influence yet.
+
+    Raises
+    ------
+    InputError
+        If one has no value or a constant one, or two cannot be told apart.
+    """
+    found = Covariates.unknown(names)
+    if not len(value):
+        raise InputError(
+            f"no window of steady motion has a value of the covariates {', '.join(names)}; check these channels, or "
+            "leave them out of [monitoring] covariates"
+        )
+    low, high = value.min(axis=0), value.max(axis=0)
+    for name, least, most in zip(names, low, high):
+        if most - least <= _CONSTANT * max(abs(least), abs(most)):
+            raise InputError(
+                f"the covariate {name!r} is {least:g} in all runs, so its influence cannot be learned; add runs at "
+                "other values, or leave it out of [monitoring] covariates"
+            )
+    alike = np.abs(np.atleast_2d(np.corrcoef(value.T))) - np.eye(len(names))
+    if alike.max() > _ALIKE:
+        one, other = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
+        raise InputError(
+            f"the covariates {one!r} and {other!r} cannot be told apart in these runs (correlation "
+            f"{alike.max():.3f}); name one of them in [monitoring] covariates"
+        )
+    return Covariates(names, value.mean(axis=0), low, high, found.slope, found.covariance)
+
+
+def parts_of(sizes: list[int]) -> list[NDArray[np.intp]]:
+    """Rows of each part of the learned windows that is left out in turn: a run, or a fifth of one.
+
+    What a run has of its own, such as its friction, is common to its windows; so the spread between runs tells how
+    well a slope is known. Fewer than three runs are cut into parts, which takes them as free of it.
+    """
+    edges = np.concatenate([[0], np.cumsum(sizes)])
+    runs = [np.arange(first, stop) for first, stop in pairwise(edges)]
+    if len(runs) >= _RUNS_MIN:
+        return runs
+    return [part for run in runs for part in np.array_split(run, _PARTS) if part.size]
+
+
+def jackknife(estimates: Floats) -> Floats:
+    """Covariance of an estimate from its values with one part left out each, (parts, unknowns) in.
+
+    Efron and Stein, Ann. Stat. 9, 1981: (n − 1)/n·Σ(θᵢ − θ̄)(θᵢ − θ̄)ᵀ, biased upwards if at all.
+    """
+    rest = estimates - estimates.mean(axis=0)
+    return np.asarray((len(rest) - 1) / len(rest) * rest.T @ rest)

@@ -1,0 +1,115 @@
+"""RunOffset: how far this run is off the baseline along the direction in which healthy runs differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.between_runs import KNOWN, BetweenRuns
+from livebode.monitoring.charts import Charts
+from livebode.monitoring.naming import Segment
+
+Floats = NDArray[np.float64]
+
+_MEMORY = 600  # windows that have an offset in common: a minute of motion, as a recording to learn from
+_PAUSE_S = 60.0  # without judged motion, after which the machine may be at another temperature
+
+
+class RunOffset:
+    """Follows this run's offset, so that only changes within the run, or in another direction, are left.
+
+    The model moves with the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence
+    is projected too: an offset of any size explains what it can of each window. The offset is the mean over the windows
+    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not.
+    An offset beyond those of healthy runs has a chart of its own; where that raises an alarm, the baseline itself is
+    the reference.
+
+    Parameters
+    ----------
+    between
+        What was learned; None: runs do not differ, and evidence stays as it is.
+    held, threshold
+        Of the charts.
+    """
+
+    def __init__(self, between: BetweenRuns | None, held: Accuracy, threshold: float) -> None:
+        self._between, self._held = between, held
+        along = slice(None) if between is None else between.dominant(held.smallest)
+        self._inflation = float(held.inflation[along].max())
+        spread = np.array([0.0 if between is None else between.spread])
+        self.chart = Charts(4 * spread, 2 * spread, threshold)
+        """Of the offset itself."""
+        self._sums = np.zeros(2)  # score and information along the direction
+        self._queue = np.zeros((0, 3))  # mark, score, information of windows that may belong to a change
+        self._fixed = False
+        self._last_s = -np.inf
+        self.replayed = np.zeros(held.smallest.size)
+        """Offset of the logarithms that the model was driven with in this stretch, (4,)."""
+
+    @property
+    def reference(self) -> Floats:
+        """Offset of the logarithms that changes are judged from, (4,): the newest estimate at a stretch's end."""
+        return np.zeros_like(self.replayed) if self._fixed else self.replayed
+
+    @property
+    def known(self) -> bool:
+        """Whether the offset is known well enough for evidence along it to count."""
+        return self._between is None or self._fixed or bool(self._sums[1] * KNOWN**2 > self._inflation)
+
+    def within_run(self, direction: int) -> bool:
+        """Whether changes of this direction are from what the run was before, not from the baseline."""
+        between = self._between
+        return between is not None and not self._fixed and bool(between.dominant(self._held.smallest)[direction])
+
+    def judged(self, score: Floats, information: Floats) -> tuple[Floats, Floats]:
+        """Evidence of windows around the reference, with an offset allowed for that is not known, (rows, 4 …)."""
+        if self._between is None or self.known:
+            return score, information
+        return self._between.projected(score, information, self._held.smallest)
+
+    def segment(self, segment: Segment) -> Segment:
+        """The same of a segment."""
+        return Segment(*self.judged(segment.score, segment.information), segment.position_m)
+
+    def step(self, score: Floats, information: Floats, mark: int, time_s: float) -> None:
+        """Take a window in which nothing is alarmed: evidence around the baseline, (4,), (4, 4)."""
+        if self._between is None:
+            return
+        if time_s - self._last_s > _PAUSE_S:
+            self._sums, self._queue = np.zeros(2), np.zeros((0, 3))
+        self._last_s = time_s
+        direction = self._between.direction
+        along, own = float(score @ direction), float(direction @ information @ direction)
+        self._queue = np.vstack([self._queue, [mark, along, own]])[-_MEMORY:]
+        self.chart.step(np.array([along]) / self._inflation, np.array([own]) / self._inflation, mark)
+
+    def fix(self) -> None:
+        """From now on the baseline itself is the reference, for the offset is beyond those of healthy runs."""
+        self._fixed = True
+
+    def settle(self, oldest: int, idle: bool) -> None:
+        """At a stretch's end: windows before the mark `oldest` belong to the run; not `idle`, a change is in them."""
+        if not idle:
+            self._queue = self._queue[:0]
+            return
+        self._fixed = False
+        enter = self._queue[:, 0] < oldest
+        for _, score, information in self._queue[enter]:
+            self._sums = (1 - 1 / _MEMORY) * self._sums + (score, information)
+        self._queue = self._queue[~enter]
+        if self._between is not None:
+            self.replayed = self._between.direction * self._sums[0] / (self._sums[1] + self._between.spread**-2)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        chart = {f"chart.{name}": array for name, array in self.chart.state().items()}
+        numbers = np.array([*self._sums, self._fixed, self._last_s])
+        return chart | {"queue": self._queue, "numbers": numbers, "replayed": self.replayed}
+
+    def load(self, state: dict[str, NDArray[Any]]) -> None:
+        self.chart.load({name.removeprefix("chart."): v for name, v in state.items() if name.startswith("chart.")})
+        self._queue, self.replayed = np.array(state["queue"]), np.array(state["replayed"])
+        self._sums, self._fixed = np.array(state["numbers"][:2]), bool(state["numbers"][2])
+        self._last_s = float(state["numbers"][3])

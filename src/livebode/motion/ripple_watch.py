@@ -1,0 +1,99 @@
+"""Ripple in what a model leaves of an axis's strokes: its orders, their size, and what they add to the bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import RippleOrder, RippleSpeed, Settings, ripple_power
+from livebode.fitting import two_masses
+from livebode.motion.chunk import Chunk
+from livebode.motion.model import MovingModel
+from livebode.motion.orders import OrderSpectrum, shaft_position
+from livebode.motion.steady import steady_rows
+
+Floats = NDArray[np.float64]
+
+_SLOWER = 0.5  # of the first stroke's speed: how slow a later one may be
+_GRID = 64  # frequencies at which the model's gain is computed
+
+
+class RippleWatch:
+    """Orders of a ripple that the settings name, or that the strokes so far show (`OrderSpectrum`).
+
+    Five strokes whose order does not meet a line are needed to find it. Delay: what is found counts from the chunk in
+    which it is found. A ripple that meets a line in every stroke is not found; name it in the settings then.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._spectrum: OrderSpectrum | None = None
+        self._made_for = np.zeros(2)  # way and slowest speed
+        self.orders = settings.ripple
+        """As they are known."""
+
+    def take(self, residual: Floats, chunk: Chunk, model: MovingModel) -> None:
+        """What a model leaves of a chunk, (samples,)."""
+        if self._settings.ripple:
+            return
+        strokes = list(self._strokes(residual, chunk))
+        if not strokes:
+            return
+        slowest = min(abs(x[-1] - x[0]) * chunk.rate_hz / (x.size - 1) for _, x in strokes)
+        spectrum = self._spectrum or self._make(np.array([model.high_m - model.low_m, _SLOWER * slowest]))
+        for rest, position_m in strokes:
+            spectrum.add(rest, position_m, _Gain(model, float(position_m.mean()), self._settings))
+        found = spectrum.found()
+        sizes = spectrum.amplitudes(found)
+        self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in zip(found, sizes) if a > 0)
+
+    def power(self, chunk: Chunk, sample: NDArray[np.int64]) -> Floats:
+        """Of the ripple at the lines of windows that end at these samples, (rows, lines)."""
+        speed = RippleSpeed(self._settings.lines).at(chunk.x, sample - chunk.start)
+        return ripple_power(self.orders, self._settings.lines, speed)
+
+    def _make(self, made_for: Floats) -> OrderSpectrum:
+        self._made_for = made_for
+        self._spectrum = OrderSpectrum(self._settings.lines, float(made_for[0]), float(made_for[1]))
+        return self._spectrum
+
+    def _strokes(self, residual: Floats, chunk: Chunk) -> Iterator[tuple[Floats, Floats]]:
+        """Residual and shaft's position of steady windows in a row."""
+        window = self._settings.lines.window
+        newest = np.arange(chunk.first + window - 1, chunk.stop, window)
+        begin = newest - chunk.start - window + 1
+        whole = np.array([np.isfinite(residual[b : b + window]).all() for b in begin], dtype=np.bool_)
+        steady = np.flatnonzero(steady_rows(newest, chunk, window) & whole)
+        if not steady.size:
+            return
+        shaft_m = shaft_position(chunk.x, chunk.y, window, chunk.rate_hz)
+        for piece in np.split(steady, np.flatnonzero(np.diff(steady) > 1) + 1):
+            cut = slice(int(begin[piece[0]]), int(begin[piece[-1]]) + window)
+            yield residual[cut], shaft_m[cut]
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        orders = np.array([[order.cycles, order.amplitude] for order in self.orders]).reshape(-1, 2)
+        spectrum = {} if self._spectrum is None else self._spectrum.state()
+        return spectrum | {"orders": orders, "made for": self._made_for}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in state["orders"])
+        self._spectrum = None
+        if "_sum" in state:
+            self._make(np.array(state["made for"], dtype=np.float64)).load(state)
+
+
+class _Gain:
+    """|G| of a model held at a position, interpolated between frequencies."""
+
+    def __init__(self, model: MovingModel, position_m: float, settings: Settings) -> None:
+        rate_hz = settings.lines.rate_hz
+        highest = 2 * float(settings.lines.frequency_hz[-1])
+        self._at = np.linspace(highest / _GRID, highest, _GRID)
+        z = np.exp(2j * np.pi * self._at / rate_hz)
+        self._gain = np.abs(two_masses.sampled(model.parameters(np.array([position_m])), z, rate_hz))[0]
+
+    def __call__(self, frequency_hz: Floats) -> Floats:
+        return np.asarray(np.interp(frequency_hz, self._at, self._gain))

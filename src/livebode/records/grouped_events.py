@@ -1,0 +1,109 @@
+"""How the events of one cause are written in one line of events.jsonl, and read back one by one or counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from livebode.nouns import Event
+
+_FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}
+
+
+def each_event(event: Event) -> Iterator[Event]:
+    """Every event that a recorded one reports, as it was before it was grouped, in the order in which they happened.
+
+    Those of a flood that were only counted are not among them: see `event_counts`.
+    """
+    repeats = _repeats(event)
+    if not repeats:
+        yield replace(event, details={name: event.details[name] for name in event.details.keys() - _FIELDS})
+    yield from repeats
+
+
+def event_counts(event: Event) -> Counter[str]:
+    """How many events of each kind a recorded one reports, with those that were only counted.
+
+    >>> line = Event("gap", 9, 0.9, "a gap", {"repeats": [["gap", 8, 0.8, "", {}], ["loss", 9, 0.9, "", {}]],
+    ...                                       "counted": {"gap": 40}})
+    >>> sorted(event_counts(line).items())
+    [('gap', 41), ('loss', 1)]
+    """
+    counts, counted = Counter(one.kind for one in each_event(event)), event.details.get("counted")
+    if isinstance(counted, dict):
+        counts.update({str(kind): number for kind, number in counted.items() if type(number) is int and number > 0})
+    return counts
+
+
+def _repeats(event: Event) -> list[Event]:
+    """Those in the event's details; none where they are not what a run writes, for a record may come from anybody."""
+    repeats = event.details.get("repeats")
+    try:
+        found = [Event(*repeat) for repeat in repeats] if isinstance(repeats, list) else []
+    except TypeError:
+        return []
+    shape: tuple[type | tuple[type, ...], ...] = (str, int, (int, float), str, dict)
+    plain = all(isinstance(value, kind) for one in found for value, kind in zip(vars(one).values(), shape))
+    return found if plain else []
+
+
+def group_of(event: Event) -> tuple[str, int] | None:
+    """Name of the group that an event belongs to, and how many events the group had with it; None without a group."""
+    name, count = event.details.get("group"), event.details.get("count")
+    return (name, count) if isinstance(name, str) and type(count) is int else None
+
+
+def still_waiting(events: Iterable[Event], waiting: Iterable[Event]) -> Iterator[Event]:
+    """These events, and behind them those of `waiting` that no line of their group reports yet."""
+    reported: dict[str, int] = {}
+    for event in events:
+        if (group := group_of(event)) is not None:
+            reported[group[0]] = group[1]
+        yield event
+    for event in waiting:
+        if (group := group_of(event)) is not None and group[1] > reported.get(group[0], 0):
+            yield event
+
+
+@dataclass
+class EventRow:
+    """The events of one kind in one group, or a single event without one.
+
+    Attributes
+    ----------
+    newest
+        The newest of them, or the newest line that reports it.
+    count
+        How many they are.
+    first_s, last_s
+        Times of the first and of the newest.
+    """
+
+    newest: Event
+    count: int
+    first_s: float
+    last_s: float
+
+
+def event_rows(events: Iterable[Event]) -> list[EventRow]:
+    """One row for each kind of event in a group, and for each event without a group, in the order of their first."""
+    rows: list[EventRow] = []
+    of: dict[tuple[str, str], EventRow] = {}
+    for event in events:
+        group = group_of(event)
+        if group is None:
+            rows.append(EventRow(event, 1, event.time_s, event.time_s))
+            continue
+        known = {one.kind: one for one in each_event(event)}
+        for kind, count in event_counts(event).items():
+            newest = known.get(kind, event)
+            row = of.get((group[0], kind))
+            if row is None:
+                first_s = next((one.time_s for one in each_event(event) if one.kind == kind), newest.time_s)
+                row = of[group[0], kind] = EventRow(newest, 0, first_s, newest.time_s)
+                rows.append(row)
+            fields = {name: event.details[name] for name in ("group", "count") if name in event.details}
+            row.newest = replace(newest, details=newest.details | fields)
+            row.count, row.last_s = row.count + count, newest.time_s
+    return rows

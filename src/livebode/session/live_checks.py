@@ -1,0 +1,128 @@
+"""What a live run finds out about its signals as they come: doubtful roles, a transient at the start, phase slips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.estimation import Settings
+from livebode.nouns import Block, Event
+from livebode.session.aligned import SlipSearch, bridged
+from livebode.session.role_spectra import role_spectra
+from livebode.session.roles import ROLES, suspicions
+from livebode.session.transients import transient_event, transient_periods
+
+_WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # of a stretch that is judged, whichever is longer
+_EXCITED_MIN = 16  # windows of it with power, so that noise is told from an answer
+_SLIP_PERIODS = 32  # that are searched at a time
+
+
+class LiveChecks:
+    """Judges stretches of the signals until one is excited, and searches the excitation for slips all the time.
+
+    Nothing is stopped or altered: what is found is an event.
+
+    Parameters
+    ----------
+    settings
+        Of the follower.
+    channels
+        Those of the Blocks that are used.
+    roles, transient
+        Whether the roles are judged, and whether the run may begin with a transient.
+    """
+
+    def __init__(self, settings: Settings, channels: list[str], *, roles: bool, transient: bool) -> None:
+        self._settings, self._channels = settings, channels
+        self._roles, self._transient = roles, transient
+        lines = settings.lines
+        self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
+        self._stretch = _Stretch()
+        self._reference = settings.excitation if settings.method.reference == "excitation" else None
+        self._slips = SlipSearch(lines.window)
+        self._searched = _Stretch()
+
+    def over(self, blocks: Iterable[Block], say: Callable[[Event], None]) -> Iterator[Block]:
+        """The same Blocks; what they show is said before the next one is asked for."""
+        for block in blocks:
+            yield block
+            for event in self.take(block):
+                say(event)
+
+    def take(self, block: Block) -> Iterator[Event]:
+        """What shows with this Block."""
+        if not len(block):
+            return
+        if self._roles or self._transient:
+            self._stretch.add(block, self._channels, self._size)
+            if self._stretch.samples >= self._size:
+                yield from self._judged(block)
+        if self._reference is not None:
+            yield from self._slipped(block, self._reference)
+
+    def _judged(self, block: Block) -> Iterator[Event]:
+        stretch, settings, self._stretch = self._stretch, self._settings, _Stretch()
+        signals = dict(zip(self._channels, stretch.data))
+        by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
+        spectra = role_spectra(by_role, settings)
+        if spectra is None or spectra.windows < _EXCITED_MIN:
+            return  # nothing is excited yet, so that the next stretch is judged
+        if self._roles:
+            for one in suspicions(by_role, settings):
+                yield Event("roles-doubtful", stretch.start, _time_s(block, stretch.start), one.message)
+        if self._transient and (periods := transient_periods(signals, settings)):
+            yield transient_event(periods, settings, first=stretch.start, time_s=_time_s(block, stretch.start))
+        self._roles = self._transient = False
+
+    def _slipped(self, block: Block, name: str) -> Iterator[Event]:
+        found, size = self._searched, _SLIP_PERIODS * self._settings.lines.window
+        if found.broken_by(block):
+            self._slips, found = SlipSearch(self._settings.lines.window), _Stretch()
+            self._searched = found
+        found.add(block, [name], 2 * size)
+        if found.samples < size:
+            return
+        if self._slips.begins_at is None:
+            self._slips.begins_at = found.start
+        self._searched = _Stretch()
+        for slip in self._slips.take(bridged(found.data[0])):
+            many = f"{abs(slip.missing)} sample{'s' * (abs(slip.missing) > 1)}"
+            message = (
+                f"the phase of {name!r} leaps at sample {slip.sample}: {many} "
+                f"{'missing' if slip.missing > 0 else 'repeated'} without a gap in the source's numbers, so that the "
+                "responses of the windows around it are wrong; let the sender number its samples"
+            )
+            details = {"missing_samples": slip.missing}
+            yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
+
+
+class _Stretch:
+    """Samples that follow each other, NaN where some are missing."""
+
+    def __init__(self) -> None:
+        self.start = self.samples = 0
+        self._parts: list[NDArray[np.float64]] = []
+
+    @property
+    def data(self) -> NDArray[np.float64]:
+        return np.concatenate(self._parts, axis=1)
+
+    def broken_by(self, block: Block) -> bool:
+        """Whether samples are missing before this Block, and their number is not known."""
+        return bool(self._parts) and block.gap and block.start <= self.start + self.samples
+
+    def add(self, block: Block, channels: list[str], samples_max: int) -> None:
+        """Append, or begin again behind a loss that is too long, or of unknown length."""
+        missing = block.start - self.start - self.samples
+        if not self._parts or self.broken_by(block) or not 0 <= missing <= samples_max:
+            self.start, self.samples, self._parts, missing = block.start, 0, [], 0
+        if missing:
+            self._parts.append(np.full((len(channels), missing), np.nan))
+        self._parts.append(np.array([block[name] for name in channels]))
+        self.samples += missing + len(block)
+
+
+def _time_s(block: Block, sample: int) -> float:
+    return block.origin_s + sample / block.rate_hz

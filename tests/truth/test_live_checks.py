@@ -1,0 +1,117 @@
+"""A live run names swapped channels, a transient at its start and slips of the excitation, and goes on all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.estimation import Settings
+from livebode.excitation import multisine
+from livebode.nouns import Block, Channel, Event, Lines
+from livebode.records import Run
+from livebode.session.averaged import averaged
+from livebode.session.live_checks import LiveChecks
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
+from livebode.sources.live import Batch, encode_layout
+from tests.live_session import LiveSession
+from tests.peers.peer import until
+from tests.peers.plain import TcpPeer
+
+RATE_HZ, WINDOW = 4000.0, 400
+LINES = Lines.parse("20:140:10", RATE_HZ, WINDOW)
+NAMES = ("w", "u", "velocity")
+SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w")
+
+
+@pytest.fixture(scope="module")
+def recorded() -> np.ndarray:
+    """w, u, y of 14 s of an axis."""
+    axis = BeltAxis(sensor=Sensor(noise_rad_per_s=0.1), excitation_n_m=multisine(LINES, 1.0), seconds=16.0)
+    block = SimulatedAxis(axis).run()[0]
+    return np.array([block[name][20 * WINDOW :] for name in NAMES])  # behind its own transient
+
+
+def blocks(data: np.ndarray, size: int = 150, gaps: tuple[int, ...] = ()) -> Iterator[Block]:
+    edges = sorted({*range(0, data.shape[1], size), *gaps, data.shape[1]})
+    for start, stop in pairwise(edges):
+        yield Block(data[:, start:stop], NAMES, RATE_HZ, start=start, gap=start in gaps)
+
+
+def found(data: np.ndarray, settings: Settings = SETTINGS, gaps: tuple[int, ...] = (), **how: bool) -> list[Event]:
+    checks = LiveChecks(settings, list(NAMES), **({"roles": True, "transient": True} | how))
+    events: list[Event] = []
+    passed = sum(len(block) for block in checks.over(blocks(data, gaps=gaps), events.append))
+    assert passed == data.shape[1]
+    return events
+
+
+def test_right_roles_and_a_steady_start_say_nothing(recorded: np.ndarray) -> None:
+    assert found(recorded) == []
+
+
+def test_swapped_channels_are_named_once_the_machine_is_excited(recorded: np.ndarray) -> None:
+    swapped = Settings(lines=LINES, output="u", input="velocity", excitation="w")
+    silent = 1e-9 * np.random.default_rng(1).standard_normal((3, 50_000))
+    silent[0] = 0.0
+    for data in (recorded, np.hstack([silent, recorded, recorded])):
+        events = found(data, swapped, transient=False)
+        assert [event.kind for event in events if event.kind == "roles-doubtful"] == ["roles-doubtful"]
+        assert "look exchanged" in events[0].message
+    assert found(recorded, swapped, roles=False, transient=False) == []
+
+
+def test_a_transient_at_the_start_is_left_out(recorded: np.ndarray) -> None:
+    data = recorded.copy()
+    data[2, : 3 * WINDOW] += 50 * np.exp(-np.arange(3 * WINDOW) / WINDOW)
+    (event,) = found(data)
+    assert (event.kind, event.sample) == ("transient", 0)
+    assert 3 <= event.details["periods"] <= 4  # where it ends, the level of the next period is another one
+    assert found(data, transient=False) == []
+
+
+@pytest.mark.parametrize("missing", [-7, 1, 60])
+def test_a_slip_that_no_number_tells_is_named(recorded: np.ndarray, missing: int) -> None:
+    at = 21_234
+    slipped = np.hstack([recorded[:, :at], recorded[:, at + missing :]])
+    events = [event for event in found(slipped, roles=False, transient=False) if event.kind == "phase-slip"]
+    assert [event.details["missing_samples"] for event in events] == [missing]
+    assert abs(events[0].sample - at) <= WINDOW
+
+
+def test_a_loss_that_is_known_is_no_slip(recorded: np.ndarray) -> None:
+    """Where a sender began again, and nobody knows how many samples are missing."""
+    at = 21_234
+    slipped = np.hstack([recorded[:, :at], recorded[:, at + 60 :]])
+    assert found(slipped, gaps=(at,), roles=False, transient=False) == []
+
+
+def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, recorded: np.ndarray) -> None:
+    class Machine(TcpPeer):
+        layout = encode_layout(tuple(map(Channel, NAMES)), RATE_HZ, epoch=3)
+
+    data = recorded.copy()
+    data[1:, : 3 * WINDOW] *= 30.0
+    signals = {"excitation": "w", "input": "velocity", "output": "u"}  # exchanged
+    with (
+        Machine(tmp_path) as peer,
+        LiveSession(
+            tmp_path, peer, signals=signals, tracking={}, lines={"frequencies": "20:140:10", "window": WINDOW}
+        ) as session,
+    ):
+        peer.wait_ready()
+        for at in range(0, data.shape[1], 500):
+            channels = tuple(map(Channel, NAMES))
+            peer.send(Batch(at, data[:, at : at + 500].copy(), channels, RATE_HZ, 3))
+        until(lambda: {"roles-doubtful", "transient"} <= {e.kind for e in session.events()}, "both to be recorded")
+    assert {"roles-doubtful", "transient"} <= {event.kind for event in session.told}
+    run = Run.open(session.run)
+    assert run.summary["counts"]["samples"] == data.shape[1]
+    left_out = run.summary["left_out_samples"]
+    assert 3 * WINDOW <= left_out <= 4 * WINDOW
+    responses = run.responses()
+    steady = responses[np.flatnonzero(responses.first >= left_out)]
+    assert averaged(run).count == len(steady) < len(responses)

@@ -1,0 +1,114 @@
+"""Runs that differ from each other without a sensor for the reason: what is still seen, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from livebode.monitoring import Machine
+from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.between_runs import BetweenRuns, between_runs
+from livebode.monitoring.evidence import JUDGED, Evidence
+from livebode.monitoring.run_offset import RunOffset
+from livebode.nouns import Event
+from livebode.simulation import TensionLoss
+from studies.temperature import at_temperature, judged
+from tests.monitored import ideal
+
+SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
+BELT = BetweenRuns(np.array([-0.005, 0.0, 0.0, 0.0]), spread=2.0)
+
+
+def without_sensor() -> Machine:
+    """The axis as it is, as learned from runs whose stiffness scatters by 1 %."""
+    return replace(ideal(), between=BELT)
+
+
+def changes(events: list[Event]) -> list[str]:
+    return [str(event.details["what"]) for event in events if event.kind == "change"]
+
+
+def windows(generator: np.random.Generator, offset: np.ndarray, count: int = 240) -> Evidence:
+    """Evidence of a machine that is off its baseline by so much."""
+    root = generator.standard_normal((count, 4, 8)) * (2.0 / SMALLEST)[:, np.newaxis]
+    information = root @ root.swapaxes(1, 2) / 8
+    noise = np.einsum("rjk,rk->rj", np.linalg.cholesky(information), generator.standard_normal((count, 4)))
+    none = np.zeros((count, 0))
+    return Evidence(
+        score=information @ offset + noise, information=information, power=none, quiet_power=none,
+        position_m=np.zeros(count), speed_m_per_s=np.ones(count), time_s=np.arange(count) / 10,
+        sample=np.arange(count), status=np.full(count, JUDGED), late_score=np.zeros(count),
+        late_information=np.zeros((count, 5)), ripple_score=none, ripple_information=np.zeros((count, 0, 0)),
+        ripple_gain=np.zeros((count, 0, 1)), covariate=none,
+    )  # fmt: skip
+
+
+def test_the_direction_in_which_runs_differ_is_found_with_its_spread() -> None:
+    generator = np.random.default_rng(1)
+    direction = np.array([0.005, 0.001, 0.0, 0.0])
+    parts = [windows(generator, amount * direction) for amount in generator.normal(0.0, 1.5, 8)]
+    found = between_runs(parts, SMALLEST)
+    assert found is not None
+    assert found.direction / found.direction[0] * 0.005 == pytest.approx(direction, abs=4e-4)
+    assert found.spread == pytest.approx(1.5, rel=0.5)
+
+
+@pytest.mark.parametrize(("runs", "size"), [(5, 0.0), (5, 0.15), (1, 3.0)])
+def test_runs_that_do_not_differ_or_hardly_have_none(runs: int, size: float) -> None:
+    """Of 30 baselines of healthy runs; by chance one in 10,000 would have one."""
+    generator = np.random.default_rng(2)
+    for _ in range(30):
+        offsets = size * SMALLEST * np.array([1, 0, 0, 0]) * generator.uniform(-1.7, 1.7, (runs, 1))
+        assert between_runs([windows(generator, offset, 72) for offset in offsets], SMALLEST) is None
+
+
+def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_others() -> None:
+    seen = windows(np.random.default_rng(3), np.array([0.02, 0.0, 0.0, 0.03]), 2000)
+    between = BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.0)
+    score, information = between.projected(seen.score, seen.information, SMALLEST)
+    assert not score[:, 0].any()
+    assert not information[:, 0].any()
+    free = np.linalg.inv(np.linalg.inv(seen.information)[:, 1:, 1:])
+    assert information[:, 1:, 1:] == pytest.approx(free)
+    found = np.linalg.solve(information[:, 1:, 1:].sum(axis=0), score[:, 1:].sum(axis=0))
+    assert found == pytest.approx([0.0, 0.0, 0.03], abs=2e-3)
+
+
+def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
+    held = Accuracy(np.ones(4), np.zeros(4), SMALLEST)
+    own, information = RunOffset(BELT, held, 20.0), np.diag(60.0 / SMALLEST**2)
+    for mark in range(30):
+        assert own.known == (mark >= 2)
+        own.step(information @ (1.2 * BELT.direction), information, mark, mark / 10)
+        own.settle(mark + 1, idle=True)
+    assert own.reference == pytest.approx(1.2 * BELT.direction, rel=1e-2)
+    own.step(information @ BELT.direction, information, 31, 3.0 + 61.0)
+    assert not own.known
+
+
+def test_a_healthy_run_at_another_temperature_raises_no_alarm_nor_does_what_temperature_explains() -> None:
+    assert judged(without_sensor(), at_temperature(4.0, 20_000, seconds=6.0)()) == []
+    lost = at_temperature(-1.0, 20_000, TensionLoss(loss=0.01), seconds=6.0)
+    assert judged(without_sensor(), lost()) == [], "a belt 5 K warmer is the same"
+
+
+def test_a_stiffness_lost_within_the_run_is_found_and_dated() -> None:
+    events = judged(without_sensor(), at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=8.0)())
+    assert changes(events) == ["stiffness"]
+    assert events[0].details["since_s"] == pytest.approx(5.0, abs=0.3)
+    assert events[0].message.endswith("than before in this run.")
+
+
+def test_a_loss_of_inertia_from_the_beginning_is_found_whatever_the_temperature() -> None:
+    events = judged(without_sensor(), at_temperature(4.0, 20_000, inertia=0.98, seconds=6.0)())
+    assert changes(events) == ["inertia"]
+    assert events[0].details["amount_percent"] == pytest.approx(-2.0, abs=0.5)
+
+
+def test_a_stiffness_beyond_that_of_any_healthy_run_is_found_from_the_beginning() -> None:
+    events = judged(without_sensor(), at_temperature(0.0, 20_000, TensionLoss(loss=0.05), seconds=6.0)())
+    assert changes(events) == ["stiffness"]
+    assert events[0].details["amount_percent"] == pytest.approx(-5.0, abs=0.5)
+    assert events[0].message.endswith("than in the baseline.")
