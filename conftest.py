@@ -1,8 +1,15 @@
-"""One thread of linear algebra for each test process, whose neighbours have the other cores.
+"""How the tests share a machine.
 
-Threads of small products wait for each other, and keep a core busy while they do. What is set already is kept.
+One thread of linear algebra for each test process, whose neighbours have the other cores: threads of small products
+wait for each other, and keep a core busy while they do. What is set already is kept. One process more than there are
+cores, because many tests wait for something: a machine that sends at its pace, a browser, a process that starts.
 """
 
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Of `-n auto`."""
+    return (os.cpu_count() or 1) + 1

@@ -52,27 +52,34 @@ static double spots(const lb_axis_config *c, double at) {
     return factor;
 }
 
-static void two_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
-    const double at = c->frozen ? c->frozen_position_m : s[2];
-    const lb_pulley m = pulley(c, s[0], s[1]);
+/* Stiffness and damping of the whole belt for two masses, of a span of 1 m for three. */
+typedef struct {
+    double k, b;
+} lb_belt;
+
+static lb_belt belt(const lb_axis_config *c, const double *now, double at) {
     const double shape = 1.0 / at + 1.0 / (2.0 * c->pulley_distance_m - at);
-    const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at) * shape;
-    const double b = c->damping_shape * now[LB_AXIS_DAMPING] * sqrt(shape);
+    const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at);
+    const double b = c->damping_shape * now[LB_AXIS_DAMPING];
+    return c->states == 4 ? (lb_belt){k * shape, b * sqrt(shape)} : (lb_belt){k, b / sqrt(shape)};
+}
+
+static void two_masses(const lb_axis_config *c, const double *now, lb_belt whole, double torque, const double *s,
+                       double *d) {
+    const lb_pulley m = pulley(c, s[0], s[1]);
     const lb_play p = play(now[LB_AXIS_GAP], m.travel - s[2], m.speed - s[3]);
-    const double force = k * p.slack + b * p.rate;
+    const double force = whole.k * p.slack + whole.b * p.rate;
     d[0] = s[1];
     d[1] = (torque - m.arm * force) / c->motor_inertia_kg_m2;
     d[2] = s[3];
     d[3] = force;
 }
 
-static void three_masses(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
-    const double r = c->radius_m, at = c->frozen ? c->frozen_position_m : s[4], l3 = c->pulley_distance_m;
+static void three_masses(const lb_axis_config *c, const double *now, lb_belt span, double at, double torque,
+                         const double *s, double *d) {
+    const double r = c->radius_m, l3 = c->pulley_distance_m, k = span.k, b = span.b;
     const lb_pulley m = pulley(c, s[0], s[1]);
     const double s1 = 1.0 / at, s2 = 1.0 / (l3 - at), s3 = 1.0 / l3;
-    const double shape = s1 + 1.0 / (2.0 * l3 - at);
-    const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at);
-    const double b = c->damping_shape * now[LB_AXIS_DAMPING] / sqrt(shape);
     /* The belt where it holds the cart: the cart itself, or within the play where the spans alone would have it. */
     const double free = (s1 * m.travel + s2 * (r * s[2])) / (s1 + s2);
     const double free_rate = (s1 * m.speed + s2 * (r * s[3])) / (s1 + s2);
@@ -90,29 +97,38 @@ static void three_masses(const lb_axis_config *c, const double *now, double torq
     d[5] = f1 - f2;
 }
 
-void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+/* Time derivative with the belt as it is at the cart, or, where the spans are frozen, as `frozen` has it. */
+static inline void derivative(const lb_axis_config *c, const double *now, const lb_belt *frozen, double torque,
+                              const double *s, double *d) {
     const double omega = s[1], v = s[c->states - 1], vs = c->stribeck_speed_m_per_s, w = c->smoothing_m_per_s;
-    const double share = now[LB_AXIS_FRICTION];
+    const double share = now[LB_AXIS_FRICTION], at = c->frozen ? c->frozen_position_m : s[c->states - 2];
+    const lb_belt here = c->frozen ? *frozen : belt(c, now, at);
     double drive = torque + now[LB_AXIS_DISTURBANCE] -
                    share * (c->motor_viscous_n_m_s * omega +
                             friction(c->motor_coulomb_n_m, c->motor_stribeck_n_m, vs, w, c->radius_m * omega));
     if (c->torque_ripple_n_m != 0.0) drive += c->torque_ripple_n_m * sin(c->torque_ripple_per_turn * s[0]);
     if (c->states == 4)
-        two_masses(c, now, drive, s, d);
+        two_masses(c, now, here, drive, s, d);
     else
-        three_masses(c, now, drive, s, d);
+        three_masses(c, now, here, at, drive, s, d);
     const double resisting =
         share * (c->load_viscous_n_s_per_m * v + friction(c->load_coulomb_n, c->load_stribeck_n, vs, w, v));
     d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
+}
+
+void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+    const lb_belt frozen = c->frozen ? belt(c, now, c->frozen_position_m) : (lb_belt){0.0, 0.0};
+    derivative(c, now, &frozen, torque, s, d);
 }
 
 /* One step of order 8 under constant torque, of n states. */
 static inline void step_of(int n, const lb_axis_config *c, const double *now, double torque, double seconds,
                            double *state) {
     double slope[LB_STAGES][LB_AXIS_STATES], at[LB_AXIS_STATES];
+    const lb_belt frozen = c->frozen ? belt(c, now, c->frozen_position_m) : (lb_belt){0.0, 0.0};
     memcpy(at, state, sizeof at);
     for (int stage = 0; stage < LB_STAGES; ++stage) {
-        lb_axis_derivative(c, now, torque, at, slope[stage]);
+        derivative(c, now, &frozen, torque, at, slope[stage]);
         const lb_combination *mix = &lb_dop853[stage];
         double sum[LB_AXIS_STATES] = {0.0};
         for (int j = 0; j < mix->terms; ++j)

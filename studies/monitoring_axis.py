@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,7 @@ def run(machine: BeltAxis) -> Callable[[], Iterable[Block]]:
 
 
 def healthy_runs(count: int = 4, each: int = 10, seed: int = 5000) -> list[Callable[[], Iterable[Block]]]:
-    """Recordings to learn from."""
+    """Recordings to learn from, simulated once: learning goes through them many times."""
     generator = np.random.default_rng(seed)
-    return [run(axis(strokes(each, generator), seed + i)) for i in range(count)]
+    recorded = [list(run(axis(strokes(each, generator), seed + i))()) for i in range(count)]
+    return [partial(iter, blocks) for blocks in recorded]

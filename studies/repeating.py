@@ -24,6 +24,7 @@ TARGET = (0.60, 0.95)
 POSITION_M, LEAD, PERIODS = 0.8, 4, 16
 LEAD_OF_LOOP = 16_000  # samples until what the noise's beginning moves has died away
 ODD = odd_lines(20, 140, RATE_HZ, 1600, seed=1)  # with a detection line near the resonance
+COARSE = odd_lines(20, 140, RATE_HZ, 800, seed=1)  # detection lines at 45 and 85 Hz, the resonance between them
 GRID = Lines.parse("20:140:20", RATE_HZ, 400)
 ON_MAINS = Lines.of_bins([3, 5, 7, 11, 13], 400, RATE_HZ)  # 50 Hz is one of the lines
 FROZEN = Mechanics(frozen_position_m=POSITION_M)
@@ -70,6 +71,7 @@ QUIET = {"noise": "quiet"}
 CASES = (
     *(simulated(f"encoder of {n} bits", sensor=Sensor(encoder_counts_per_turn=2**n)) for n in (12, 14, 16, 18, 20)),
     simulated("backlash of 10 µm", faults=(Backlash(gap_m=1e-5),)),
+    replace(simulated("backlash of 10 µm, N = 800", faults=(Backlash(gap_m=1e-5),)), lines=COARSE),
     simulated("Coulomb friction of 2 N", friction=Friction(load_coulomb_n=2.0)),
     simulated("Coulomb friction of 15 N", friction=Friction(load_coulomb_n=15.0)),
     simulated("Coulomb friction of the motor", friction=Friction(motor_coulomb_n_m=0.04)),

@@ -21,24 +21,18 @@ from typing import Self
 from tests.peers.certificates import Authority
 from tests.peers.machine import Machine
 from tests.peers.peer import until
+from tests.small_axis import SMALL_AXIS
 
 TOKEN = "owner-" + "x" * 40
 _HEAD = "HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\n"
-AXIS = """
-[signals]
-excitation = "w"
-input = "u"
-output = "y"
-[lines]
-frequencies = "50,100,200"
-window = 100
-[tracking]
-hop = 20
-[record]
+AXIS = (
+    SMALL_AXIS
+    + """[record]
 segment_s = 1
 [serve]
 port = 0
 """
+)
 
 
 class Attacked:

@@ -16,22 +16,15 @@ from livebode.records import Run
 from tests.command import RATE_HZ
 from tests.peers.machine import CHANNELS, Machine, data
 from tests.peers.peer import PATIENCE_S, until
+from tests.small_axis import WITH_SCHEDULE
 
-SHARED = """
-[signals]
-excitation = "w"
-input = "u"
-output = "y"
-schedule = "n"
-[lines]
-frequencies = "50,100,200"
-window = 100
-[tracking]
-hop = 20
-[record]
+SHARED = (
+    WITH_SCHEDULE
+    + """[record]
 samples = true
 segment_s = 2
 """
+)
 
 
 def source(machine: Machine) -> str:

@@ -181,11 +181,20 @@ def test_the_segments_may_be_cut_otherwise_when_it_goes_on(tmp_path: Path) -> No
     assert len(list((tmp_path / "run" / "responses").iterdir())) == 2
 
 
-@pytest.fixture
-def given(tmp_path: Path) -> tuple[object, ...]:
-    log = write_parquet(tmp_path / "log.parquet", signals(60_000))
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, ...]:
+    """A recording, what is asked of it, and where the run is to go; `whole` beside the recording was never ended."""
+    folder = tmp_path_factory.mktemp("asked")
+    log = write_parquet(folder / "log.parquet", signals(60_000))
     lines = ("--lines", "50,100,200", "--window", 100, "--hop", 10)
-    return (log, "--excitation", "w", "--input", "u", "--output", "y", *lines, "--out", tmp_path / "run", "--continue")
+    asked = (log, "--excitation", "w", "--input", "u", "--output", "y", *lines, "--out")
+    assert livebode("run", *asked, folder / "whole").code == 0
+    return asked
+
+
+@pytest.fixture
+def given(tmp_path: Path, asked: tuple[object, ...]) -> tuple[object, ...]:
+    return (*asked, tmp_path / "run", "--continue")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -211,8 +220,7 @@ def test_the_command_goes_on_where_it_was_ended(
     run = Run.open(tmp_path / "run")
     assert run.responses().sample[-1] > 40_000 - RATE_HZ
     assert livebode("run", *given).code == 0
-    whole = tmp_path / "whole"
-    assert livebode("run", *given[:-2], whole).code == 0
+    whole = Path(str(given[0])).with_name("whole")
     assert same(Run.open(tmp_path / "run").responses(), Run.open(whole).responses())
     assert (tmp_path / "run" / "bode.png").stat().st_size > 10_000
     assert "is finished" in livebode("run", *given).err

@@ -2,82 +2,35 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import json
 import re
-import resource
-import socket
 import ssl
 import subprocess
 import sys
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
-from typing import Any
 
 import pytest
 import websockets
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
-from livebode.dashboard import Dashboard, Serving, patience
+from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access, TooManyTriesError
-from livebode.dashboard.app import SOCKETS_MAX
 from livebode.dashboard.guard import Guard
-from livebode.dashboard.listener import connections_max
-from livebode.dashboard.server import Faults
 from livebode.nouns import Event, InputError
 from livebode.session.axis import Axis, ServeSection
-from tests.browser import Tab, chromium, until
+from tests.browser import Tab, chromium
 from tests.dashboards import Watched
+from tests.guarded import TOKEN, VIEWER, ask, cookie, guarded, login, origin, port_of
 from tests.peers.certificates import Authority
-
-TOKEN, VIEWER = "operator-" + "x" * 40, "viewer-" + "y" * 40
 
 
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
-    """With tokens, on the loopback."""
-    serving = Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
-    with Watched(tmp_path_factory.mktemp("guarded") / "run", serving) as found:
-        found.go(6000)
+    with guarded(tmp_path_factory.mktemp("guarded")) as found:
         yield found
-
-
-def port_of(watched: Watched) -> int:
-    return int(re.search(r":(\d+)/", watched.url).group(1))
-
-
-def ask(
-    watched: Watched, path: str, method: str = "GET", body: Any = None, **headers: str
-) -> tuple[int, dict[str, str], str]:
-    """Status, headers and body; nothing is sent that is not named, but Host."""
-    connection = HTTPConnection("127.0.0.1", port_of(watched), timeout=20)
-    names = {k.replace("_", "-"): v for k, v in headers.items()}
-    data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-    connection.request(method, path, data, names)
-    answer: HTTPResponse = connection.getresponse()
-    found = answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read().decode("utf-8", "replace")
-    connection.close()
-    return found
-
-
-def origin(watched: Watched) -> str:
-    return watched.url.rstrip("/")
-
-
-def login(watched: Watched, token: str) -> tuple[int, str]:
-    status, headers, _ = ask(watched, "/login", "POST", {"token": token}, Origin=origin(watched))
-    return status, headers.get("set-cookie", "")
-
-
-def cookie(watched: Watched, token: str) -> str:
-    status, said = login(watched, token)
-    assert status == 200
-    return said.partition(";")[0]
 
 
 def test_nothing_is_shown_without_a_token(watched: Watched) -> None:
@@ -242,97 +195,6 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
         assert [len(a) == len(b) == 32 for a, b in seen] == [True, True]
 
 
-def closed(live: ClientConnection) -> bool:
-    """Whether the server closes it, within what it has sent."""
-    try:
-        for _ in range(60):
-            live.recv(timeout=3)
-    except websockets.exceptions.ConnectionClosed:
-        return True
-    except TimeoutError:
-        pass
-    return False
-
-
-def answer(live: ClientConnection, word: str) -> Any:
-    """What stands under this word in the next message that has it."""
-    for _ in range(200):
-        message = live.recv(timeout=20)
-        if isinstance(message, str) and word in (said := json.loads(message)):
-            return said[word]
-    raise AssertionError(f"no message said {word!r}")
-
-
-def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
-    url, headers = f"ws://127.0.0.1:{port_of(watched)}/live", {"Cookie": cookie(watched, TOKEN)}
-
-    def opened() -> ClientConnection:
-        return connect(url, origin=origin(watched), additional_headers=headers, ping_interval=None, close_timeout=1)
-
-    with contextlib.ExitStack() as stack:
-        for _ in range(SOCKETS_MAX):
-            stack.enter_context(opened())
-        with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
-            opened()
-    with opened() as live:
-        with contextlib.suppress(websockets.exceptions.ConnectionClosed):
-            for _ in range(200):
-                live.send('{"kind": "pause"}')
-        assert closed(live)
-    with opened() as live:
-        live.send("x" * 100_000)
-        assert closed(live)
-    with opened() as live:  # a message that means nothing is answered, and no more
-        answer(live, "facts")
-        live.send("no json")
-        assert answer(live, "error") == "the message is not JSON"
-        live.send(b"\x00\xff")
-        assert answer(live, "error") == "a message is text, not bytes"
-        live.send('{"kind": "watch"}')
-        answer(live, "facts")
-    assert not [line for line in watched.told if "internal error" in line]
-
-
-def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
-    """A socket that is never read fills up; the machine goes on, another browser sees it, memory stays bounded."""
-    mine = cookie(watched, TOKEN)
-    request = (
-        f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port_of(watched)}\r\nOrigin: {origin(watched)}\r\nCookie: {mine}\r\n"
-        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    )
-    with socket.create_connection(("127.0.0.1", port_of(watched))) as deaf:
-        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-        deaf.sendall(request.encode())
-        with connect(
-            watched.url.replace("http", "ws") + "live", origin=origin(watched), additional_headers={"Cookie": mine}
-        ) as live:
-            live.recv()
-            for samples in range(6200, 10_001, 200):
-                watched.go(samples)
-            seen = 0
-            until(lambda: bool(live.recv(timeout=20)), "news")
-            for _ in range(40):
-                seen += isinstance(live.recv(timeout=20), bytes)
-                if seen > 2:
-                    break
-            assert seen > 2
-    assert watched.hub._values < 1 << 20
-
-
-def test_heads_that_never_end_are_refused(watched: Watched) -> None:
-    with socket.create_connection(("127.0.0.1", port_of(watched))) as long:
-        with contextlib.suppress(OSError):
-            long.sendall(b"GET / HTTP/1.1\r\nX: " + b"x" * 200_000)
-        answer = b""
-        with contextlib.suppress(OSError):
-            while part := long.recv(4096):
-                answer += part
-        assert answer == b"" or b" 400 " in answer.split(b"\r\n")[0] + b" "
-    assert ask(watched, "/?" + "x" * 2000)[0] == 414
-    assert ask(watched, "/login", "POST", b"x" * 10_000, Origin=origin(watched))[0] == 400
-
-
 SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spaces " * 4}
 
 
@@ -416,57 +278,6 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
             urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5)
 
 
-def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """As by a reload of the page: its connection is over before a request would have been due."""
-    authority, told = Authority(tmp_path, "authority"), list[str]()
-    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
-    with Dashboard(Serving("127.0.0.1", 0, tls=tls), told.append) as dashboard:
-        dashboard.hub("axis")
-        url = dashboard.url.replace("https", "wss") + "live"
-        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
-            live.recv()
-        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
-            monkeypatch.setattr(patience, "REQUEST_S", 0.2)  # now: a busy machine may take longer for a handshake
-            time.sleep(1.5)  # the listener has looked at both
-            live.send('{"kind": "pause"}')
-            assert "facts" in json.loads(live.recv())
-    assert told == []
-    assert capfd.readouterr().err == ""
-
-
-def test_a_body_that_does_not_come_is_not_waited_for(
-    watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
-    host = f"127.0.0.1:{port_of(watched)}"
-    head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
-    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
-        slow.sendall(head.encode())
-        assert slow.recv(100) == b""
-    assert "internal error" not in " ".join(watched.told)
-    assert capfd.readouterr().err == ""
-
-
-@pytest.mark.parametrize(("soft", "most"), [(1024, 128), (256, 64), (16, 8), (resource.RLIM_INFINITY, 128)])
-def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.MonkeyPatch, soft: int, most: int) -> None:
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
-    assert connections_max() == most
-
-
-def test_faults_of_the_server_are_told_once_a_minute() -> None:
-    told = list[str]()
-    faults = Faults(told.append)
-    for _ in range(1000):
-        try:
-            raise ValueError("odd")
-        except ValueError as error:
-            faults.take(error)
-    assert len(told) == 1
-    assert "internal error in the dashboard: ValueError('odd') at" in told[0]
-
-
 def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
     with chromium() as browser, Tab(browser, watched.url, wait=False) as tab:
         tab.page.fill("#token", "wrong" * 10)
@@ -506,15 +317,3 @@ def test_read_only_is_for_everybody() -> None:
     assert access.role("", "", "::1") == "viewer"
     access = Access(Serving("127.0.0.1", 0, token=TOKEN, read_only=True), lambda _: None)
     assert access.role("", f"Bearer {TOKEN}", "::1") == "viewer"
-
-
-def test_the_event_loop_is_quiet() -> None:
-    """Starting and stopping leaves no thread and no loop behind."""
-    import threading
-
-    before = {t.name for t in threading.enumerate()}
-    with Dashboard(Serving("127.0.0.1", 0)):
-        pass
-    until(lambda: {t.name for t in threading.enumerate()} <= before, "the threads to end")
-    with pytest.raises(RuntimeError):
-        asyncio.get_running_loop()

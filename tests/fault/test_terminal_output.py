@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.cli.terminal import visible
-from tests.command import signals
+from tests.command import livebode, signals
 
 EVIL = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e"
 SHOWN = r"\u001b[2J\u001b]0;owned\u0007\u009b31m\u202e"
@@ -77,6 +77,13 @@ def test_events_of_a_stored_run_do_not_command_the_terminal(tracked: tuple[Path,
     (tracked[0] / "events.jsonl").write_text(json.dumps(event) + "\n")
     text = on_terminal("query", tracked[0], f"select message, 'x{EVIL}' as x from events")
     assert is_harmless(text)
+
+
+def test_the_help_has_colours_on_a_terminal_and_nowhere_else() -> None:
+    text = on_terminal("query", "--help")
+    assert is_harmless(text)
+    assert "\x1b[1;33mUsage: " in text
+    assert "\x1b" not in livebode("query", "--help").out
 
 
 @given(st.text())

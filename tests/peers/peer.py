@@ -111,10 +111,13 @@ def send_all(peer: Peer, given: Sequence[Batch], pause_s: float = 0.001) -> None
 def until(condition: Callable[[], Any], what: str) -> Any:
     """Waits for something to become true; this bounds a hang, it measures nothing."""
     end = time.monotonic() + PATIENCE_S
-    while not (found := condition()):
+    while True:
+        began = time.monotonic()
+        if found := condition():
+            return found
         assert time.monotonic() < end, f"{what} did not happen within {PATIENCE_S} s"
-        time.sleep(0.01)
-    return found
+        # What costs much is looked at less often: what is waited for needs the processor.
+        time.sleep(min(max(0.01, 3 * (time.monotonic() - began)), 0.2))
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import sys
@@ -36,7 +37,8 @@ class UdpPeer(Peer):
         return True
 
     def send(self, batch: Batch) -> None:
-        self._socket.send(encode_samples(batch, double=True))
+        with contextlib.suppress(ConnectionRefusedError):  # who listened has ended: then a datagram is lost
+            self._socket.send(encode_samples(batch, double=True))
 
     def send_rubbish(self) -> None:
         self._socket.send(b"GET / HTTP/1.1\r\n\r\n" * 10)

@@ -28,7 +28,7 @@ rate_hz = 4000
 """
 
 
-@pytest.mark.parametrize("resolution_hz", [20, 40])
+@pytest.mark.parametrize("resolution_hz", [40, 60])
 def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_predicted(resolution_hz, tmp_path):
     """From rest: switched on at once the following error is several times that of the periodic state."""
     axis = BeltAxis()

@@ -25,19 +25,9 @@ from tests.command import RATE_HZ, livebode, signals, write_parquet
 from tests.live_session import LiveSession
 from tests.peers.peer import PATIENCE_S, batches, free_port, until
 from tests.peers.plain import TcpPeer
+from tests.small_axis import SMALL_AXIS
 
 CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
-REST = """
-[signals]
-excitation = "w"
-input = "u"
-output = "y"
-[lines]
-frequencies = "50,100,200"
-window = 100
-[tracking]
-hop = 20
-"""
 
 
 def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch]:
@@ -48,7 +38,7 @@ def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch
     ]
 
 
-def axis(folder: Path, source: str, rest: str = REST) -> Path:
+def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
     path = folder / "axis.toml"
     path.write_text(f"[source]\n{source}\n{rest}")
     return path
@@ -104,7 +94,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
 
 
 def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
-    path = axis(tmp_path, 'url = "stdin:"', REST.replace("window = 100", ""))
+    path = axis(tmp_path, 'url = "stdin:"', SMALL_AXIS.replace("window = 100", ""))
     process = started(path, tmp_path / "live")
     _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
     assert process.returncode == 2
@@ -152,7 +142,7 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
     _, err = process.communicate(timeout=PATIENCE_S)
     said = err.decode().splitlines()
     assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
-    assert sum("the sender began anew at its sample 0" in line for line in said) == 1
+    assert sum("the sender started again at its sample 0" in line for line in said) == 1
 
 
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):

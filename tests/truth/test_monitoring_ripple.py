@@ -82,8 +82,8 @@ def test_cogging_and_a_delay_are_learned_and_raise_no_alarm() -> None:
     late = Sensor(noise_rad_per_s=0.1, velocity_differenced=True)
     machine_with = Condition("both", drive={"torque_ripple_n_m": 0.05}, sensor=late, delay_samples=1)
     assert {"ripple 0.05 N m", "delay of 1.5 samples"} < set(CONDITIONS)
-    runs = [simulated(machine_with, 9000, strokes=6)]
-    learned = learn_machine(runs, LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
+    blocks = list(simulated(machine_with, 9000, strokes=6)())
+    learned = learn_machine([lambda: blocks], LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
     assert learned.ripple.cycles_per_m == pytest.approx([COGGING_PER_M], abs=0.4)
     assert learned.ripple.amplitude_n_m == pytest.approx([0.05 / np.sqrt(2)], rel=0.2)
     assert learned.delay_s * RATE_HZ == pytest.approx(1.5, abs=0.02)

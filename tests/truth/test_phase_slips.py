@@ -15,6 +15,8 @@ from livebode.excitation.slips import realigned
 from livebode.nouns import Lines
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
+from livebode.session.aligned import AlignedLog
+from livebode.sources import open_log
 from tests.command import livebode, write_parquet
 
 RATE_HZ, WINDOW = 4000.0, 400
@@ -112,6 +114,15 @@ def test_a_run_realigns_what_was_dropped_and_reports_it(tmp_path: Path) -> None:
     assert sum(event.kind == "gap" for event in events) == len(places)
     inspected = json.loads(livebode("inspect", log, "--rate", 4000, "--excitation", "w", "--json").out)
     assert len(inspected["excitation"]["phase_slips"]) == len(places)
+
+
+@pytest.mark.parametrize("missing", [5, -1, -3])
+@pytest.mark.parametrize("at", [4000, 4096, 4097])
+def test_samples_behind_a_leap_do_not_follow_those_before_it(missing: int, at: int, tmp_path: Path) -> None:
+    log = open_log(write_parquet(tmp_path / "log.parquet", recorded(8000)), rate_hz=RATE_HZ)
+    blocks = list(AlignedLog(log, (Slip(at, missing),)).blocks(["w"]))
+    assert [block.start for block in blocks if block.gap and block.start] == [at + max(missing, 0)]
+    assert sum(map(len, blocks)) == 8000 - max(-missing, 0)
 
 
 def test_two_leaps_are_undone_on_the_grid_of_the_first_period() -> None:

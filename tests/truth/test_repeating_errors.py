@@ -22,7 +22,7 @@ def case(name: str) -> Case:
     return next(c for c in CASES if c.name == name)
 
 
-@pytest.mark.parametrize("name", ["encoder of 14 bits", "Coulomb friction of 2 N", "backlash of 10 µm"])
+@pytest.mark.parametrize("name", ["encoder of 14 bits", "Coulomb friction of 2 N", "backlash of 10 µm, N = 800"])
 def test_distortion_is_in_the_bounds_of_windows_averages_and_means(name: str) -> None:
     found = measure(case(name), runs=6)
     print(name, found.coverage, found.reasons)

@@ -15,6 +15,7 @@ from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.nouns import Block, Gain, Lines, Loop
 from livebode.session.plan import beginnings
+from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions
 from livebode.simulation import BeltAxis, Drive, Friction, Sensor, SimulatedAxis, Strokes
 from livebode.sources import open_log
@@ -80,6 +81,18 @@ def test_a_description_of_the_loop_without_its_delay_is_doubted_but_not_refused(
     (found,) = suspected(recorded("delayed"), "indirect", LOOP, **RIGHT)
     assert not found.certain
     assert "contradicts 'u': at 60 Hz" in found.message
+
+
+@pytest.mark.parametrize("missing", [np.nan, np.inf])
+@pytest.mark.parametrize("samples", [1, 250, 400, 3999, 4000])
+def test_a_recording_whose_signals_begin_late_is_looked_at_without_a_warning(missing: float, samples: int) -> None:
+    lines = Lines.parse("20:140:20", 4000.0, 400)
+    w = np.tile(multisine(lines), 10)
+    late = np.where(np.arange(w.size) < samples, missing, w)
+    described = Settings(lines=lines, output="y", input="u", excitation="w")
+    found = role_spectra({"output": late, "input": w, "excitation": late}, described)
+    assert (found is None) == (samples > 3200)
+    assert found is None or found.exact
 
 
 def test_exchanged_signals_of_the_direct_estimator_are_seen_by_their_gain() -> None:

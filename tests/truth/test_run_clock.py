@@ -42,7 +42,7 @@ def taken(delays_s: list[float], pauses_s: dict[int, float] | None = None, ppm: 
     return relation
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.lists(st.floats(0.0, 0.9), min_size=3, max_size=90))
 def test_the_clock_is_that_of_the_least_delayed_samples(delays_s: list[float]) -> None:
     """Also where a backlog of a minute, which a broker kept, comes first."""
@@ -58,9 +58,11 @@ def test_a_pause_of_unknown_length_and_a_rate_that_is_not_exact_are_followed() -
     relation = taken([0.1] * 200, pauses_s={100: 3600.0})
     assert [from_s for from_s, _ in relation.clock.pieces] == [0.0, 10.0]
     assert np.diff([unix_s for _, unix_s in relation.clock.pieces]) == pytest.approx([3600.0], abs=0.01)
-    relation = taken([0.1] * 100_000, ppm=500.0)  # nearly three hours, and 5 s
-    true_s = relation.began_s + 1e4 * (1 + 500e-6)  # type: ignore[attr-defined]
-    assert relation.clock.unix_s(1e4) == pytest.approx(true_s, abs=STEP_S + 0.2)
+    relation = taken([0.1] * 10_000, ppm=5000.0)  # a thousand seconds, and 5 s
+    true_s = relation.began_s + 1e3 * (1 + 5000e-6)  # type: ignore[attr-defined]
+    assert relation.clock.unix_s(1e3) == pytest.approx(
+        true_s, abs=STEP_S + 2 * 60 * 5000e-6
+    )  # it is judged every minute
 
 
 def test_moments_are_clock_time_only_where_the_run_has_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ import warnings
 from typing import Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from livebode.cli.compare_command import compare_command
 from livebode.cli.demo_command import demo_command
@@ -29,33 +30,53 @@ from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
 from livebode.cli.report_command import report_command
 from livebode.cli.run_command import run_command
-from livebode.cli.terminal import protect
+from livebode.cli.terminal import protect, unchecked_output
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
 from livebode.nouns import DamageWarning, InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
+
+class _Group(TyperGroup):
+    """With a help in colours."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """As Typer does, on the terminal itself: the texts are the program's own."""
+        with unchecked_output():
+            super().format_help(ctx, formatter)
+
+
+class _Command(TyperCommand):
+    """The same for one command."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """As Typer does, on the terminal itself."""
+        with unchecked_output():
+            super().format_help(ctx, formatter)
+
+
 app = typer.Typer(
+    cls=_Group,
     help="The Bode plot of a machine while the machine works.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("run")(run_command)
-app.command("fit")(fit_command)
-app.command("inspect")(inspect_command)
-app.command("demo")(demo_command)
-app.command("design")(design_command)
-app.command("query")(query_command)
-app.command("export")(export_command)
-app.command("margins")(margins_command)
-app.command("validate")(validate_command)
-app.command("learn")(learn_command)
-app.command("plc")(plc_command)
-app.command("report")(report_command)
-app.command("compare")(compare_command)
-app.command("view")(view_command)
+app.command("run", cls=_Command)(run_command)
+app.command("fit", cls=_Command)(fit_command)
+app.command("inspect", cls=_Command)(inspect_command)
+app.command("demo", cls=_Command)(demo_command)
+app.command("design", cls=_Command)(design_command)
+app.command("query", cls=_Command)(query_command)
+app.command("export", cls=_Command)(export_command)
+app.command("margins", cls=_Command)(margins_command)
+app.command("validate", cls=_Command)(validate_command)
+app.command("learn", cls=_Command)(learn_command)
+app.command("plc", cls=_Command)(plc_command)
+app.command("report", cls=_Command)(report_command)
+app.command("compare", cls=_Command)(compare_command)
+app.command("view", cls=_Command)(view_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -11,11 +11,13 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.estimation.settings import default_hop
 from livebode.nouns import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
     from livebode.session.inspection import Inspection
+    from livebode.session.quiet import Quiet
 
 _LINES_SHOWN = 24
 
@@ -24,23 +26,57 @@ def inspect_command(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording.")],
     excitation: Excitation = None,
     output: Output = None,
+    input_: Annotated[
+        str | None, typer.Option("--input", metavar="CHANNEL", help="Channel of the plant input u.")
+    ] = None,
+    lines: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HZ", help="Lines to measure later, as in run: look for hum where there is no excitation."
+        ),
+    ] = None,
+    window: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Their window.", min=1)] = None,
     rate: Rate = None,
     time: Time = None,
     as_json: Json = False,
 ) -> None:
-    """List channels, rate, gaps and samples that are not finite; for an excitation its period, lines and SNR."""
+    """List channels, rate, gaps and samples that are not finite; for an excitation its period, lines and SNR.
+
+    With lines, hum of the mains in a recording without excitation, or in its longest pause.
+    """
     from livebode.session.inspection import inspect  # with its statistics half a second to import
 
-    if output is not None and excitation is None:
-        raise InputError("--output is for the signal-to-noise ratio of an excitation; name it with --excitation too")
-    found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output)
+    _check(excitation, output, input_, lines, window)
+    of_lines = None if lines is None or window is None else (lines, window)
+    found = inspect(log, rate_hz=rate, time=time, excitation=excitation, output=output, input=input_, lines=of_lines)
     if as_json:
         print(to_json(found.plain()))
         return
     console = terminal.console(markup=False)  # names and units may hold brackets
     _show_recording(found, console)
+    if found.quiet is not None:
+        _show_hum(found.quiet, console)
     if found.excitation is not None:
         _show_excitation(found, console)
+
+
+def _check(
+    excitation: str | None, output: str | None, input_: str | None, lines: str | None, window: int | None
+) -> None:
+    if (lines is None) != (window is None):
+        raise InputError("--lines and --window belong together: the window says how near to a line hum disturbs it")
+    if lines is not None:
+        if output is None:
+            raise InputError(
+                "--lines is for the hum in a recording without excitation; name --output (and --input) too"
+            )
+    elif input_ is not None:
+        raise InputError("--input is for the hum in a recording without excitation; name --lines and --window too")
+    elif output is not None and excitation is None:
+        raise InputError(
+            "--output is for the signal-to-noise ratio of an excitation, or for hum without one; "
+            "name --excitation, or --lines and --window, too"
+        )
 
 
 def _show_recording(found: Inspection, console: Console) -> None:
@@ -68,6 +104,31 @@ def _show_recording(found: Inspection, console: Console) -> None:
         console.print(f"  no channel: {skipped.name} ({skipped.reason})", style="dim")
 
 
+def _show_hum(quiet: Quiet, console: Console) -> None:
+    seconds, lines = quiet.samples / quiet.lines.rate_hz, quiet.lines
+    where = f"{seconds:.4g} s without excitation, from sample {quiet.first} on"
+    if not quiet.found:
+        console.print(f"no hum of the mains is visible in {where}", soft_wrap=True)
+        return
+    console.print(f"hum of the mains in {where}:", soft_wrap=True)
+    table = Table(box=None, header_style="bold")
+    table.add_column("Hz", justify="right")
+    for name, unit in quiet.units.items():
+        table.add_column(f"{name} {unit}".strip(), justify="right")
+    table.add_column("disturbs the lines Hz")
+    for hum, disturbed in quiet.found:
+        amplitude = [f"{hum.amplitude[name]:.3g}" if name in hum.amplitude else "" for name in quiet.units]
+        table.add_row(f"{hum.frequency_hz:.5g}", *amplitude, ", ".join(f"{f:g}" for f in disturbed) or "none")
+    console.print(table)
+    lost = sorted({f for _, disturbed in quiet.found for f in disturbed})
+    if lost:
+        console.print(
+            f"a response at {', '.join(f'{f:g}' for f in lost)} Hz would contain the hum, which no average removes; "
+            f"choose lines more than half a bin ({lines.resolution_hz / 2:g} Hz) from it",
+            soft_wrap=True,
+        )
+
+
 def _show_excitation(found: Inspection, console: Console) -> None:
     excitation = found.excitation
     assert excitation is not None
@@ -91,6 +152,9 @@ def _show_excitation(found: Inspection, console: Console) -> None:
             soft_wrap=True,
         )
     console.print(f"{len(lines)} lines, {lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz")
+    hops = ((default_hop(excitation.period), "a run"), (found.live_hop, "live"))
+    each = "; ".join(f"{who} {lines.rate_hz / hop:.4g} (hop {hop})" for hop, who in hops)
+    console.print(f"responses/s by default, with this period as window: {each}", soft_wrap=True)
     table = Table(box=None, header_style="bold")
     for heading in ("line Hz", "amplitude", "SNR at output dB"):
         table.add_column(heading, justify="right")

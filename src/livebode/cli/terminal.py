@@ -10,6 +10,7 @@ import io
 import re
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -77,6 +78,19 @@ def protect() -> None:
             # A terminal that lacks a letter shows another one, rather than nothing and an error.
             stream.reconfigure(errors="replace")
             setattr(sys, name, VisibleText(stream))
+
+
+@contextmanager
+def unchecked_output() -> Iterator[None]:
+    """Within, what is printed may command the terminal: for texts of the program alone, such as its help."""
+    before = sys.stdout
+    before.flush()
+    sys.stdout = _unchecked()
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stdout = before
 
 
 def console(*, stderr: bool = False, **options: Any) -> Console:

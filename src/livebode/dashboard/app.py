@@ -21,13 +21,12 @@ from livebode.dashboard.client import Client
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
+from livebode.dashboard.places import Place
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.nouns import InputError, Responses
 
 _HERE = Path(__file__).parent
-SOCKETS_MAX = 16
-"""Browsers at once."""
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
@@ -149,16 +148,19 @@ class _Pages:
             role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
         except TooManyTriesError:
             role = None
-        if role is None or len(self._board.clients) >= SOCKETS_MAX:
-            await socket.close(1008 if role is None else 1013)
+        if role is None:
+            await socket.close(1008)
             return
         client = Client(self._board, socket, role)
-        self._board.clients.add(client)
+        place = Place(role, address, client.displace)
+        if not self._board.places.take(place):
+            await socket.close(1013)
+            return
         self._board.pulse_now()
         try:
             await client.run()
         finally:
-            self._board.clients.discard(client)
+            self._board.places.leave(place)
 
     def _file(self, name: str) -> Response:
         content, kind = self._files.get(name, (b"not found\n", ""))

@@ -8,8 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from livebode.dashboard.access import Access
-from livebode.dashboard.client import Client, Pulse
+from livebode.dashboard.client import Pulse
 from livebode.dashboard.notices import acknowledgement
+from livebode.dashboard.places import Places
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.nouns import InputError
@@ -36,7 +37,7 @@ class Board:
 
     def __init__(self, states: list[State], viewed: dict[int, Viewed], access: Access) -> None:
         self.states, self.access = states, access
-        self.clients: set[Client] = set()
+        self.places = Places(access.open)
         self.pulse = Pulse()
         self._viewed = viewed
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="livebode dashboard reads")
@@ -60,7 +61,7 @@ class Board:
                 looked = began
                 await self._follow()
             self.pulse.beat()
-            pause = 1 / UPDATES_PER_S if self.clients else _IDLE_S
+            pause = 1 / UPDATES_PER_S if self.places else _IDLE_S
             self._hurry.clear()
             try:
                 await asyncio.wait_for(self._hurry.wait(), max(0.001, began + pause - clock()))
@@ -73,7 +74,7 @@ class Board:
 
     def health(self, state: State) -> dict[str, Any]:
         """Of an axis, and of the dashboard itself."""
-        return state.health() | {"browsers": len(self.clients), "refused": self.access.refused}
+        return state.health() | {"browsers": len(self.places), "refused": self.access.refused}
 
     async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
         """The result of a long job, which runs in another thread; InputError where too many wait."""

@@ -23,6 +23,8 @@ ROWS_EVERY_S = 0.1
 TRENDS_EVERY_S = 0.25
 SLOW_S = 20.0
 """A browser that takes nothing for so long is let go."""
+DISPLACED = 4000
+"""Code of a web socket that is closed for another browser; the page comes back later."""
 _ROWS_AT_ONCE = 400
 _WISHES_PER_S = 20
 
@@ -35,6 +37,7 @@ class Client:
         self._watched = Wish("watch")
         self._anew = True
         self._paused = False
+        self._displaced = asyncio.Event()
         self._reference: Responses | None = None
         self._sent: dict[str, Any] = {}
 
@@ -43,16 +46,24 @@ class Client:
         await self._socket.accept()
         hearing = asyncio.create_task(self._hear())
         saying = asyncio.create_task(self._say())
+        displaced = asyncio.create_task(self._displaced.wait())
+        tasks = {hearing, saying, displaced}
         try:
-            done, _ = await asyncio.wait({hearing, saying}, return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
+            if displaced in done:
+                await asyncio.wait_for(self._socket.close(DISPLACED, "another browser took this place"), SLOW_S)
         except (TimeoutError, WebSocketDisconnect, RuntimeError, OSError):
             pass  # it is gone, or too slow
         finally:
-            for task in (hearing, saying):
+            for task in tasks:
                 task.cancel()
-            await asyncio.gather(hearing, saying, return_exceptions=True)
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    def displace(self) -> None:
+        """Ask it to go: another browser has its place."""
+        self._displaced.set()
 
     async def _hear(self) -> None:
         count, since = 0, time.monotonic()

@@ -1,6 +1,7 @@
 """From samples to frequency responses: the online tracker and the offline reference."""
 
 from livebode.estimation.line_stage import response_unit
+from livebode.estimation.movement import Movement
 from livebode.estimation.ripple import RippleOrder, RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra_tracker import SpectraTracker
@@ -8,6 +9,7 @@ from livebode.estimation.tracker import Tracker
 from livebode.estimation.welch import welch
 
 __all__ = [
+    "Movement",
     "RippleOrder",
     "RippleSpeed",
     "Settings",

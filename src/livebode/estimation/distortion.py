@@ -17,11 +17,13 @@ Floats = NDArray[np.float64]
 _INSIDE_MIN = 2  # detection lines between the outermost lines, without which nothing is known of the band
 _OUTSIDE = 6  # more of them on each side
 _COHERENT = 3.0
-"""What a nonlinearity does to a line itself over what it spreads to a detection line.
+"""What a nonlinearity does to a line of usual strength over what it spreads to a detection line.
 
 A nonlinearity changes the gain at the lines (the describing function) and spreads the rest over the bins that it
 reaches. Of a sign of Gaussian velocity the gain has 2/π of the power, and the rest is spread over a band twice as wide:
-about 2 for a flat velocity, 3 … 3.5 where a line is stronger than the others (`python -m studies.repeating`).
+about 2 for a flat velocity (`python -m studies.repeating`). By Bussgang's theorem (1952) the change is proportional to
+the line's own amplitude in the signal that is distorted, and the rest is not: a line that is stronger in the output
+than the rms of the lines, as at a resonance, suffers by as much more.
 """
 _STEPS_MARGIN = 3.0  # how much more than uniform rounding the steps of a sensor may show at a few bins
 _POWERLESS = 1e-4
@@ -52,7 +54,8 @@ class Distortion:
 
     The residual of the mean over all periods, less what noise leaves there, at the detection lines on which distortion
     falls; interpolated over frequency once as it is and once over |Ĝ|, of which the larger counts: steps of a sensor
-    are alike in the output, friction is alike in the torque. Three times that amplitude is what it may do to a line.
+    are alike in the output, friction is alike in the torque. Three times that amplitude is what it may do to a line,
+    and more at a line that is stronger in the output than the others.
 
     Parameters
     ----------
@@ -87,7 +90,9 @@ class Distortion:
         as_output = self._groups.at((mean - noise)[np.newaxis])[0]
         as_input = self._groups.at(((mean - noise) / gain)[np.newaxis])[0] * power(ratio)
         found = np.maximum(np.fmax(as_output, as_input), 0.0)
-        coherent = (_COHERENT**2 - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
+        strength = power(numerator[lines])
+        stronger = np.maximum(strength / strength.mean(), 1.0)
+        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
         return np.asarray(_share(mean, noise) * (found + coherent))
 
 

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 MAINS_HZ = (50.0, 60.0)
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
-_HARMONICS = 10
+HARMONICS = 10
 _BESIDE = np.array([-4, -3, -2, -1, 1, 2, 3, 4])
 _CHANCE = 1e-8  # of noise alone to be taken for a tone: (1 + r/n)^-n for a power of r times the mean of n neighbours
 
@@ -41,7 +41,7 @@ class Mains:
         free = []
         for i, mains_hz in enumerate(MAINS_HZ):
             self.lines[i] = np.isin(at, _on_bins(mains_hz, lines, highest))
-            tones = np.setdiff1d(_on_bins(mains_hz, lines, _HARMONICS), at)
+            tones = np.setdiff1d(_on_bins(mains_hz, lines, HARMONICS), at)
             free.append(tones if self.lines[i].any() else tones[:0])
         self._any = np.asarray(self.lines.any(axis=0))
         # Distortion is at multiples of the lines' common divisor, and of odd lines at odd or at even ones alone:
@@ -90,7 +90,7 @@ class _Neighbours:
         count = self._usable.sum(axis=1)
         self._count = np.maximum(count, 1)
         self._enough = count >= distances.size // 2
-        self._times = count * (_CHANCE ** (-1 / self._count) - 1)
+        self._times = np.array([stands_out_by(n) for n in count])
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -104,6 +104,11 @@ class _Neighbours:
         """Which bins have more power than chance gives them beside their neighbours, (tones,)."""
         level = np.where(self._usable, power[self._beside], 0.0).sum(axis=1) / self._count
         return np.asarray(self._enough & (power[self.tones] > self._times * level))
+
+
+def stands_out_by(neighbours: int) -> float:
+    """How many times the mean power of its neighbours a bin has by chance once in 1e8 bins of noise."""
+    return float(neighbours * (_CHANCE ** (-1 / max(neighbours, 1)) - 1))
 
 
 def _on_bins(mains_hz: float, lines: Lines, harmonics: int) -> NDArray[np.int64]:

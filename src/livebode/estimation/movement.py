@@ -1,4 +1,4 @@
-"""Whether the machine moves, as its schedule tells."""
+"""Whether the machine moves, as its schedule shows."""
 
 from __future__ import annotations
 
@@ -6,47 +6,90 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
-_STILL = 0.01  # of the schedule's largest value: a machine that remains where it is
-_PER_PERIOD = 0.2  # share of the newest schedule in the remembered one: about nine periods
+PLACES = 20  # of a period that are looked at
+_PERIODS = 9  # before, with which the schedule is compared
+_BEFORE = _PERIODS + 2  # that are remembered: the oldest value with a bend needs two more
+_BENDS_MIN = 6  # second differences without which the jitter is not known
+_JITTER = 3.0  # times the largest second difference: what noise and a flickering count do not reach
+_FEW = (
+    8  # places: with fewer, second differences miss vibration, and what wanders slowly is larger; twice as many times
+)
 
 
 class Movement:
-    """Compares the schedule with its mean over the periods before, at the same place in the period.
+    """Compares the schedule with the nine periods before, at the same place in the period.
 
-    So the motion that the excitation itself makes, which is the same in every period, does not count. A schedule that
-    is not known does not move.
+    So the motion that the excitation itself makes, which is the same in every period, does not count. The machine moves
+    where the schedule is farther from one of these than three times its jitter: the largest second difference of values
+    that follow each other, over the same time. That depends on no offset and no unit; noise, a count that flickers and
+    a drift that stays within them are no motion. A schedule that is not known does not move.
+
+    With fewer than eight places in a period it is six times. With a single one it takes eight periods to know the
+    jitter, and strokes of less than 14 periods have second differences as large as they are, and are not seen.
 
     Parameters
     ----------
     places
-        Windows in one period.
+        Windows in one period; of many at most twenty are looked at, and what is found counts until the next.
     """
 
     def __init__(self, places: int) -> None:
-        self._mean = np.full(places, np.nan)
-        self._largest = 0.0
+        self._places, self._stride = places, -(-places // PLACES)
+        self._past = np.full((_BEFORE + 1, -(-places // self._stride)), np.nan)  # newest last, perhaps in part
+        self._next, self._moves = 0, False
+        self._times = _JITTER if places >= _FEW else 2 * _JITTER
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"movement": np.append(self._mean, self._largest)}
+        return {"movement": np.append(self._past, [self._next, self._moves])}
 
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._mean[:], self._largest = state["movement"][:-1], float(state["movement"][-1])
+        past, (following, moves) = state["movement"][:-2], state["movement"][-2:].tolist()
+        self._past, self._next, self._moves = (
+            past.reshape(self._past.shape).astype(np.float64),
+            int(following),
+            bool(moves),
+        )
 
-    def process(self, place: int, schedule: Floats) -> NDArray[np.bool_]:
+    def process(self, place: int, schedule: Floats) -> Flags:
         """Which of these moments, at consecutive places from `place` on, belong to a machine that moves."""
-        moves = np.zeros(schedule.size, dtype=np.bool_)
-        if np.isnan(schedule).all():
-            return moves
-        largest = np.fmax.accumulate(np.r_[self._largest, np.abs(schedule)])[1:]
-        self._largest = float(largest[-1])
-        done = 0
-        while done < schedule.size:
-            at = (place + done) % self._mean.size
-            n = min(schedule.size - done, self._mean.size - at)
-            mean, now = self._mean[at : at + n], schedule[done : done + n]
-            apart = now - mean
-            moves[done : done + n] = np.abs(apart) > _STILL * largest[done : done + n]
-            mean[:] = np.where(np.isnan(apart), np.where(np.isnan(now), mean, now), mean + _PER_PERIOD * apart)
-            done += n
+        if np.isnan(schedule).all() and np.isnan(self._past).all():
+            return np.zeros(schedule.size, dtype=np.bool_)
+        at = place + np.arange(schedule.size)
+        looked = np.flatnonzero(at % self._places % self._stride == 0)
+        moves = np.empty(schedule.size + 1, dtype=np.bool_)
+        moves[0] = self._moves
+        moves[looked + 1] = self._look(at[looked], schedule[looked])
+        newest = np.zeros(moves.size, dtype=np.int64)
+        newest[looked + 1] = looked + 1
+        moves = moves[np.maximum.accumulate(newest)][1:]
+        self._moves = bool(moves[-1])
         return moves
+
+    def _look(self, at: NDArray[np.int64], schedule: Floats) -> Flags:
+        if not at.size:
+            return np.zeros(0, dtype=np.bool_)
+        row, column = at // self._places - at[0] // self._places, at % self._places // self._stride
+        row = row + _BEFORE + int(column[0] < self._next)
+        periods = np.full((int(row[-1]) + 1, self._past.shape[1]), np.nan)
+        periods[: _BEFORE + 1] = self._past
+        periods[row, column] = schedule
+        self._past, self._next = periods[-_BEFORE - 1 :].copy(), int(column[-1]) + 1
+        return np.asarray(_moving(periods, self._times)[row - _BEFORE, column])
+
+
+def _moving(periods: Floats, times: float) -> Flags:
+    """Of the schedule in consecutive periods, (periods, places): which moments move, behind those before."""
+    now = periods[_BEFORE:]
+    bends = np.full(periods.size, np.nan)
+    bends[2:] = np.abs(np.diff(periods.ravel(), 2))
+    known = np.cumsum(np.isfinite(bends).reshape(periods.shape), axis=1)
+    jitter = np.maximum.accumulate(np.nan_to_num(bends).reshape(periods.shape), axis=1)
+    largest, count, apart = jitter[_BEFORE:], known[_BEFORE:], np.full(now.shape, np.nan)
+    for i in range(1, _PERIODS + 1):
+        earlier = slice(_BEFORE - i, len(periods) - i)
+        apart = np.fmax(apart, np.abs(now - periods[earlier]))
+        largest = np.maximum(largest, jitter[earlier, -1:])
+        count = count + known[earlier, -1:]
+    return np.asarray((count >= _BENDS_MIN) & (apart > times * largest))

@@ -13,7 +13,7 @@ from livebode.estimation.bounds import power
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.mains import Mains
 from livebode.estimation.moments import Moments, PeriodMoments
-from livebode.estimation.movement import Movement
+from livebode.estimation.movement import PLACES, Movement
 from livebode.estimation.settings import Settings
 from livebode.estimation.silence import SilentHum
 from livebode.estimation.spectra import Rows, after
@@ -70,7 +70,8 @@ class RepeatingErrors:
         self._samples = np.zeros((len(settings.roles), lines.window + 1))  # with the one before the period
         self._position = np.full(lines.window, np.nan)
         self._at, self._whole, self._largest, self._step = 0, False, 0.0, 0.0
-        self._movement = Movement(1)
+        self._looked = slice(0, None, -(-lines.window // PLACES))
+        self._movement = Movement(self._position[self._looked].size)
         self._forget()
         self._now = np.full(len(lines), np.nan), np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
         self._silence = SilentHum(len(lines))
@@ -123,7 +124,7 @@ class RepeatingErrors:
     def restart(self, sample: int) -> None:
         """The next sample has this number, and does not follow the one before."""
         self._at = sample % self._settings.lines.window
-        self._whole = False
+        self._whole, self._position[:] = False, np.nan
         self._forget()
         self._silence.interrupt()
 
@@ -166,7 +167,7 @@ class RepeatingErrors:
         return Repeating(distortion[which], invalid[which], dof)
 
     def _end_period(self, sample: int, block: Block) -> None:
-        if self._movement.process(0, np.array([np.mean(self._position)])).any():
+        if self._movement.process(0, self._position[self._looked]).any():
             self._forget()
             self._now = np.full_like(self._now[0], np.nan), np.zeros_like(self._now[1])
         elif self._whole:

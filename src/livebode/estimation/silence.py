@@ -13,7 +13,7 @@ _PERIODS = 9
 A mode with a damping ratio of 0.1 % at 50 Hz loses 31 % of its power from the first to the last third of nine periods
 of 0.1 s; in two periods a damping ratio of 0.5 % cannot be told from noise.
 """
-_STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
+STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
 _GONE = 0.25  # of the power that the hum had: below this it is no longer there
 _GONE_PERIODS = 2  # in a row
 
@@ -82,5 +82,5 @@ class SilentHum:
     def _find(self, periods: int) -> None:
         part, third = self._power[-periods:], max(1, periods // 3)
         first, last = part[:third].mean(axis=0), part[-third:].mean(axis=0)
-        steady = np.isfinite(part).all(axis=0) & (last >= _STEADY * first)
+        steady = np.isfinite(part).all(axis=0) & (last >= STEADY * first)
         self._found = np.where(steady & (self._found == 0), last, self._found)

@@ -66,12 +66,12 @@ def odd_lines(
             f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {rate_hz / window:g} Hz grid, less than one "
             f"group of {group}; take {wider(high_hz - low_hz, 2 * group, window, rate_hz)}"
         )
-    generator, ends = np.random.default_rng(seed), odd[[0, -1]]
+    generator, ends = np.random.default_rng(seed), odd[[0, -1]].tolist()
     groups = [odd[i : i + group] for i in range(0, odd.size - group + 1, group)]
-    inner = [g[~np.isin(g, ends)] if odd.size > _GROUP_MIN else g for g in groups]
+    inner = [g[(g != ends[0]) & (g != ends[1])] if odd.size > _GROUP_MIN else g for g in groups]
     for _ in range(_DRAWS):
-        silent = {int(generator.choice(g)) for g in inner}
-        bins = [int(k) for k in odd if int(k) not in silent]
+        silent = [generator.choice(g) for g in inner]
+        bins = odd[~np.isin(odd, silent)].tolist()
         # With a factor in common they would repeat within the window, on a grid without quiet bins.
         if gcd(window, *bins) == 1:
             break

@@ -46,7 +46,10 @@ def checked(samples: ArrayLike, name: str) -> Floats:
     if not known.size:
         raise InputError(f"the {name} has no finite sample among {x.size}; choose another channel")
     if np.ptp(known) == 0:
-        raise InputError(f"the {name} is constant at {known[0]:g}; choose the channel that carries the excitation")
+        raise InputError(
+            f"the {name} is constant at {known[0]:g}; choose the channel that carries the excitation (what a recording "
+            "without excitation shows of hum: livebode inspect --lines)"
+        )
     # A time column is a ramp but for rounding, and rounding repeats.
     n = np.flatnonzero(np.isfinite(x))
     rest = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))

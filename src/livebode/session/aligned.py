@@ -104,25 +104,22 @@ class AlignedLog:
                 yield block.cut(max(self.first - block.start, 0), len(block))
 
     def _aligned(self, channels: Sequence[str] | None) -> Iterator[Block]:
-        shift, again, ahead = 0, 0, list(self.slips)
+        shift, again, ahead, leapt = 0, 0, list(self.slips), False
         for block in self.log.blocks(channels):
             while len(block):
                 if again:
                     drop = min(again, len(block))
                     block, again = block.cut(drop, len(block)), again - drop
                     continue
-                leap = bool(ahead) and ahead[0].sample <= block.start
-                if leap:
+                if ahead and ahead[0].sample <= block.start:
                     slip = ahead.pop(0)
-                    shift += slip.missing
+                    shift, leapt = shift + slip.missing, True
                     again = max(-slip.missing, 0)
-                    block = replace(block, gap=True)
-                    if again:
-                        continue
+                    continue
                 stop = min(ahead[0].sample - block.start if ahead else len(block), len(block))
                 piece = block.cut(0, stop)
-                yield replace(piece, start=piece.start + shift)
-                block = block.cut(stop, len(block))
+                yield replace(piece, start=piece.start + shift, gap=piece.gap or leapt)
+                block, leapt = block.cut(stop, len(block)), False
 
 
 def slip_event(slips: Sequence[Slip], settings: Settings) -> Event:

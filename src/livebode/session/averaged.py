@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from livebode.estimation import Movement
 from livebode.fitting import RunningMean
 from livebode.nouns import Response, Responses
 from livebode.records import Run
 from livebode.session.overview import Overview
-
-_STILL = 0.01  # of the schedule's largest value: a machine that stays where it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,8 @@ class Averaged:
         How many have a line that is not valid.
     spans_s, spans
         The first and last moment; lowest and highest schedule at a valid response, NaN without one.
+    moved
+        Whether the machine moved at a valid response, as `Movement` finds it.
     """
 
     response: Response
@@ -42,12 +44,7 @@ class Averaged:
     incomplete: int
     spans_s: tuple[float, float]
     spans: tuple[float, float]
-
-    @property
-    def moved(self) -> bool:
-        """Whether the schedule changed along the run."""
-        low, high = self.spans
-        return bool(high - low > _STILL * max(abs(low), abs(high)))
+    moved: bool
 
 
 def averaged(run: Run) -> Averaged:
@@ -58,7 +55,7 @@ def averaged(run: Run) -> Averaged:
     InputError
         If no line is ever valid, or the run cannot be read.
     """
-    mean, overview, counted = RunningMean(), Overview(), _Counted(len(run.lines))
+    mean, overview, counted = RunningMean(), Overview(), _Counted(run)
     for part in run.steady_batches():
         mean.add(part)
         overview.add(part)
@@ -75,6 +72,7 @@ def averaged(run: Run) -> Averaged:
         counted.incomplete,
         counted.spans_s,
         counted.spans,
+        counted.moved,
     )
     if not found.moved:
         return found
@@ -85,9 +83,11 @@ def averaged(run: Run) -> Averaged:
 class _Counted:
     """What else there is to know of a run's responses."""
 
-    def __init__(self, lines: int) -> None:
+    def __init__(self, run: Run) -> None:
+        self._window, self._hop = run.lines.window, int(run.summary["found"]["hop"])
+        self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
         self.rows, self.incomplete = 0, 0
-        self.valid = np.zeros(lines, dtype=np.int64)
+        self.valid = np.zeros(len(run.lines), dtype=np.int64)
         self.spans_s, self.spans = (np.nan, np.nan), (np.nan, np.nan)
 
     def add(self, part: Responses) -> None:
@@ -98,6 +98,15 @@ class _Counted:
         rows = np.flatnonzero(part.valid.any(axis=1))
         if rows.size:
             self.spans = _wider(self.spans, part.schedule[rows])
+            self._follow(part.sample[rows], part.schedule[rows])
+
+    def _follow(self, sample: NDArray[np.int64], schedule: NDArray[np.float64]) -> None:
+        places = max(1, self._window // self._hop)
+        place = ((sample + 1) % self._window // self._hop - 1) % places
+        follows = (np.diff(place) % places == 1 % places) & (np.diff(sample) <= 2 * self._hop)
+        cuts = np.flatnonzero(~follows) + 1
+        for at, values in zip(np.split(place, cuts), np.split(schedule, cuts)):
+            self.moved |= bool(self._movement.process(int(at[0]), values).any())
 
 
 def _wider(span: tuple[float, float], values: np.ndarray) -> tuple[float, float]:

@@ -125,6 +125,12 @@ def check_excitation(tracker: Follower, variance: float) -> None:
         )
 
 
+_SPOILS = {
+    "gaps": "gaps", "non-finite": "samples that are not finite", "implausible": "implausibly large samples",
+    "spike": "spikes",
+}  # fmt: skip
+
+
 def check_period(samples: np.ndarray, settings: Settings) -> None:
     """InputError where the beginning of an excitation repeats after another number of samples than the window.
 
@@ -151,16 +157,29 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
     return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
 
 
-def check_some_valid(responses: int, valid: int, counts: dict[str, int], window: int) -> None:
-    """InputError where no response of the whole run is valid."""
+def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
+    """InputError with the reason where no response of the whole run is valid."""
+    counts, window = tracker.counts, tracker.settings.lines.window
     if responses and not valid and "spectra" in counts:
         raise InputError(
             f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
             f"whole and {counts['spike']} hold a spike; see to the drive's samples, or let it take a shorter window"
         )
-    if responses and not valid:
+    if not responses or valid:
+        return
+    if judged := tracker.found().get("judged", {}).get("invalid_lines_hz"):
+        lines = "; ".join(f"{kind} at {', '.join(f'{f:g}' for f in at)} Hz" for kind, at in judged.items())
         raise InputError(
-            f"none of {responses} responses is valid: no stretch of {window} samples has excitation and none of "
-            f"the {counts['gaps']} gaps and {counts['non-finite']} samples that are not finite; take a shorter "
-            "window, or look at the recording with `livebode inspect`"
+            f"none of {responses} responses is valid, and lines are invalid by what repeats with the excitation: "
+            f"{lines}; see events.jsonl for what to do at each"
         )
+    spoiled = [f"{count} {words}" for kind, words in _SPOILS.items() if (count := counts.get(kind, 0))]
+    if spoiled:
+        raise InputError(
+            f"none of {responses} responses is valid: no stretch of {window} samples has excitation and is free of the "
+            f"{', '.join(spoiled)}; take a shorter window, or look at the recording with `livebode inspect`"
+        )
+    raise InputError(
+        f"none of {responses} responses is valid, although no sample is missing or left out: no window of {window} "
+        "samples has excitation at its lines; take other lines, or look at the recording with `livebode inspect`"
+    )

@@ -250,8 +250,10 @@ class Tracking:
             self._renew(left_out_samples=event.sample + event.details["samples"])
 
     def _clocked(self) -> Iterator[Block]:
+        # What waits in a file or a pipe says by its arrival nothing of when it was sampled.
+        paced = isinstance(self.source, LiveSource) and self.source.paced and not self.source.waits
         for block in self._blocks:
-            if isinstance(block, LiveBlock) and self._relation.take(block):
+            if paced and isinstance(block, LiveBlock) and self._relation.take(block):
                 self._set_clock()
             yield block
 
@@ -364,7 +366,7 @@ class Tracking:
             self._step(follower.finish)
             tally.handed_out = tally.stop
         check_excitation(follower, tally.check.variance)
-        check_some_valid(tally.responses, tally.valid_lines, follower.counts, window)
+        check_some_valid(tally.responses, tally.valid_lines, follower)
 
     def finish(self) -> Outcome:
         """Draw the pictures and put the record in its place."""

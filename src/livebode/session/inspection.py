@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
-from livebode.nouns import Block
-from livebode.session.plan import beginning
+from livebode.nouns import Block, Lines
+from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
+from livebode.session.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
 
 
@@ -43,6 +45,13 @@ class Inspection:
     gaps: int
     missing: int
     excitation: Excitation | None
+    quiet: Quiet | None = None
+
+    @property
+    def live_hop(self) -> int:
+        """Default hop of a live run whose window is the excitation's period, in samples."""
+        assert self.excitation is not None
+        return nearest_hop(self.excitation.period, self.log.rate_hz / LIVE_RESPONSES_PER_S)
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
@@ -60,6 +69,8 @@ class Inspection:
             "channels": [asdict(channel) for channel in self.channels],
             "skipped": [asdict(skipped) for skipped in log.skipped],
         }
+        if self.quiet is not None:
+            plain["without_excitation"] = self.quiet.plain()
         if found is not None:
             plain["excitation"] = {
                 "period": found.period,
@@ -68,6 +79,7 @@ class Inspection:
                 "crest_factor": found.crest_factor,
                 "rms": found.rms,
                 "peak": found.peak,
+                "live_hop": self.live_hop,
                 "frequency_hz": found.lines.frequency_hz.tolist(),
                 "amplitude": found.amplitude.tolist(),
                 "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
@@ -85,10 +97,15 @@ def inspect(
     time: str | None = None,
     excitation: str | None = None,
     output: str | None = None,
+    input: str | None = None,
+    lines: tuple[str, int] | None = None,
 ) -> Inspection:
-    """Read a recording once and say what it holds; InputError where it cannot be read or nothing repeats in it."""
+    """Read a recording and say what it holds; InputError where it cannot be read or nothing repeats in it.
+
+    With lines (a text and the window) hum is looked for in `output` and `input` where there is no excitation.
+    """
     log = open_log(path, rate_hz=rate_hz, time=time)
-    wanted = [name for name in (excitation, output) if name is not None]
+    wanted = [name for name in (excitation, output, input) if name is not None]
     known = {channel.name for channel in log.channels}
     # Named by a path or an alias, a channel is listed by that name.
     extra = [name for name in dict.fromkeys(wanted) if name not in known]
@@ -102,8 +119,12 @@ def inspect(
         if stop is not None and (block.gap or block.start != stop):
             gaps, missing = gaps + 1, missing + block.start - stop
         stop = block.stop
-    found = None
-    if excitation is not None:
+    found, quiet = None, None
+    if lines is not None:
+        signals = [name for name in (output, input) if name is not None]
+        quiet = look_for_hum(log, signals, excitation, Lines.parse(lines[0], log.rate_hz, lines[1]))
+    silent = quiet is not None and quiet.samples == samples
+    if excitation is not None and not silent:
         w = beginning(log, excitation)
         found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
-    return Inspection(log, samples, list(summaries.values()), gaps, missing, found)
+    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet)

@@ -83,7 +83,7 @@ def role_spectra(signals: Mapping[Role, Floats], settings: Settings) -> RoleSpec
     count = (min(x.size for x in signals.values()) - 1) // n
     if count < 2:
         return None
-    cut = {role: _without_ramp(x, n, count) for role, x in signals.items()}
+    cut = {role: _without_ramp(np.where(np.isfinite(x), x, np.nan), n, count) for role, x in signals.items()}
     bins = np.asarray(settings.lines.bins)
     whole = np.all([np.isfinite(windows).all(axis=1) for windows in cut.values()], axis=0)
     z = settings.lines.z
@@ -93,10 +93,12 @@ def role_spectra(signals: Mapping[Role, Floats], settings: Settings) -> RoleSpec
             for role, windows in cut.items()
         }
     reference = settings.method.reference
-    power = np.where(whole, np.sum(np.abs(found[reference]) ** 2, axis=1), 0.0)
+    power = np.sum(np.abs(np.where(whole[:, np.newaxis], found[reference], 0.0)) ** 2, axis=1)
     used = np.flatnonzero(power > _RUNS * power.max())
+    if used.size < 2:
+        return None
     spread = _spread(signals[reference])
-    if used.size < 2 or 2 * power.max() <= POWERLESS_SHARE * spread * n**2:
+    if 2 * power.max() <= POWERLESS_SHARE * spread * n**2:
         return None
     neighbours = np.diff(used) == 1
     windows = cut[reference][used]

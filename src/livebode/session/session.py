@@ -61,6 +61,7 @@ class Session:
         self.ended_by = 0
         """The signal that ended it, or 0."""
         self._reload_asked = threading.Event()
+        self._postponed = ""
         for name, axis in axes.items():
             self._add(name, axis)
 
@@ -102,6 +103,10 @@ class Session:
         self._reload_asked.clear()
         try:
             axes = file.read()
+            if finishing := self._finishing(axes):
+                self._postpone(finishing)
+                return
+            self._postponed = ""
             changes = self._checked(axes)
         except (InputError, MemoryError) as error:
             why = str(error) or "there is not enough memory for it"
@@ -113,13 +118,23 @@ class Session:
             return
         self._apply(axes, changes)
 
+    def _finishing(self, axes: Axes) -> str:
+        """An axis of these that was taken out, and whose run is not finished yet."""
+        return next((thread.name for thread in self.taken_out if thread.alive and thread.name in axes), "")
+
+    def _postpone(self, name: str) -> None:
+        """Look at the file again soon: the axis begins when its run before is finished."""
+        self._reload_asked.set()
+        if self._postponed != name:
+            self._postponed = name
+            message = f"axis {name} was taken out and is still being finished; the configuration is applied after that"
+            self._say("configuration-postponed", message, record=False)
+
     def _checked(self, axes: Axes) -> dict[str, Change | None]:
         """What each axis that runs is told; InputError where one of them cannot go on so."""
         changes: dict[str, Change | None] = {}
         if ("" in axes) != ("" in self.threads):
             raise InputError("one axis does not become several while it runs; end livebode and start it again")
-        if finishing := [thread.name for thread in self.taken_out if thread.alive and thread.name in axes]:
-            raise InputError(f"axis {finishing[0]} was taken out and is still being finished; try again a moment later")
         for name, thread in self.threads.items():
             if name not in axes or not thread.alive:
                 continue

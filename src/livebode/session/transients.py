@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.estimation import Settings
+from livebode.estimation import Movement, Settings
+from livebode.estimation.movement import PLACES
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.prepare import filled
 from livebode.excitation.transient import leading, unlike
@@ -21,7 +22,6 @@ Floats = NDArray[np.float64]
 _PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are looked at, at most
 _PERIODS_MIN = 8
 _SHARE_MAX = 1 / 4  # of what is looked at; more is no transient, but another condition of the machine
-_STILL = 0.01  # of the schedule's largest value
 
 
 def leading_transient(log: AlignedLog, settings: Settings) -> int:
@@ -45,7 +45,7 @@ def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
     found = {name: x[:size] for name, x in signals.items()}
     names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
     count = found[names[0]].size // window
-    if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule])):
+    if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule], window)):
         return 0
     excited = np.zeros((window + 1) // 2, dtype=np.bool_)
     excited[list(settings.lines.bins)] = True
@@ -60,9 +60,12 @@ def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
     return leading(unlike(blocks, spectra(blocks), excited))
 
 
-def _moves(schedule: np.ndarray) -> bool:
-    known = schedule[np.isfinite(schedule)]
-    return bool(known.size and np.ptp(known) > _STILL * np.max(np.abs(known)))
+def _moves(schedule: np.ndarray, window: int) -> bool:
+    """Whether the machine moves behind what a transient may take, over which it may settle."""
+    settled = schedule[int(_SHARE_MAX * schedule.size) // window * window :]
+    step = max(1, window // PLACES)
+    periods = settled[: settled.size // window * window].reshape(-1, window)[:, : window // step * step : step]
+    return bool(Movement(periods.shape[1]).process(0, periods.ravel()).any())
 
 
 def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:

@@ -29,6 +29,7 @@ export class Link {
         location.reload();
         return;
       }
+      if (event.code === 4000) this.pauseMs = PAUSE_MS_MAX; // another browser has this place
       setTimeout(() => this.connect(), this.pauseMs);
       this.pauseMs = Math.min(2 * this.pauseMs, PAUSE_MS_MAX);
     };

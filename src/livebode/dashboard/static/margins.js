@@ -80,7 +80,7 @@ export class Margins {
       this.host.replaceChildren(element("p", { class: "empty" }, this.why));
       return;
     }
-    const head = ["margin", "value, ± holds 95 %", "at", "how it is known"].map((t) =>
+    const head = ["margin", "value, ± 95 % if the model is complete", "at", "how it is known"].map((t) =>
       element("th", { scope: "col" }, t),
     );
     this.host.replaceChildren(

@@ -1,4 +1,4 @@
-// Parameters over time with the bound that holds 95 %: a small chart for each.
+// Parameters over time with the bound that covers 95 % where the model is complete: a small chart for each.
 import { axis, chart } from "./chart.js";
 import { ticks } from "./clock.js";
 import { element } from "./make.js";

@@ -44,8 +44,9 @@ def how(of: Material) -> Section:
         ("loop", "; ".join(_loop(of.configuration.get("loop", {})))),
     ]
     bounds = (
-        "A response speaks for the moment at the centre of its window. Bounds hold the truth with the probability that "
-        "stands beside them; they speak of noise and scatter, not of a bias that the estimator or the signals may have."
+        "The effective time of a response is the centre of its window. A bound contains the true response with the "
+        "probability that is given beside it. It covers noise, and distortion where it is seen; "
+        "a systematic error that nothing in the signals shows is not in it."
     )
     return Section("How it was measured", (pairs(rows), Paragraph(bounds)))
 

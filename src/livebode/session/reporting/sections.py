@@ -77,7 +77,7 @@ def parameters(of: Material) -> Section | str:
         mean = with_bound(*fitted[name]) if name in fitted else ("held" if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
         rows.append((name.replace("_", " "), *mean, *late, units.get(name) or (now.unit if now else "")))
-    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % of noise, and of what ε allows."
+    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % where the model is complete."
     at = next((n.time_s for n in newest.values()), float("nan"))
     headings = ("", "of the mean", "±", f"newest, at {moment(at, 2)}" if newest else "newest", "±", "unit")
     if of.fit is not None:
@@ -126,7 +126,8 @@ def margins(of: Material) -> Section | str:
         mark = "between the lines" if found.place[0, i] == "interpolated" else "EXTRAPOLATED: no line checks it"
         rows.append((WORDS[name], *with_bound(value, bound[i]), unit, f"{at:.4g}", mark))
     size, around, at_hz = of.loop.at_lines
-    note = f"± holds 95 % of noise. At the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
+    about = "" if of.fit is None else f"Of the fit: {of.fit.about_bounds}. "
+    note = f"{about}At the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
     note += f"(at {at_hz:g} Hz). Tuning {of.loop.tuning.verdict}: {of.loop.tuning.sentence}"
     table = Table(("", "", "±", "unit", "at Hz", "read"), tuple(rows), (1, 2, 4), note)
     caption = (

@@ -251,7 +251,7 @@ class Sequencer:
             how = f"by this computer's clock it paused for {seconds:.1f} s, which is an estimate"
         self._number += missing
         self._say_restart(
-            f"the sender began anew at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
+            f"the sender started again at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
         )
         self._next, self._resumed = None, None
 

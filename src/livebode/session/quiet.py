@@ -1,0 +1,85 @@
+"""What a recording without excitation, or a pause of the excitation, shows of the mains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
+from livebode.nouns import InputError, Lines
+from livebode.session.plan import beginnings
+from livebode.sources import Log
+
+_SAMPLES_MAX = 1 << 22  # that are looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """The longest stretch without excitation, and the hum in it.
+
+    Attributes
+    ----------
+    lines
+        What is to be measured later.
+    first, samples
+        Of the stretch.
+    found
+        Tones, and the lines that each disturbs.
+    units
+        Of the signals.
+    """
+
+    lines: Lines
+    first: int
+    samples: int
+    found: list[tuple[Hum, list[float]]]
+    units: dict[str, str]
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, for JSON."""
+        tones = [
+            {"frequency_hz": hum.frequency_hz, "amplitude": dict(hum.amplitude), "disturbed_lines_hz": disturbed}
+            for hum, disturbed in self.found
+        ]
+        return {"first": self.first, "samples": self.samples, "units": self.units, "hum": tones}
+
+
+def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines: Lines) -> Quiet:
+    """Hum in the longest stretch in which the excitation does not change; without one, of the whole recording.
+
+    A line is disturbed by a tone that is nearer to it than half a bin of its window, where a design leaves lines out.
+
+    Raises
+    ------
+    InputError
+        If that stretch is shorter than two seconds.
+    """
+    names = list(dict.fromkeys([*signals, *([excitation] if excitation else [])]))
+    rows = dict(zip(names, beginnings(log, names, _SAMPLES_MAX)))
+    silent = np.all([np.isfinite(x) for x in rows.values()], axis=0)
+    if excitation:
+        w = rows[excitation]
+        silent[1:] &= (w[1:] == w[:-1]) & np.isfinite(w[1:])
+    first, stop = _longest(silent)
+    if excitation and stop - first < SECONDS_MIN * lines.rate_hz:
+        raise InputError(
+            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most; hum is looked for in two "
+            "seconds or more without excitation: record these, or leave out --lines"
+        )
+    found = find_hum({name: rows[name][first:stop] for name in dict.fromkeys(signals)}, lines.rate_hz)
+    f = lines.frequency_hz
+    near = [f[np.abs(f - hum.frequency_hz) <= lines.resolution_hz / 2].tolist() for hum in found]
+    units = {channel.name: channel.unit for channel in log.channels}
+    return Quiet(lines, first, stop - first, list(zip(found, near)), {name: units.get(name, "") for name in signals})
+
+
+def _longest(flags: np.ndarray) -> tuple[int, int]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    if not edges.size:
+        return 0, 0
+    first, stop = edges[::2], edges[1::2]
+    at = int(np.argmax(stop - first))
+    return int(first[at]), int(stop[at])
