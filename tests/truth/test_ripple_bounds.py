@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from livebode.estimation import RippleOrder, Settings, Tracker, ripple_power
 from livebode.excitation import multisine
+from livebode.monitoring import Baseline, Rows, learn_table
+from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
 from livebode.nouns import Block, InputError, Lines, Responses
+from livebode.session import Axis
+from livebode.session.plan import live_follower
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes
 from studies.monitoring_axis import LINES, RADIUS_M, RandomStrokes
 from studies.motion import SETTINGS, cruising, truth_at
+from tests.monitored import ideal
 
 COGGING_PER_M = 24 / (2 * np.pi * RADIUS_M)
 MEETING_M_PER_S = 0.2985  # 24 a turn are 60.01 Hz there
@@ -94,3 +100,29 @@ def test_what_a_ripple_needs_is_reported() -> None:
         replace(TOLD, schedule=None)
     with pytest.raises(InputError, match="amplitude = 0 is not a positive number"):
         RippleOrder(COGGING_PER_M, 0)
+
+
+def described(**sections: object) -> Axis:
+    signals = {"excitation": "w", "input": "u", "output": "velocity", "schedule": "x"}
+    given = {"source": {"url": "udp://127.0.0.1:5000"}, "signals": signals}
+    lines = {"frequencies": "20:140:20", "window": 400}
+    return Axis.of(given | {"lines": lines} | sections, "the test")
+
+
+def test_orders_come_from_the_configuration_or_else_from_the_baseline(tmp_path: Path) -> None:
+    rows = Rows(
+        np.ones((40, len(LINES)), dtype=complex), np.full((40, len(LINES)), 1e-4), np.zeros(40), np.zeros(40),
+        0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
+    )  # fmt: skip
+    table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], [rows])
+    signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
+    machine = replace(ideal(), ripple=Ripple(np.array([COGGING_PER_M]), np.array([0.05 / np.sqrt(2)])))
+    path = tmp_path / "healthy.json"
+    Baseline(LINES, 20, signals, "joint", "plant", (table,), machine).save(path)
+    learned = live_follower(described(monitoring={"baseline": path}), 4000.0).settings.ripple
+    assert [(order.cycles, order.amplitude) for order in learned] == [pytest.approx((COGGING_PER_M, 0.05))]
+    both = described(monitoring={"baseline": path}, tracking={"ripple": [[100.0, 0.2]]})
+    assert live_follower(both, 4000.0).settings.ripple == (RippleOrder(100.0, 0.2),)
+    assert live_follower(described(), 4000.0).settings.ripple == ()
+    with pytest.raises(InputError, match=r"tracking\.ripple"):
+        described(tracking={"ripple": [[100.0, -0.2]]})
