@@ -7,7 +7,7 @@ BUILT   = $(VENV)/.built
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 
-.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy fuzz crash damage soak attacks system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -62,6 +62,9 @@ fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lac
 
 monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
 	$(BIN)/python -m studies.monitoring
+
+temperature: $(BUILT) ## a belt that softens with temperature: alarms and detection with and without a sensor (10 min)
+	$(BIN)/python -m studies.temperature
 
 HEALTHY_RUNS ?= 1000
 healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricity, delay and others (2 h; HEALTHY_RUNS=20: 10 min)

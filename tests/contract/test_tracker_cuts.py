@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.estimation import Settings, Tracker
+from livebode.estimation import RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import Block, InputError, Lines, Responses
 
@@ -18,7 +18,7 @@ LINES = Lines((4, 8, 13), WINDOW, RATE_HZ, quiet=(5, 6, 7, 9, 10, 11, 12))
 OPTIONS = [
     {},
     {"average": True, "forgetting": 1.0},
-    {"hop": 7},
+    {"hop": 7, "ripple": (RippleOrder(90.0, 0.1),)},
     {"hop": 1},
     {"noise": "quiet", "average": True},
     {"hann": True},

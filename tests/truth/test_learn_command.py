@@ -15,6 +15,8 @@ import pytest
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Machine, Rows, learn_table
 from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.between_runs import BetweenRuns
+from livebode.monitoring.covariates import Covariates
 from livebode.motion import Curve, MovingModel
 from livebode.nouns import Block, Channel, InputError, Lines
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
@@ -210,13 +212,24 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
         ("tables", [], "tables = [] is empty"),
         ("hop", 0, "hop = 0 is below 1"),
         ("signals", 3, "signals = 3 is not a table"),
+        ("machine.covariates.high", [15.0], "machine.covariates.high = [15.0] is not above low"),
+        ("machine.covariates.slope", [[1.0]], "machine.covariates.slope = [[1.0]] is not an array of shape (4, 1)"),
+        (
+            "machine.between.direction",
+            [0, 0],
+            "machine.between.direction = [0, 0] is not 4 numbers of which one is not 0",
+        ),
     ],
 )
 def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: str) -> None:
     """One sentence with the file, the key, the value and the remedy."""
     path = tmp_path / "x.json"
     _small().save(path)
-    Baseline.load(path)
+    whole = Baseline.load(path).machine
+    assert whole is not None
+    assert whole.covariates.slope.tolist() == [[-0.002], [0.0], [0.0], [0.0]]
+    assert whole.between is not None
+    assert whole.between.spread == 1.5
     data = json.loads(path.read_text("utf-8"))
     *above, name = at.split(".")
     part = data
@@ -244,6 +257,11 @@ def _small() -> Baseline:
     machine = Machine(
         MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
         0.1, 0.4, np.full(28, 9),
+        covariates=Covariates(
+            ("temperature",), np.array([20.0]), np.array([15.0]), np.array([25.0]),
+            np.array([[-0.002], [0.0], [0.0], [0.0]]), np.zeros((4, 1, 1)),
+        ),
+        between=BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.5),
     )  # fmt: skip
     signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
     return Baseline(lines, 20, signals, "joint", "plant", (table,), machine)

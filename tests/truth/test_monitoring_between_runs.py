@@ -7,17 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from livebode.monitoring import Machine
+from livebode.monitoring import Machine, MachineMonitor, seconds_between
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs
 from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.run_offset import RunOffset
 from livebode.nouns import Event
 from livebode.simulation import TensionLoss
+from studies.healthy import ASKED, NAMES
+from studies.monitoring_axis import LINES
 from studies.temperature import at_temperature, judged
 from tests.monitored import ideal
 
 SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
+MEAN_S = seconds_between(ASKED)
 BELT = BetweenRuns(np.array([-0.005, 0.0, 0.0, 0.0]), spread=2.0)
 
 
@@ -112,3 +115,18 @@ def test_a_stiffness_beyond_that_of_any_healthy_run_is_found_from_the_beginning(
     assert changes(events) == ["stiffness"]
     assert events[0].details["amount_percent"] == pytest.approx(-5.0, abs=0.5)
     assert events[0].message.endswith("than in the baseline.")
+
+
+def test_cut_and_restored_anywhere_the_events_are_the_same() -> None:
+    blocks = list(at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=7.0)())
+    assert len(blocks) == 1
+    pieces = [blocks[0].cut(at, at + 3333) for at in range(0, len(blocks[0]), 3333)]
+    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S), []
+    for piece in pieces:
+        events += monitor.process(piece)
+        state = monitor.state()
+        monitor = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S)
+        monitor.load(state)
+    events += monitor.finish()
+    assert changes(events) == ["stiffness"]
+    assert events == judged(without_sensor(), blocks)

@@ -34,8 +34,8 @@ def recorded(motion: Strokes | RandomStrokes, seconds: float) -> tuple[BeltAxis,
 
 @cache
 def meeting() -> tuple[BeltAxis, Block]:
-    """There and back at the speed at which the ripple meets the line at 60 Hz."""
-    return recorded(Strokes(speed_m_per_s=MEETING_M_PER_S), 10.0)
+    """A stroke at the speed at which the ripple meets the line at 60 Hz."""
+    return recorded(Strokes(speed_m_per_s=MEETING_M_PER_S), 5.0)
 
 
 def corrected(block: Block, settings: Settings) -> tuple[Responses, MotionCorrection]:
@@ -67,8 +67,9 @@ def test_a_correction_finds_the_ripple_in_strokes_that_differ() -> None:
     motion = RandomStrokes((0.38, 0.36, 0.34, 0.32, 0.37, MEETING_M_PER_S))
     axis, block = recorded(motion, float(motion.edges_s[-1]))
     responses, correction = corrected(block, SETTINGS)
-    found = correction.found()["motion"]["ripple"]
-    assert found == [{"cycles": pytest.approx(COGGING_PER_M, abs=0.4), "amplitude": pytest.approx(0.05, rel=0.25)}]
+    strongest, *others = correction.found()["motion"]["ripple"]
+    assert strongest == {"cycles": pytest.approx(COGGING_PER_M, abs=0.4), "amplitude": pytest.approx(0.05, rel=0.25)}
+    assert all(order["amplitude"] < 0.01 for order in others)
     assert covered(axis, responses, after_s=float(motion.edges_s[-2])) > 0.95
 
 

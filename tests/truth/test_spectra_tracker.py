@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive
 from examples.kernel_drive import KernelDrive
-from livebode.estimation import Settings, SpectraTracker, Tracker
+from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.nouns import PID, Block, Cascade, Channel, InputError, Lines, Loop, Responses, Spectra, SpectraLayout
 from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
@@ -100,6 +100,18 @@ def test_float64_frames_lose_nothing(record: Block, hop: int) -> None:
     theirs = Tracker(described(hop)).process(record)
     same(ours, theirs)
     np.testing.assert_array_equal(ours.schedule, theirs.schedule)
+
+
+def test_a_ripple_is_in_the_bound_of_spectra_as_in_that_of_samples(record: Block) -> None:
+    """The position goes 0.4 a second, where 150 cycles are 60 Hz."""
+    ripple = (RippleOrder(150.0, 0.05),)
+    ours = tracked(sent(record, layout(), "float64"), layout(), ripple=ripple)
+    theirs = Tracker(described(20, ripple=ripple)).process(record)
+    without = Tracker(described(20)).process(record)
+    np.testing.assert_allclose(ours.sigma[1:], theirs.sigma[1:], rtol=1e-6)
+    wider = np.nanmedian(theirs.sigma / without.sigma, axis=0)
+    assert wider[2] > 5
+    assert wider[[0, 1, 3, 4]] == pytest.approx(np.ones(4), abs=0.1)
 
 
 def test_float32_is_off_by_no_more_than_its_kernel_promises(record: Block) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -93,7 +93,7 @@ class LineStage:
 
     def found(self) -> dict[str, Any]:
         """What the responses stand on, as plain data for a record: rate, window, lines, hop, the noise's origin."""
-        lines = self._settings.lines
+        lines, ripple = self._settings.lines, [asdict(order) for order in self._settings.ripple]
         return {
             "rate_hz": lines.rate_hz,
             "window": lines.window,
@@ -101,7 +101,8 @@ class LineStage:
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
-            "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving},
+            "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving}
+            | ({"ripple": ripple} if ripple else {}),
         }
 
     def excitation_power(self) -> Floats:

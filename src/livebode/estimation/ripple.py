@@ -91,3 +91,24 @@ class RippleSpeed:
         middle, first = known[last - half], known[last - self._window + 1]
         late, early = half, self._window - 1 - half
         return np.stack([(middle - first) / max(early, 1), (known[last] - middle) / late]) * self._rate_hz
+
+
+class HopSpeed:
+    """Speed of the schedule from one spectrum to the next, where only its value at the windows' centres is sent."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._last = np.full(2, np.nan)
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        return {"last": self._last.copy()}
+
+    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+        self._last[:] = state["last"]
+
+    def at(self, schedule: Floats, sample: NDArray[np.int64]) -> Floats:
+        """Speeds per second at these samples, the same at a window's beginning and end, (2, rows)."""
+        known = np.concatenate([self._last[:, np.newaxis], np.stack([sample.astype(np.float64), schedule])], axis=1)
+        self._last = known[:, -1]
+        apart, moved = np.diff(known)
+        return np.tile(moved / apart * self._rate_hz, (2, 1))

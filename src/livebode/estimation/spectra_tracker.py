@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
+from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
 from livebode.estimation.spectra_watch import SpectraWatch
@@ -62,10 +63,12 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
         self._watch = SpectraWatch(layout.window)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
+        self._speed = HopSpeed(settings.lines.rate_hz) if settings.ripple else None
         self._parts = {
             "lines": self._lines,
             "watch": self._watch,
             "range": self._range,
+            **({"speed": self._speed} if self._speed else {}),
         }
 
     def found(self) -> dict[str, Any]:
@@ -99,7 +102,11 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         place = (block.place + hop * np.arange(len(block))) % window
         time_s = block.origin_s + (block.sample - (window - 1) / 2) / block.rate_hz
         schedule = block[self.settings.schedule] if self.settings.schedule else np.full(len(block), np.nan)
-        responses = self._lines.process(rows, place, np.stack([time_s, schedule]), block.channels)
+        ripple = None
+        if self._speed is not None:
+            ripple = ripple_power(self.settings.ripple, self.settings.lines, self._speed.at(schedule, block.sample))
+        centre = np.stack([time_s, schedule])
+        responses = self._lines.process(rows, place, centre, block.channels, ripple=ripple)
         self._nothing = responses[0:0]
         return responses
 

@@ -147,14 +147,14 @@ def _machine(data: Part, lines: Lines) -> Machine:
     low, high = data.number("low_m"), data.number("high_m")
     if high < low:
         raise data.wrong("high_m", "below low_m")
-    curves = [Curve(low, high, data.array(name, 1)) for name in ("log_stiffness", "log_damping")]
+    stiffness, damping = (Curve(low, high, data.array(name, 1)) for name in ("log_stiffness", "log_damping"))
     inertia, load, radius = (data.number(name, 0) for name in ("inertia_kg_m2", "load_kg", "radius_m"))
     noise, quiet = data.array("noise_power", 1, least=0), data.array("quiet_power", 1, least=0)
     for name, values, of in (("noise_power", noise, lines.bins), ("quiet_power", quiet, lines.quiet)):
         if len(values) != len(of):
             raise data.wrong(name, f"not {len(of)} numbers")
     return Machine(
-        MovingModel(inertia, load, radius, *curves),
+        MovingModel(inertia, load, radius, stiffness, damping),
         noise,
         quiet,
         _accuracy(data.part("held")),

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import shift
 
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import torques
 from livebode.motion import MovingModel
-from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, torque_only
+from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, late, torque_only
 
 Floats = NDArray[np.float64]
 
@@ -85,11 +84,4 @@ class Replay:
         settings = self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}
         wrong = "the baseline's model does not stay finite under this torque; check its signals and units"
         velocity = np.asarray(advance(settings, inputs, wrong)[1])
-        return _late(velocity, self._delay_samples)
-
-
-def _late(velocity: Floats, samples: float) -> Floats:
-    """The same by so many samples, whole or not, later: a cubic spline, exact to 1e-5 at a tenth of the rate."""
-    if samples == 0:
-        return velocity
-    return np.asarray(shift(velocity, samples, order=3, mode="nearest"))
+        return late(velocity, self._delay_samples)

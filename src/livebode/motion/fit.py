@@ -41,6 +41,8 @@ class Fit:
         r.
     stiffness_splines, damping_splines
         How freely ln Keff(x) and ln bs(x) move: 1 for a constant, else 4 or more B-splines. No shape is assumed.
+    delayed
+        Whether the output may be late behind the input; else the model has no delay.
     """
 
     z: Complex
@@ -48,6 +50,7 @@ class Fit:
     radius_m: float
     stiffness_splines: int
     damping_splines: int
+    delayed: bool = False
 
     def start(self, rows: Rows) -> MovingModel:
         """From a scan of ten stiffnesses at up to 24 places: medians of the masses, curves through the rest."""
@@ -66,7 +69,7 @@ class Fit:
             smooth = _third_differences(splines)
             matrix = shape.T @ shape + 1e-2 * smooth + 1e-9 * np.eye(splines)
             weights.append(np.linalg.solve(matrix, shape.T @ found[:, which]))
-        return self._model(np.concatenate([found[0, :2], *weights]), low, high)
+        return self._model(np.concatenate([found[0, :2], *weights, np.zeros(1)]), low, high)
 
     def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
         """A model from before, over another range of positions."""
@@ -81,28 +84,30 @@ class Fit:
                 (model.log_damping, self.damping_splines),
             )
         ]
-        masses = self._unknowns(model)[:2]
-        return self._model(np.concatenate([masses, *weights]), low, high)
+        known = self._unknowns(model)
+        return self._model(np.concatenate([known[:2], *weights, known[-1:]]), low, high)
 
     def misfit(self, rows: Rows, model: MovingModel) -> float:
         """Share of the weighted responses that the model leaves, rms."""
-        rest = two_masses.sampled(model.parameters(rows.position_m), self.z, self.rate_hz) - rows.value
+        rest = sampled(model, rows.position_m, self.z, self.rate_hz) - rows.value
         return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
 
     def refine(self, rows: Rows, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
-        """Weighted least squares over all rows, from a model on; `masses_known` holds Js and mL."""
+        """Weighted least squares over all rows, from a model on; `masses_known` holds Js, mL and the delay."""
         low, high = model.low_m, model.high_m
         known = self._unknowns(model)
-        free = np.s_[2:] if masses_known else np.s_[:]
+        free = slice(2 if masses_known else 0, None if self.delayed and not masses_known else -1)
         design = self._design(rows.position_m, low, high)
         pull = _SMOOTH * self._smoothness(rows)
 
         def normal(unknowns: Floats) -> tuple[Floats, Floats, Floats]:
             known[free] = unknowns[0]
-            parameters = design @ known
-            residual = (rows.weight * (two_masses.sampled(parameters, self.z, self.rate_hz) - rows.value)).ravel()
-            slope = rows.weight[..., np.newaxis] * two_masses.slopes(parameters, self.z, self.rate_hz)
-            left = (slope @ design[..., free]).reshape(residual.size, -1)
+            parameters, late = design @ known, self.z ** -known[-1]
+            value = late * two_masses.sampled(parameters, self.z, self.rate_hz)
+            residual = (rows.weight * (value - rows.value)).ravel()
+            slope = late[:, np.newaxis] * two_masses.slopes(parameters, self.z, self.rate_hz) @ design
+            slope[..., -1] = -np.log(self.z) * value
+            left = (rows.weight[..., np.newaxis] * slope[..., free]).reshape(residual.size, -1)
             matrix = (left.conj().T @ left).real + pull[free, free]
             gradient = (left.conj().T @ residual).real + (pull @ known)[free]
             cost = np.sum(np.abs(residual) ** 2) + known @ pull @ known
@@ -115,23 +120,24 @@ class Fit:
         """From the unknowns to the four logarithms of each row, shape (rows, 4, unknowns)."""
         stiffness = basis(position_m, low, high, self.stiffness_splines)
         damping = basis(position_m, low, high, self.damping_splines)
-        design = np.zeros((position_m.size, 4, 2 + self.stiffness_splines + self.damping_splines))
+        design = np.zeros((position_m.size, 4, 3 + self.stiffness_splines + self.damping_splines))
         design[:, 0, 0] = design[:, 1, 1] = 1.0
         design[:, 2, 2 : 2 + self.stiffness_splines] = stiffness
-        design[:, 3, 2 + self.stiffness_splines :] = damping
+        design[:, 3, 2 + self.stiffness_splines : -1] = damping
         return design
 
     def _smoothness(self, rows: Rows) -> Floats:
         n, k = 2 + self.stiffness_splines + self.damping_splines, 2 + self.stiffness_splines
-        penalty = np.zeros((n, n))
+        penalty = np.zeros((n + 1, n + 1))
         penalty[2:k, 2:k] = _third_differences(self.stiffness_splines)
-        penalty[k:, k:] = _third_differences(self.damping_splines)
+        penalty[k:-1, k:-1] = _third_differences(self.damping_splines)
         return penalty * float(np.sum(np.abs(rows.weight * rows.value) ** 2)) / n
 
     def _unknowns(self, model: MovingModel) -> Floats:
         arm = 2 * np.log(self.radius_m)
         masses = np.log(model.inertia_kg_m2), np.log(model.load_kg) + arm
-        return np.concatenate([masses, model.log_stiffness.weights + arm, model.log_damping.weights + arm])
+        late = [model.delay_s * self.rate_hz]
+        return np.concatenate([masses, model.log_stiffness.weights + arm, model.log_damping.weights + arm, late])
 
     def _model(self, unknowns: Floats, low: float, high: float) -> MovingModel:
         arm, k = 2 * np.log(self.radius_m), 2 + self.stiffness_splines
@@ -140,8 +146,14 @@ class Fit:
             load_kg=float(np.exp(unknowns[1] - arm)),
             radius_m=self.radius_m,
             log_stiffness=Curve(low, high, unknowns[2:k] - arm),
-            log_damping=Curve(low, high, unknowns[k:] - arm),
+            log_damping=Curve(low, high, unknowns[k:-1] - arm),
+            delay_s=float(unknowns[-1]) / self.rate_hz,
         )
+
+
+def sampled(model: MovingModel, position_m: Floats, z: Complex, rate_hz: float) -> Complex:
+    """Response at e^(jωT) behind a zero-order hold, of the model held at these positions, (rows, lines)."""
+    return np.asarray(z ** (-model.delay_s * rate_hz) * two_masses.sampled(model.parameters(position_m), z, rate_hz))
 
 
 def _third_differences(splines: int) -> Floats:

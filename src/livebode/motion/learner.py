@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings
-from livebode.fitting import two_masses
 from livebode.motion.chunk import Chunk
-from livebode.motion.fit import Fit, Rows
+from livebode.motion.fit import Fit, Rows, sampled
 from livebode.motion.model import Curve, MovingModel
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
@@ -165,7 +164,7 @@ class Learner:
 
     def _fit(self, stiffness_splines: int, damping_splines: int) -> Fit:
         lines = self._settings.lines
-        return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines)
+        return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines, delayed=True)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         head = {"count": np.array([self.chunks]), "misfit": np.array([self._misfit])}
@@ -173,7 +172,7 @@ class Learner:
             return head
         m = self.model
         return head | {
-            "constants": np.array([m.inertia_kg_m2, m.load_kg, m.low_m, m.high_m]),
+            "constants": np.array([m.inertia_kg_m2, m.load_kg, m.low_m, m.high_m, m.delay_s]),
             "stiffness": m.log_stiffness.weights,
             "damping": m.log_damping.weights,
         }
@@ -182,9 +181,9 @@ class Learner:
         self.chunks, self._misfit = int(state["count"][0]), float(state["misfit"][0])
         self.model = None
         if "constants" in state:
-            inertia, load, low, high = (float(n) for n in state["constants"])
-            curves = (Curve(low, high, np.array(state[name], dtype=np.float64)) for name in ("stiffness", "damping"))
-            self.model = MovingModel(inertia, load, self._radius_m, *curves)
+            inertia, load, low, high, delay_s = (float(n) for n in state["constants"])
+            stiffness, damping = (Curve(low, high, np.array(state[name])) for name in ("stiffness", "damping"))
+            self.model = MovingModel(inertia, load, self._radius_m, stiffness, damping, delay_s)
 
 
 def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
@@ -198,4 +197,4 @@ def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
 def frozen(model: MovingModel, position_m: Floats, settings: Settings) -> Complex:
     """The model's response held at these positions (the lowest it knows, where NaN), (rows, lines)."""
     at = np.where(np.isfinite(position_m), position_m, model.low_m)
-    return two_masses.sampled(model.parameters(at), settings.lines.z, settings.lines.rate_hz)
+    return sampled(model, at, settings.lines.z, settings.lines.rate_hz)

@@ -74,6 +74,8 @@ class MovingModel:
         Js, mL, r.
     low_m, high_m
         The positions that the fit has seen.
+    delay_s
+        Of the measured velocity behind the torque, beyond what two masses behind a zero-order hold have.
     """
 
     inertia_kg_m2: float
@@ -81,6 +83,7 @@ class MovingModel:
     radius_m: float
     log_stiffness: Curve
     log_damping: Curve
+    delay_s: float = 0.0
 
     @property
     def rigid_kg_m2(self) -> float:
@@ -110,6 +113,7 @@ class MovingModel:
             "inertia_kg_m2": self.inertia_kg_m2,
             "load_kg": self.load_kg,
             "radius_m": self.radius_m,
+            "delay_s": self.delay_s,
             "position_m": at.tolist(),
             "stiffness_n_per_m": self.stiffness_at(at).tolist(),
             "damping_n_s_per_m": self.damping_at(at).tolist(),

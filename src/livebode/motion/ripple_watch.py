@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import RippleOrder, RippleSpeed, Settings, ripple_power
-from livebode.fitting import two_masses
 from livebode.motion.chunk import Chunk
+from livebode.motion.fit import sampled
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import OrderSpectrum, shaft_position
 from livebode.motion.steady import steady_rows
@@ -93,7 +93,7 @@ class _Gain:
         highest = 2 * float(settings.lines.frequency_hz[-1])
         self._at = np.linspace(highest / _GRID, highest, _GRID)
         z = np.exp(2j * np.pi * self._at / rate_hz)
-        self._gain = np.abs(two_masses.sampled(model.parameters(np.array([position_m])), z, rate_hz))[0]
+        self._gain = np.abs(sampled(model, np.array([position_m]), z, rate_hz))[0]
 
     def __call__(self, frequency_hz: Floats) -> Floats:
         return np.asarray(np.interp(frequency_hz, self._at, self._gain))
