@@ -181,6 +181,13 @@ def test_continuing_removes_no_file_that_it_did_not_write(tmp_path: Path, runs: 
     assert Run.open(tmp_path / "run").finished
 
 
+def test_continuing_does_not_wait_at_a_pipe_in_place_of_the_pictures(tmp_path: Path, runs: dict[str, Path]) -> None:
+    shutil.copytree(runs["killed"], tmp_path / "run")
+    os.mkfifo(tmp_path / "run" / ".pictures.partial")
+    with pytest.raises(InputError, match=r"pictures\.partial' is not a directory of the run; remove it"):
+        record_run(tmp_path / "run")
+
+
 def test_a_picture_replaces_a_link_and_not_what_it_names(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     (tmp_path / "margins.png").symlink_to(tmp_path / "thesis.tex")

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.fitting.line_verdicts import LineVerdicts
 from livebode.nouns import InputError, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _DISTORTION_DOF = 4.0  # of detection lines behind a distortion: four, if they are all on one side of a line
-_FIRST_VERDICT = 3  # windows that may be valid before what repeats is known: three periods, of which two are whole
 
 
 def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
@@ -86,7 +86,7 @@ class RunningMean:
     def __init__(self) -> None:
         self.rows, self.averages = 0, False
         self._newest: Responses | None = None
-        self._verdict: _Verdict | None = None
+        self._verdict: LineVerdicts | None = None
 
     def _begin(self, like: Responses) -> None:
         n = len(like.lines)
@@ -101,7 +101,7 @@ class RunningMean:
         """The next responses."""
         used = part.valid & np.isfinite(part.value)
         if self._verdict is None:
-            self._verdict = _Verdict(part.lines.window, len(part.lines))
+            self._verdict = LineVerdicts(part.lines.window, len(part.lines))
         self._verdict.add(used, part)
         rows = np.asarray(used.any(axis=1))
         if not rows.any():
@@ -184,33 +184,6 @@ def _without(one: Responses, lines: NDArray[np.bool_]) -> Responses:
         weight=np.where(lines, nothing, one.weight),
         valid=one.valid & ~lines,
     )
-
-
-class _Verdict:
-    """At each line the newest known distortion, and whether a reason against the line outweighs when it was valid."""
-
-    def __init__(self, window: int, lines: int) -> None:
-        self._window, self._stop = window, 0
-        self.distortion = np.full(lines, np.nan)
-        self._valid, self._against = np.zeros(lines), np.zeros(lines)  # in samples
-
-    def add(self, used: NDArray[np.bool_], part: Responses) -> None:
-        if not len(part):
-            return
-        against = np.isinf(part.distortion)
-        step = np.diff(part.sample + 1, prepend=self._stop or int(part.sample[0]) + 1 - self._window)
-        step, self._stop = np.minimum(step, self._window), int(part.sample[-1]) + 1
-        self._valid += step @ used
-        self._against += step @ against
-        known = against | (used & ~np.isnan(part.distortion))
-        newest = len(known) - 1 - np.argmax(known[::-1], axis=0)
-        of_part = np.take_along_axis(part.distortion, newest[np.newaxis], 0)[0]
-        self.distortion = np.where(known.any(axis=0), of_part, self.distortion)
-
-    @property
-    def against(self) -> NDArray[np.bool_]:
-        late = self._valid <= self._against + _FIRST_VERDICT * self._window
-        return np.asarray(np.isinf(self.distortion) & late)
 
 
 class _Mean:

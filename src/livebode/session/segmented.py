@@ -13,6 +13,7 @@ from typing import Any
 from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.nouns.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records.inside import check_folder
 from livebode.records.removal import check_removable, remove
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments.disk import why
@@ -205,6 +206,7 @@ class SegmentedRun:
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
         """Draw the pictures, close what is open and write run.json; `ends` says that another run goes on instead."""
+        check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would wait at a pipe of that name
         try:
             shutil.rmtree(self.partial, ignore_errors=True)
             os.mkdir(self.partial)

@@ -30,7 +30,9 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
     """
     with open_read(run, segment.name) as file:
         status = os.fstat(file.fileno())
-        data = file.read(segment.size_bytes + 1)
+        if status.st_size != segment.size_bytes:
+            raise InputError(f"it has {status.st_size} bytes, where the manifest says {segment.size_bytes}")
+        data = file.read(segment.size_bytes)
     key = (segment.sha256, status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     if key not in _verified:
         if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
