@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from functools import cache
 
 import numpy as np
 
@@ -19,10 +20,16 @@ _REPEATED = 20 * RATE_HZ
 """Samples after which w, u and y repeat: whole periods of the excitation."""
 
 
-def data(samples: int) -> np.ndarray:
-    """w, u, y and the sample's number, shape (4, samples)."""
-    columns = signals(samples)
-    return np.array([columns["w"], columns["u"], columns["y"], np.arange(samples)])
+def data(samples: int, start: int = 0) -> np.ndarray:
+    """w, u, y and the sample's number from a sample on, shape (4, samples)."""
+    at = np.arange(start, start + samples)
+    return np.vstack([_repeated()[:, at % _REPEATED], at])
+
+
+@cache
+def _repeated() -> np.ndarray:
+    columns = signals(_REPEATED)
+    return np.array([columns["w"], columns["u"], columns["y"]])
 
 
 class Machine(TcpPeer):
@@ -55,16 +62,13 @@ class Machine(TcpPeer):
         self._sender.join()
 
     def _send(self) -> None:
-        every = data(_REPEATED)
         while self._link is None and not self._done.wait(0.01):
             pass
         began = time.monotonic()
         while not self._done.is_set():
             due = int((time.monotonic() - began) * RATE_HZ * self._times)
             for start in range(self.sent, due - BATCH, BATCH):
-                sent = every[:, np.arange(start, start + BATCH) % _REPEATED]
-                sent[-1] = np.arange(start, start + BATCH)
-                batch = Batch(start, sent, CHANNELS, float(RATE_HZ), 9)
+                batch = Batch(start, data(BATCH, start), CHANNELS, float(RATE_HZ), 9)
                 with contextlib.suppress(OSError):  # livebode has ended
                     self._link.sendall(encode_samples(batch, double=True))
                 self.sent = start + BATCH

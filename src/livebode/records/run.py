@@ -104,7 +104,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether its source came to its end and everything is written."""
-        return bool((self.summary.get("record") or {}).get("finished", True))
+        return bool(self.summary.get("record", {}).get("finished", True))
 
     def responses(self) -> Responses:
         """All responses, as they were written; none before the first."""

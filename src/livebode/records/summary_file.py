@@ -38,7 +38,7 @@ def to_document(summary: dict[str, Any]) -> bytes:
 def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
     """The summary again, without its checksum; DamagedError where it is not what was written.
 
-    One without a checksum is taken where it need not be `checked`.
+    One without a checksum is taken where it need not be `checked`. What is null is as if it was not there.
 
     >>> from_document(to_document({"found": {"rate_hz": 1000}}))
     {'found': {'rate_hz': 1000}}
@@ -62,7 +62,7 @@ def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
         raise error if isinstance(error, DamagedError) else DamagedError(str(error)) from None
     if not isinstance(found, dict):
         raise DamagedError("it is not an object")
-    return found
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def read_summary(run: Path) -> tuple[dict[str, Any], str]:

@@ -21,8 +21,8 @@ class _Found(_Part):
     window: Positive
     bins: list[Positive]
     quiet_bins: list[Positive]
-    quantity: Text = ""
-    unit: Text = ""
+    quantity: Text
+    unit: Text
     hop: Positive = 1
     frequency_hz: list[float] = []
     schedule: Text | None = None

@@ -219,6 +219,8 @@ def _table(table: Table) -> list[Flowable]:
     if not titled:
         for cells, texts in zip(rows, table.rows):
             cells[0] = _cell(texts[0], _NAME, widths[0])
+    if not rows:  # a grid has a row at least
+        return []
     ruled = [*_LINES, ("LINEBELOW", (0, 0), (-1, 0), 0.8, _MUTED)] if titled else _LINES
     grid = Grid(rows, colWidths=widths, style=ruled, repeatRows=int(titled), splitInRow=1, hAlign="LEFT")
     return [grid, _words(table.note, _NOTE) if table.note else Spacer(0, 3 * mm)]

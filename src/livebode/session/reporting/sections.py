@@ -156,7 +156,7 @@ def quality(of: Material) -> Section:
     counts = of.run.summary.get("counts", {})
     rows = [
         ("samples", f"{of.samples:,}"),
-        *((words, f"{counts[key]:,}") for key, words in _COUNTS.items() if key in counts),
+        *((words, f"{counts[key]:,}") for key, words in _COUNTS.items() if counts.get(key) is not None),
         ("responses", f"{of.of.count:,}"),
         ("with a line that is not valid", f"{of.of.incomplete:,} ({share(of.of.incomplete, of.of.count)})"),
     ]
@@ -164,7 +164,7 @@ def quality(of: Material) -> Section:
     parts: list[Part] = [table]
     if "counts" not in of.run.summary:
         parts.append(Paragraph("The counts of samples come with the end of the run."))
-    if (source := of.run.summary.get("source")) is not None:
+    if source := of.run.summary.get("source"):
         parts.append(pairs([(_SOURCE.get(key, key), _plain(value)) for key, value in source.items()]))
     if (speed := of.run.summary.get("speed")) is not None:
         words = f"{speed['recorded_s']:.4g} s of machine were tracked in {speed['run_s']:.3g} s"
