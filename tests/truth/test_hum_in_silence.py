@@ -84,6 +84,14 @@ def test_hum_that_a_later_silence_does_not_show_is_withdrawn(pieces: int) -> Non
     assert tracker.found()["judged"]["invalid_lines_hz"] == {}
 
 
+def test_hum_that_a_later_silence_shows_at_two_fifths_of_its_amplitude_is_still_hum() -> None:
+    w = excitation(10, 12, 20, 6, 5)
+    level = np.where(np.arange(w.size) < 30 * N, 1.0, 0.4)
+    responses, events = tracked(w, w + level * hum(w.size, 0.1))
+    assert [event.kind for event in events] == ["hum"]
+    assert not responses.valid[-1, ON_MAINS]
+
+
 @pytest.mark.parametrize("silent", [1.0, 0.5, 0.0])
 def test_an_excitation_that_begins_again_at_another_phase_begins_the_mean_again(silent: float) -> None:
     lines = odd_lines(20, 140, RATE_HZ, 800, seed=1)

@@ -14,7 +14,7 @@ A mode with a damping ratio of 0.1 % at 50 Hz loses 31 % of its power from the f
 of 0.1 s; in two periods a damping ratio of 0.5 % cannot be told from noise.
 """
 STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
-_GONE = 0.25  # of the power that the hum had: below this it is no longer there
+_GONE = 0.25  # of the power that the hum had: below this, and without a tone, it is no longer there
 _GONE_PERIODS = 2  # in a row
 
 
@@ -23,7 +23,7 @@ class SilentHum:
 
     After the excitation a weakly damped mode rings near its own frequency, and looks like a tone. So a tone counts
     where it is seen in nine periods of silence in a row and does not decay over these; where the data begins without
-    excitation, all that there are do. What was found is withdrawn when a later silence does not show it.
+    excitation, all that there are do. What was found is withdrawn when a later silence shows no tone there.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class SilentHum:
         self._counts[0] += 1
         if self._counts[0] >= _PERIODS:
             self._find(_PERIODS)
-        self._low = np.where(power < _GONE * self._found, self._low + 1, 0.0)
+        self._low = np.where((power < _GONE * self._found) & ~stands_out, self._low + 1, 0.0)
         gone = self._low >= _GONE_PERIODS
         self._found[gone] = 0.0
         return np.asarray(gone)
