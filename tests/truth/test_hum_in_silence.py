@@ -55,6 +55,23 @@ def test_a_mode_that_rings_on_at_the_mains_frequency_is_not_hum(damping: float, 
     assert responses.valid[-1, ON_MAINS]
 
 
+@pytest.mark.parametrize("silent", [2, 4])
+@pytest.mark.parametrize("damping", [0.01, 0.002])
+def test_a_mode_that_rings_where_the_data_begins_is_not_hum(silent: int, damping: float) -> None:
+    w = excitation(0, silent, 5)
+    begun = np.concatenate([[100.0], np.zeros(w.size - 1)])
+    _, events = tracked(w, w + ringing(begun, 50.5, damping))
+    assert events == []
+
+
+@pytest.mark.parametrize(("silent", "kinds"), [(3, []), (4, ["hum"])])
+def test_hum_where_the_data_begins_is_found_in_three_whole_periods_behind_the_first(
+    silent: int, kinds: list[str]
+) -> None:
+    w = excitation(0, silent, 5)
+    assert [event.kind for event in tracked(w, w + hum(w.size, 0.1))[1]] == kinds
+
+
 def test_hum_under_a_mode_that_rings_on_is_found_once_that_has_died_away() -> None:
     w = excitation(30, 30, 20)
     y = ringing(w, 50.7, 0.02) + hum(w.size, 0.1)
