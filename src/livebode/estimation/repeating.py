@@ -265,7 +265,7 @@ class RepeatingErrors:
     def _reason(self, kind: str, at: int, f: float) -> tuple[str, dict[str, float]]:
         if kind == "hum":
             return (
-                f"{f:g} Hz is a multiple of the mains frequency, and hum of the mains is seen; choose other lines",
+                f"{f:g} Hz is a multiple of the mains frequency: mains hum detected; use other lines",
                 {},
             )
         if kind == "steps":
