@@ -98,6 +98,22 @@ def test_a_mode_that_rings_out_is_no_hum(damping: float) -> None:
     assert find_hum({"y": y + 1e-5 * np.random.default_rng(6).standard_normal(t.size)}, RATE_HZ) == []
 
 
+@pytest.mark.parametrize("damping", [0.005, 0.002])
+def test_a_mode_at_the_mains_frequency_that_noise_drives_is_seldom_hum(damping: float) -> None:
+    """100 recordings, of which one in 20 passes by chance: at most 12 do (three standard deviations more)."""
+    rng, settled = np.random.default_rng(8), 2000
+    pole = np.exp((-damping + 1j) * 2 * np.pi * 50 / 1000)
+    y = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], rng.standard_normal((100, settled + 3000)))[:, settled:]
+    assert sum(find_hum({"y": recorded}, 1000.0) != [] for recorded in y) <= 12
+
+
+def test_hum_whose_power_noise_changes_by_more_than_a_tenth_is_found() -> None:
+    """90 of 100 recordings: none of three thirds may be farther off than by two standard deviations of noise."""
+    rng, t = np.random.default_rng(9), T[:12_000]
+    y = 0.4 * np.cos(2 * np.pi * 50 * t) + 0.6 * rng.standard_normal((100, t.size))
+    assert sum(find_hum({"y": recorded}, RATE_HZ) != [] for recorded in y) >= 90
+
+
 def test_less_than_two_seconds_is_refused() -> None:
     with pytest.raises(InputError, match="record two seconds or more"):
         find_hum({"y": T[:7999]}, RATE_HZ)

@@ -20,6 +20,7 @@ SECONDS_MIN = 2.0  # thirds of it tell 50 from 60 Hz, and have bins between thes
 _PARTS = 3
 _REACH = 3e-3  # of its frequency by which the mains may be off
 _LOBE = 2  # bins on each side that a tone reaches in a Hann window
+_NOISE = 4.0  # two standard deviations of a tone's power in a third: √(2·35/18) is one, times √(noise per bin/power)
 _BESIDE = np.r_[-12:-3, 4:13]  # bins that a tone is compared with
 
 
@@ -43,8 +44,9 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
     """Tones within 0.3 % of multiples 1 … 10 of 50 and 60 Hz in signals without excitation, ascending.
 
     A tone counts where its power, over thirds of the recording with a Hann window, is more than noise gives beside it
-    by chance (1e-8), and where the last third has nine tenths of the power of the first: what rings out is no hum. Bias
-    of the amplitude: noise adds to its square what it has in five bins.
+    by chance (1e-8), and where each third has nine tenths of the power of each other one, less what noise explains:
+    what rings out is no hum, and neither is a mode that noise drives, for its amplitude wanders; it passes by chance
+    about once in 20 recordings. Bias of the amplitude: noise adds to its square what it has in five bins.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def _powers(x: Floats, rate_hz: float) -> Floats:
 
 
 def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple[float, float] | None:
-    """Place in bins and amplitude of a tone near a place; None where none stands out, or one decays."""
+    """Place in bins and amplitude of a tone near a place; None where none stands out, or its power changes."""
     mean, reach = power.mean(axis=0), max(1, round(_REACH * expected))
     first = max(round(expected) - reach, 1)
     at = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
@@ -106,6 +108,7 @@ def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple
     if beside.size < _BESIDE.size // 2 or mean[at] <= stands_out_by(beside.size // 2) * mean[beside].mean():
         return None
     of_part = power[:, lobe].sum(axis=1)
-    if of_part[-1] < STEADY * of_part[0]:
+    by_noise = _NOISE * np.sqrt(mean[beside].mean() / of_part.mean())
+    if of_part.min() < (STEADY - by_noise) * of_part.max():
         return None
     return float(np.average(lobe, weights=mean[lobe])), float(np.sqrt(of_part.mean()))
