@@ -255,6 +255,8 @@ class Tracking:
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block):
                 self._set_clock()
+                for event in self._relation.drain_events():
+                    self._out.write_event(event)
             yield block
 
     def _set_clock(self) -> None:
