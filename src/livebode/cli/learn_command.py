@@ -134,8 +134,8 @@ def _dependence(model: dict[str, Any]) -> str:
         sizes = ", ".join(f"{what} by {percent:g} %" for what, percent in differ.items())
         text += (
             f"\nThe runs differ from each other: {sizes} (standard deviation). A change like that is detected when it "
-            "happens within a run; one that is there from the start only beyond three times that. If a temperature explains it, name its channel in "
-            "[monitoring] covariates of the runs."
+            "happens within a run; one that is there from the start only beyond three times that. If a temperature "
+            "explains it, name its channel in [monitoring] covariates of the runs."
         )
     return text
 
