@@ -101,6 +101,16 @@ def test_a_flood_is_counted_and_its_lines_do_not_grow_with_it() -> None:
     assert lengths[1] < 1.1 * lengths[0]
 
 
+def test_a_row_is_of_its_own_kind_where_its_newest_events_were_only_counted() -> None:
+    steps = ["loss", "gap", *["loss"] * 1200, *["gap", "loss"] * 50]
+    events = [Event(kind, n, n / 1e3, kind) for n, kind in enumerate(steps)]
+    for lines in (reported(EventGroups(), events), reported(EventGroups(), events)[-1:]):
+        rows = event_rows(lines)
+        assert sorted(row.newest.kind for row in rows) == ["gap", "loss"]
+        assert {row.newest.kind: row.count for row in rows} == counted(lines)
+        assert all(row.newest.message in (row.newest.kind, "counted") for row in rows if row.newest.kind == "gap")
+
+
 def test_a_cause_that_was_silent_begins_another_group() -> None:
     groups = EventGroups()
     names = [groups.take(Event("gap", n, s, ""))[0].details["group"] for n, s in ((1, 0.0), (2, QUIET_S + 1))]
