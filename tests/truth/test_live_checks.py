@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -73,6 +74,19 @@ def test_a_transient_at_the_start_is_left_out(recorded: np.ndarray) -> None:
     assert found(data, transient=False) == []
 
 
+def test_a_transient_is_judged_only_where_nothing_was_excited_before(recorded: np.ndarray) -> None:
+    silent, burst = np.zeros((3, 36_000)), recorded[:, : 10 * WINDOW]
+    late = np.hstack([silent, np.zeros_like(burst), silent, np.zeros_like(burst), np.zeros((3, 2000)), recorded])
+    (event,) = found(late, roles=False)
+    assert 82_000 <= event.details["samples"] <= 82_000 + WINDOW
+    assert f"with what came before, {event.details['samples']} samples" in event.message
+    bursts = late.copy()
+    for at in (20_000, 60_000):  # too short to be judged
+        bursts[:, at : at + burst.shape[1]] = burst
+    assert found(bursts, roles=False) == []
+    assert found(late, roles=False, gaps=(41_250,)) == []  # what was lost may have been excited
+
+
 @pytest.mark.parametrize("missing", [-7, 1, 60])
 def test_a_slip_that_no_number_tells_is_named(recorded: np.ndarray, missing: int) -> None:
     at = 21_234
@@ -87,6 +101,38 @@ def test_a_loss_that_is_known_is_no_slip(recorded: np.ndarray) -> None:
     at = 21_234
     slipped = np.hstack([recorded[:, :at], recorded[:, at + 60 :]])
     assert found(slipped, gaps=(at,), roles=False, transient=False) == []
+
+
+SEARCHED, AT = 32 * WINDOW, 90_000
+
+
+def slips_behind(lost: list[tuple[int, int]], x: np.ndarray) -> list[tuple[int, int]]:
+    """The slips found in these samples without the lost ones."""
+    checks = LiveChecks(SETTINGS, list(NAMES), roles=False, transient=False)
+    came = [
+        replace(block, gap=any(block.start == stop for _, stop in lost))
+        for block in blocks(x, WINDOW, gaps=tuple(edge for loss in lost for edge in loss))
+        if not any(start <= block.start < stop for start, stop in lost)
+    ]
+    events = [event for block in came for event in checks.take(block)]
+    return [(event.sample, event.details["missing_samples"]) for event in events]
+
+
+@pytest.mark.parametrize(
+    "lost", [[(SEARCHED, SEARCHED + 300)], [(40_000, 40_117 + 66 * WINDOW)], [(SEARCHED, 14_000), (20_000, 70_000)]]
+)
+def test_a_known_loss_wherever_it_is_is_no_slip_and_shifts_none(
+    recorded: np.ndarray, lost: list[tuple[int, int]]
+) -> None:
+    """Right behind what was searched, and longer than what is searched at a time."""
+    w = np.hstack([recorded, recorded])  # of whole periods
+    ((sample, missing),) = slips_behind(lost, np.delete(w, slice(AT, AT + 7), axis=1))
+    assert missing == 7
+    assert abs(sample - AT) <= WINDOW
+
+
+def test_an_unknown_loss_behind_what_was_searched_is_no_slip(recorded: np.ndarray) -> None:
+    assert slips_behind([(SEARCHED, SEARCHED)], np.delete(recorded, slice(SEARCHED, SEARCHED + 60), axis=1)) == []
 
 
 def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, recorded: np.ndarray) -> None:

@@ -247,7 +247,7 @@ class Tracking:
         self.to.tell(event)
         self._out.write_event(event)
         if event.kind == "transient":
-            self._renew(left_out_samples=event.sample + event.details["samples"])
+            self._renew(left_out_samples=event.details["samples"])
 
     def _clocked(self) -> Iterator[Block]:
         # What waits in a file or a pipe says by its arrival nothing of when it was sampled.

@@ -69,11 +69,12 @@ def _moves(schedule: np.ndarray, window: int) -> bool:
 
 
 def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
-    """What is left out, in an Event at the beginning: sample `first`."""
-    window = settings.lines.window
+    """What is left out, in an Event at sample `first`, with which the excitation begins: all up to the steady state."""
+    samples = first + periods * settings.lines.window
     which = "period differs" if periods == 1 else f"{periods} periods differ"
+    before = "with what came before, " if first else ""
     message = (
-        f"the first {which} from the steady state: {counted(periods * window, 'sample')} "
-        f"({periods * window / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
+        f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
+        f"({samples / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
     )
-    return Event("transient", first, time_s, message, {"periods": periods, "samples": periods * window})
+    return Event("transient", first, time_s, message, {"periods": periods, "samples": samples})
