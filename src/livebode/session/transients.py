@@ -57,7 +57,10 @@ def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
     if np.count_nonzero(np.isfinite(x)) < window:
         return 0
     blocks = cut(filled(x), window)
-    return leading(unlike(blocks, spectra(blocks), excited))
+    # A period that was interpolated differs from the others, and says nothing of the machine.
+    whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
+    count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
+    return int(whole[count - 1]) + 1 if count else 0
 
 
 def _moves(schedule: np.ndarray, window: int) -> bool:
