@@ -237,10 +237,12 @@ class Tracking:
         axis, source = self.pipeline.axis, self.source
         if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
             return None
-        roles = isinstance(self.recorder, RunDirectory) or not self.recorder.continued
-        transient = not (self._tally.stop or axis.tracking.all_periods or axis.motion)
-        settings = self._follower.settings
-        return LiveChecks(settings, self.pipeline.channels, roles=roles, transient=transient)
+        tally, settings = self._tally, self._follower.settings
+        # Behind a response that is valid the excitation does not begin any more.
+        begins = not (tally.judged or tally.valid_lines or self._goes_on)
+        transient = begins and not (axis.tracking.all_periods or axis.motion)
+        channels = self.pipeline.channels
+        return LiveChecks(settings, channels, roles=not tally.judged, transient=transient, judged=tally.judge)
 
     def _found(self, event: Event) -> None:
         """Record and show what the signals of a live run show."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event
+from livebode.nouns import Block, Event, counted
 from livebode.session.aligned import SlipSearch, bridged
 from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions
@@ -32,10 +32,20 @@ class LiveChecks:
         Those of the Blocks that are used.
     roles, transient
         Whether the roles are judged, and whether the run may begin with a transient.
+    judged
+        Called when a stretch was judged, which is done once.
     """
 
-    def __init__(self, settings: Settings, channels: list[str], *, roles: bool, transient: bool) -> None:
-        self._settings, self._channels = settings, channels
+    def __init__(
+        self,
+        settings: Settings,
+        channels: list[str],
+        *,
+        roles: bool,
+        transient: bool,
+        judged: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._settings, self._channels, self._tell_judged = settings, channels, judged
         self._roles, self._transient = roles, transient
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
@@ -80,6 +90,7 @@ class LiveChecks:
         if self._transient and (periods := transient_periods(signals, settings)):
             yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
         self._roles = self._transient = False
+        self._tell_judged()
 
     def _slipped(self, block: Block, name: str) -> Iterator[Event]:
         size = _SLIP_PERIODS * self._settings.lines.window
@@ -91,11 +102,12 @@ class LiveChecks:
         if self._slips.begins_at is None:
             self._slips.begins_at = start
         for slip in self._slips.take(bridged(data[0])):
-            many = f"{abs(slip.missing)} sample{'s' * (abs(slip.missing) > 1)}"
+            way, what = ("forward", "missing") if slip.missing > 0 else ("back", "repeated")
             message = (
-                f"the phase of {name!r} leaps at sample {slip.sample}: {many} "
-                f"{'missing' if slip.missing > 0 else 'repeated'} without a gap in the source's numbers, so that the "
-                "responses of the windows around it are wrong; let the sender number its samples"
+                f"the phase of {name!r} leaps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
+                f"where the source reports no gap: samples are {what}, or the generator was started again; the "
+                "responses of the windows around it are wrong; let the generator run on, and the sender number each "
+                "sample as it is taken"
             )
             details = {"missing_samples": slip.missing}
             yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
