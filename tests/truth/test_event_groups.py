@@ -87,6 +87,11 @@ def test_a_thousand_events_of_one_cause_are_one_group_and_each_is_exact() -> Non
     assert (last["count"], last["first_s"], last["last_s"]) == (1065, 0.0, 266.0)
 
 
+def test_what_an_event_without_a_group_counts_stays_with_it() -> None:
+    event = Event("phase-slips", 5, 0.1, "two leaps", {"count": 2, "slips": [[5, 1], [9, 1]]})
+    assert [one for line in reported(EventGroups(), [event]) for one in each_event(line)] == [event]
+
+
 def test_a_flood_is_counted_and_its_lines_do_not_grow_with_it() -> None:
     lengths = []
     for rate_hz in (100, 1000):

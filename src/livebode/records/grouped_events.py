@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from livebode.nouns import Event
 
-_FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}
+_FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}  # that a group adds
 
 
 def each_event(event: Event) -> Iterator[Event]:
@@ -18,7 +18,8 @@ def each_event(event: Event) -> Iterator[Event]:
     """
     repeats = _repeats(event)
     if not repeats:
-        yield replace(event, details={name: event.details[name] for name in event.details.keys() - _FIELDS})
+        added = set() if group_of(event) is None else _FIELDS
+        yield replace(event, details={name: event.details[name] for name in event.details.keys() - added})
     yield from repeats
 
 
