@@ -10,9 +10,10 @@ import pytest
 from livebode.monitoring import Machine, MachineMonitor, seconds_between
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs
+from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.run_offset import RunOffset
-from livebode.nouns import Event
+from livebode.nouns import Block, Event
 from livebode.simulation import TensionLoss
 from studies.healthy import ASKED, NAMES
 from studies.monitoring_axis import LINES
@@ -77,6 +78,26 @@ def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_othe
     assert information[:, 1:, 1:] == pytest.approx(free)
     found = np.linalg.solve(information[:, 1:, 1:].sum(axis=0), score[:, 1:].sum(axis=0))
     assert found == pytest.approx([0.0, 0.0, 0.03], abs=2e-3)
+
+
+def test_windows_without_information_are_projected_to_none_and_charts_refuse_what_is_no_number() -> None:
+    score, information = BELT.projected(np.zeros((1, 4)), np.zeros((1, 4, 4)), SMALLEST)
+    assert not score.any()
+    assert not information.any()
+    with pytest.raises(ValueError, match="not a number"):
+        Charts(SMALLEST, np.zeros(4), 20.0).step(np.full(4, np.nan), np.ones(4), 0)
+
+
+def test_a_loss_is_found_in_a_run_that_begins_without_torque() -> None:
+    statuses: list[str] = []
+    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S), []
+    for block in at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=8.0)():
+        data = block.data.copy()
+        data[block.index("u"), : max(2 * 4000 - block.start, 0)] = 0.0
+        still = Block(data, block.channels, block.rate_hz, start=block.start)
+        events += monitor.process(still, lambda seen: statuses.extend(seen.status))
+    assert "unexcited" in statuses
+    assert changes(events + monitor.finish()) == ["stiffness"]
 
 
 def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:

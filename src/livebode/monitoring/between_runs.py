@@ -47,8 +47,8 @@ class BetweenRuns:
         The directions that the offset is made of are left without information.
         """
         along = information @ self.direction
-        own = along @ self.direction
-        gain = along / own[:, np.newaxis]
+        own = (along @ self.direction)[:, np.newaxis]
+        gain = np.divide(along, own, out=np.zeros_like(along), where=own > np.finfo(float).tiny)
         score = score - gain * (score @ self.direction)[:, np.newaxis]
         information = information - gain[:, :, np.newaxis] * along[:, np.newaxis, :]
         seen = ~self.dominant(smallest)

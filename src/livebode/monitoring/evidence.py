@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
-COVARIATE, NO_COVARIATE = "covariate", "no covariate"
+COVARIATE, NO_COVARIATE, UNEXCITED = "covariate", "no covariate", "unexcited"
 """Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
-covariate is outside of the learned range, or has no value."""
+covariate is outside of the learned range, or has no value; no torque at the lines."""
 
 
 @dataclass(frozen=True, eq=False)

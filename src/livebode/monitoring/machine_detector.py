@@ -30,7 +30,7 @@ _LOOK = 0.22  # of the way: a change is a place's only if the rest is not change
 _PASSED = 2.0  # standard deviations of a place, behind which its middle is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _SMALL = 0.5  # of the smallest change that an alarm is for: less is none
-_STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED}
+_STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED, word.UNEXCITED}
 
 Moment = tuple[float, float, float]
 """Position, newest sample and time of a window."""
