@@ -9,7 +9,7 @@ import pytest
 
 from livebode.monitoring import Machine, MachineMonitor, seconds_between
 from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.between_runs import BetweenRuns, between_runs
+from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.run_offset import RunOffset
@@ -66,6 +66,28 @@ def test_runs_that_do_not_differ_or_hardly_have_none(runs: int, size: float) -> 
     for _ in range(30):
         offsets = size * SMALLEST * np.array([1, 0, 0, 0]) * generator.uniform(-1.7, 1.7, (runs, 1))
         assert between_runs([windows(generator, offset, 72) for offset in offsets], SMALLEST) is None
+
+
+@pytest.mark.parametrize(("runs", "count"), [(2, 240), (3, 72), (5, 48)])
+def test_too_few_runs_or_stretches_show_no_direction(runs: int, count: int) -> None:
+    generator = np.random.default_rng(4)
+    parts = [windows(generator, offset * SMALLEST, count) for offset in np.linspace(-5.0, 5.0, runs)]
+    assert between_runs(parts, SMALLEST) is None
+
+
+@pytest.mark.parametrize(("between", "within"), [(2, 10), (4, 70)])
+def test_a_direction_chosen_by_the_noise_is_not_less_likely_than_its_bound_says(between: int, within: int) -> None:
+    """5,000 pairs of Wishart matrices without a difference; the bound of the fraction is four standard deviations."""
+    generator, draws, level = np.random.default_rng(5), 5000, 0.01
+    among, noise = (generator.standard_normal((draws, degrees, 4)) for degrees in (between, within))
+    ratios = np.linalg.solve(noise.swapaxes(1, 2) @ noise, among.swapaxes(1, 2) @ among)
+    roots = np.linalg.eigvals(ratios).real
+    limit = level + 4 * np.sqrt(level / draws)
+    assert np.mean([chance(root, between, within) < level for root in roots.max(axis=1)]) < limit
+    wilks = np.prod(1 + roots, axis=1) - 1
+    assert np.mean([chance(ratio, between, within) < level for ratio in wilks]) == pytest.approx(
+        level, abs=limit - level
+    )
 
 
 def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_others() -> None:
