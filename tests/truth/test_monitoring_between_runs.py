@@ -12,6 +12,7 @@ from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
+from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.run_offset import RunOffset
 from livebode.nouns import Block, Event
 from livebode.simulation import TensionLoss
@@ -132,6 +133,24 @@ def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
     assert own.reference == pytest.approx(1.2 * BELT.direction, rel=1e-2)
     own.step(information @ BELT.direction, information, 31, 3.0 + 61.0)
     assert not own.known
+
+
+@pytest.mark.parametrize(("information", "reports"), [(0.1, 1), (1.0, 0)])
+def test_an_offset_that_the_windows_never_tell_well_enough_is_reported_once(information: float, reports: int) -> None:
+    """600 windows, each with so much information on a smallest change: 0.16 of it would tell a tenth at last."""
+    generator, detector = np.random.default_rng(6), MachineDetector(without_sensor(), 24.0)
+    known, root = np.diag(information / SMALLEST**2), np.sqrt(information) / SMALLEST
+    events = []
+    for _ in range(60):
+        noise = generator.standard_normal((10, 4)) * root
+        seen = windows(generator, np.zeros(4), 10)
+        score = noise - known @ detector.offset.logarithms
+        events += detector.process(replace(seen, score=score, information=np.tile(known, (10, 1, 1))))
+    assert [event.details["reason"] for event in events] == ["offset"] * reports
+    if reports:
+        assert "tell its own offset only to ± 0.072 %" in events[0].message
+        assert "the belt's stiffness" in events[0].message
+        assert "detected only beyond 3 % from the baseline" in events[0].message
 
 
 def test_a_healthy_run_at_another_temperature_raises_no_alarm_nor_does_what_temperature_explains() -> None:

@@ -14,6 +14,8 @@ JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast
 COVARIATE, NO_COVARIATE, UNEXCITED = "covariate", "no covariate", "unexcited"
 """Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
 covariate is outside of the learned range, or has no value; no torque at the lines."""
+OFFSET = "offset"
+"""Why changes along what differs between runs are not judged: the windows tell too little of this run's own offset."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from livebode.monitoring.naming import Change, Segment, begin_of, candidates, fa
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.sentences import changed, cleared, corrected, far_away, unknown
+from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
 from livebode.monitoring.standing import Standing
 from livebode.nouns import Event
 
@@ -88,7 +88,11 @@ class MachineDetector:
                 events.append(unknown(self._machine, seen, i))
         self.standing.settle()
         self._own.settle(self._oldest(), idle=self._pending < 0 and not self.standing.alarms)
-        return events + self._said(int(seen.sample[-1]), float(seen.time_s[-1]))
+        sample, time_s = int(seen.sample[-1]), float(seen.time_s[-1])
+        if self._own.unreachable and word.OFFSET not in self._unknown:
+            self._unknown.add(word.OFFSET)
+            events.append(offset_unknown(self._machine, self._own.error_reachable, sample, time_s))
+        return events + self._said(sample, time_s)
 
     def finish(self) -> list[Event]:
         """A change that was found but not yet named, named by what is likeliest."""
