@@ -135,6 +135,29 @@ def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
     assert not own.known
 
 
+def test_windows_that_wait_for_longer_than_an_alarm_looks_back_enter_the_offset() -> None:
+    own, information = RunOffset(BELT, Accuracy(np.ones(4), np.zeros(4), SMALLEST), 20.0), np.diag(60.0 / SMALLEST**2)
+    for mark in range(610):
+        own.step(information @ (0.2 * BELT.direction), information, mark, mark / 10)
+        own.settle(0, idle=True)
+    assert own.reference == pytest.approx(0.2 * BELT.direction, rel=1e-2)
+
+
+def test_a_chart_of_a_cell_that_the_cart_has_left_does_not_keep_the_offset_from_following() -> None:
+    detector, known = MachineDetector(without_sensor(), 24.0), np.diag(60.0 / SMALLEST**2)
+    for stretch in range(34):
+        off = np.full((10, 1), (0.1 if stretch else 0.0) * BELT.direction[0])
+        position_m = np.full(10, 1.0)
+        if stretch == 1:
+            off[0], position_m[0] = 0.8 * BELT.direction[0], 0.5
+        seen = windows(np.random.default_rng(7), np.zeros(4), 10)
+        score = (off * [1, 0, 0, 0] - detector.offset.logarithms) @ known
+        time_s, information = np.arange(10) / 10 + stretch, np.tile(known, (10, 1, 1))
+        seen = replace(seen, score=score, information=information, position_m=position_m, time_s=time_s)
+        assert detector.process(seen) == []
+    assert detector.offset.logarithms[0] == pytest.approx(0.1 * BELT.direction[0], rel=0.1)
+
+
 @pytest.mark.parametrize(("information", "reports"), [(0.1, 1), (1.0, 0)])
 def test_an_offset_that_the_windows_never_tell_well_enough_is_reported_once(information: float, reports: int) -> None:
     """600 windows, each with so much information on a smallest change: 0.16 of it would tell a tenth at last."""

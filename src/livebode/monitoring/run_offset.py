@@ -24,7 +24,8 @@ class RunOffset:
 
     The model moves with the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence
     is projected too: an offset of any size explains what it can of each window. The offset is the mean over the windows
-    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not.
+    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not,
+    and at the latest 600 windows later.
     An offset beyond those of healthy runs has a chart of its own; where that raises an alarm, the baseline itself is
     the reference.
 
@@ -100,7 +101,7 @@ class RunOffset:
         self._last_s = time_s
         direction = self._between.direction
         along, own = float(score @ direction), float(direction @ information @ direction)
-        self._queue = np.vstack([self._queue, [mark, along, own]])[-_MEMORY:]
+        self._queue = np.vstack([self._queue, [mark, along, own]])
         self.chart.step(np.array([along]) / self._inflation, np.array([own]) / self._inflation, mark)
 
     def fix(self) -> None:
@@ -108,12 +109,16 @@ class RunOffset:
         self._fixed = True
 
     def settle(self, oldest: int, idle: bool) -> None:
-        """At a stretch's end: windows before the mark `oldest` belong to the run; not `idle`, a change is in them."""
+        """At a stretch's end: windows before the mark `oldest` belong to the run; not `idle`, a change is in them.
+
+        So do those that have waited for 600 others: no alarm looks back that far.
+        """
         if not idle:
             self._queue = self._queue[:0]
             return
         self._fixed = False
         enter = self._queue[:, 0] < oldest
+        enter[:-_MEMORY] = True
         for _, score, information in self._queue[enter]:
             self._sums = (1 - 1 / _MEMORY) * self._sums + (score, information, 1.0)
         self._queue = self._queue[~enter]
