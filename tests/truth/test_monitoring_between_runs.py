@@ -9,10 +9,12 @@ import pytest
 
 from livebode.monitoring import Machine, MachineMonitor, seconds_between
 from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.between_runs import BetweenRuns, between_runs
+from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
+from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
+from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.run_offset import RunOffset
-from livebode.nouns import Event
+from livebode.nouns import Block, Event
 from livebode.simulation import TensionLoss
 from studies.healthy import ASKED, NAMES
 from studies.monitoring_axis import LINES
@@ -67,6 +69,28 @@ def test_runs_that_do_not_differ_or_hardly_have_none(runs: int, size: float) -> 
         assert between_runs([windows(generator, offset, 72) for offset in offsets], SMALLEST) is None
 
 
+@pytest.mark.parametrize(("runs", "count"), [(2, 240), (3, 72), (5, 48)])
+def test_too_few_runs_or_stretches_show_no_direction(runs: int, count: int) -> None:
+    generator = np.random.default_rng(4)
+    parts = [windows(generator, offset * SMALLEST, count) for offset in np.linspace(-5.0, 5.0, runs)]
+    assert between_runs(parts, SMALLEST) is None
+
+
+@pytest.mark.parametrize(("between", "within"), [(2, 10), (4, 70)])
+def test_a_direction_chosen_by_the_noise_is_not_less_likely_than_its_bound_says(between: int, within: int) -> None:
+    """5,000 pairs of Wishart matrices without a difference; the bound of the fraction is four standard deviations."""
+    generator, draws, level = np.random.default_rng(5), 5000, 0.01
+    among, noise = (generator.standard_normal((draws, degrees, 4)) for degrees in (between, within))
+    ratios = np.linalg.solve(noise.swapaxes(1, 2) @ noise, among.swapaxes(1, 2) @ among)
+    roots = np.linalg.eigvals(ratios).real
+    limit = level + 4 * np.sqrt(level / draws)
+    assert np.mean([chance(root, between, within) < level for root in roots.max(axis=1)]) < limit
+    wilks = np.prod(1 + roots, axis=1) - 1
+    assert np.mean([chance(ratio, between, within) < level for ratio in wilks]) == pytest.approx(
+        level, abs=limit - level
+    )
+
+
 def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_others() -> None:
     seen = windows(np.random.default_rng(3), np.array([0.02, 0.0, 0.0, 0.03]), 2000)
     between = BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.0)
@@ -79,6 +103,26 @@ def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_othe
     assert found == pytest.approx([0.0, 0.0, 0.03], abs=2e-3)
 
 
+def test_windows_without_information_are_projected_to_none_and_charts_refuse_what_is_no_number() -> None:
+    score, information = BELT.projected(np.zeros((1, 4)), np.zeros((1, 4, 4)), SMALLEST)
+    assert not score.any()
+    assert not information.any()
+    with pytest.raises(ValueError, match="not a number"):
+        Charts(SMALLEST, np.zeros(4), 20.0).step(np.full(4, np.nan), np.ones(4), 0)
+
+
+def test_a_loss_is_found_in_a_run_that_begins_without_torque() -> None:
+    statuses: list[str] = []
+    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S), []
+    for block in at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=8.0)():
+        data = block.data.copy()
+        data[block.index("u"), : max(2 * 4000 - block.start, 0)] = 0.0
+        still = Block(data, block.channels, block.rate_hz, start=block.start)
+        events += monitor.process(still, lambda seen: statuses.extend(seen.status))
+    assert "unexcited" in statuses
+    assert changes(events + monitor.finish()) == ["stiffness"]
+
+
 def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
     held = Accuracy(np.ones(4), np.zeros(4), SMALLEST)
     own, information = RunOffset(BELT, held, 20.0), np.diag(60.0 / SMALLEST**2)
@@ -89,6 +133,47 @@ def test_an_offset_is_followed_and_forgotten_after_a_pause() -> None:
     assert own.reference == pytest.approx(1.2 * BELT.direction, rel=1e-2)
     own.step(information @ BELT.direction, information, 31, 3.0 + 61.0)
     assert not own.known
+
+
+def test_windows_that_wait_for_longer_than_an_alarm_looks_back_enter_the_offset() -> None:
+    own, information = RunOffset(BELT, Accuracy(np.ones(4), np.zeros(4), SMALLEST), 20.0), np.diag(60.0 / SMALLEST**2)
+    for mark in range(610):
+        own.step(information @ (0.2 * BELT.direction), information, mark, mark / 10)
+        own.settle(0, idle=True)
+    assert own.reference == pytest.approx(0.2 * BELT.direction, rel=1e-2)
+
+
+def test_a_chart_of_a_cell_that_the_cart_has_left_does_not_keep_the_offset_from_following() -> None:
+    detector, known = MachineDetector(without_sensor(), 24.0), np.diag(60.0 / SMALLEST**2)
+    for stretch in range(34):
+        off = np.full((10, 1), (0.1 if stretch else 0.0) * BELT.direction[0])
+        position_m = np.full(10, 1.0)
+        if stretch == 1:
+            off[0], position_m[0] = 0.8 * BELT.direction[0], 0.5
+        seen = windows(np.random.default_rng(7), np.zeros(4), 10)
+        score = (off * [1, 0, 0, 0] - detector.offset.logarithms) @ known
+        time_s, information = np.arange(10) / 10 + stretch, np.tile(known, (10, 1, 1))
+        seen = replace(seen, score=score, information=information, position_m=position_m, time_s=time_s)
+        assert detector.process(seen) == []
+    assert detector.offset.logarithms[0] == pytest.approx(0.1 * BELT.direction[0], rel=0.1)
+
+
+@pytest.mark.parametrize(("information", "reports"), [(0.1, 1), (1.0, 0)])
+def test_an_offset_that_the_windows_never_tell_well_enough_is_reported_once(information: float, reports: int) -> None:
+    """600 windows, each with so much information on a smallest change: 0.16 of it would tell a tenth at last."""
+    generator, detector = np.random.default_rng(6), MachineDetector(without_sensor(), 24.0)
+    known, root = np.diag(information / SMALLEST**2), np.sqrt(information) / SMALLEST
+    events = []
+    for _ in range(60):
+        noise = generator.standard_normal((10, 4)) * root
+        seen = windows(generator, np.zeros(4), 10)
+        score = noise - known @ detector.offset.logarithms
+        events += detector.process(replace(seen, score=score, information=np.tile(known, (10, 1, 1))))
+    assert [event.details["reason"] for event in events] == ["offset"] * reports
+    if reports:
+        assert "tell its own offset only to ± 0.072 %" in events[0].message
+        assert "the belt's stiffness" in events[0].message
+        assert "detected only beyond 3 % from the baseline" in events[0].message
 
 
 def test_a_healthy_run_at_another_temperature_raises_no_alarm_nor_does_what_temperature_explains() -> None:

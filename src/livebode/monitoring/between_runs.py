@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, t
+from scipy.stats import f, t
 
 from livebode.monitoring.accuracy import STRETCH
 from livebode.monitoring.evidence import Evidence
@@ -19,6 +19,7 @@ _FALSE = 1e-4  # chance of a direction that is not there
 _MATTERS = 0.25  # of the smallest change: runs that differ by less need no allowance
 _DOMINANT = 0.5  # of the largest component, in smallest changes: such a direction is not seen beside the offset
 _CERTAIN = 0.95
+_RUNS_MIN, _WITHIN_MIN = 3, 10  # runs, and degrees of freedom of their stretches, from which on they are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,25 +31,25 @@ class BetweenRuns:
     direction
         Of the logarithms of stiffness, load, damping, inertia, (4,); its largest component is one smallest change.
     spread
-        Standard deviation of the runs' offsets along it, with what so few runs leave open.
+        Standard deviation of the runs' offsets along it, with the uncertainty of an estimate from so few runs.
     """
 
     direction: Floats
     spread: float
 
     def dominant(self, smallest: Floats) -> NDArray[np.bool_]:
-        """Directions that the offset is made of, (4,): a change of one is seen within a run alone."""
+        """Directions with a large share of the offset, (4,): a change of one is detected only within a run."""
         share = np.abs(self.direction / smallest)
         return np.asarray(share >= _DOMINANT * share.max())
 
     def projected(self, score: Floats, information: Floats, smallest: Floats) -> tuple[Floats, Floats]:
         """Score and information of windows with an offset of any size allowed for in each, (rows, 4), (rows, 4, 4).
 
-        The directions that the offset is made of are left without information.
+        The dominant directions are left without information.
         """
         along = information @ self.direction
-        own = along @ self.direction
-        gain = along / own[:, np.newaxis]
+        own = (along @ self.direction)[:, np.newaxis]
+        gain = np.divide(along, own, out=np.zeros_like(along), where=own > np.finfo(float).tiny)
         score = score - gain * (score @ self.direction)[:, np.newaxis]
         information = information - gain[:, :, np.newaxis] * along[:, np.newaxis, :]
         seen = ~self.dominant(smallest)
@@ -58,35 +59,58 @@ class BetweenRuns:
 def between_runs(parts: Sequence[Evidence], smallest: Floats) -> BetweenRuns | None:
     """The direction in which these runs differ, if it is beyond chance and matters.
 
-    A run's offset is estimated from all of its windows, with the covariance that its stretches of 24 windows show. What
-    the offsets scatter beyond that has a largest principal component, in units of the smallest changes; it counts where
-    chance makes it less than once in 10,000 times, and where its standard deviation exceeds a quarter of the smallest
-    change: then it would be taken for what healthy stretches have in common, and hide changes in every direction.
+    A run's offset is estimated from all of its windows. What stretches of 24 windows scatter within runs, pooled, is
+    the noise; what the offsets scatter beyond it has a largest principal component, in units of the smallest changes.
+    It counts where chance makes it less than once in 10,000 times, and where its standard deviation exceeds a quarter
+    of the smallest change: then it would be taken for what healthy stretches have in common, and hide changes in every
+    direction. Fewer than three runs, or than ten degrees of freedom of the stretches, have none.
     """
     parts = [part for part in parts if len(part) >= STRETCH]
-    if len(parts) < 2:
+    if len(parts) < _RUNS_MIN:
         return None
-    offsets, errors = zip(*(_offset(part, smallest) for part in parts))
-    rest = np.array(offsets) - np.mean(offsets, axis=0)
-    degrees = len(parts) - 1
-    size, vectors = np.linalg.eigh(rest.T @ rest / degrees - np.mean(errors, axis=0))
+    offsets, stretches = zip(*(_offset(part, smallest) for part in parts))
+    degrees, within = len(parts) - 1, sum(len(stretch) - 1 for stretch in stretches)
+    if within < _WITHIN_MIN:
+        return None
+    windows = np.array([len(part) for part in parts])
+    offset, scattered = np.array(offsets), np.concatenate(stretches)
+    rest, noise = offset - offset.mean(axis=0), scattered.T @ scattered / within
+    size, vectors = np.linalg.eigh(rest.T @ rest / degrees - noise * np.mean(1 / windows))
     along = vectors[:, -1] / np.abs(vectors[:, -1]).max()
-    noise = along @ np.mean(errors, axis=0) @ along
-    chance = chi2.sf(np.sum((rest @ along) ** 2) / noise, degrees)
-    spread = np.sqrt(max(np.sum((rest @ along) ** 2) / degrees - noise, 0.0)) / (along @ along)
-    if chance > _FALSE or spread < _MATTERS or size[-1] <= 0:
+    weighted = (offset - np.average(offset, axis=0, weights=windows)) @ along
+    ratio = float(windows @ weighted**2 / np.sum((scattered @ along) ** 2))
+    variance = np.sum((rest @ along) ** 2) / degrees - along @ noise @ along * np.mean(1 / windows)
+    spread = np.sqrt(max(variance, 0.0)) / (along @ along)
+    if chance(ratio, degrees, within) > _FALSE or spread < _MATTERS or size[-1] <= 0:
         return None
     few = t.ppf(_CERTAIN, degrees) / t.ppf(_CERTAIN, np.inf)
     return BetweenRuns(along * smallest, float(spread * few))
 
 
+def chance(ratio: float, between: int, within: int) -> float:
+    """Upper bound of the chance that some direction of four scatters so much more between runs than within.
+
+    `ratio` is of the sums of squares, with these degrees of freedom. The direction was chosen by the data, so its ratio
+    is at most the largest root of the two Wishart matrices; and Wilks' Λ is at most 1/(1 + that root). Λ's distribution
+    by Rao, Bull. Int. Stat. Inst. 33, 1951.
+    """
+    p = 4
+    root = np.sqrt(((p * between) ** 2 - 4) / (p**2 + between**2 - 5))
+    first = p * between
+    second = (within - (p - between + 1) / 2) * root - first / 2 + 1
+    return float(f.sf(((1 + ratio) ** (1 / root) - 1) * second / first, first, second))
+
+
 def _offset(part: Evidence, smallest: Floats) -> tuple[Floats, Floats]:
-    """All four directions of a run together and their covariance, in smallest changes, (4,), (4, 4)."""
+    """All four directions of a run together, (4,), and how its stretches scatter, (stretches, 4), in smallest changes.
+
+    The latter as of a single window: a mean over n windows has 1/n of that covariance.
+    """
     information = part.information.sum(axis=0)
     inverse = np.linalg.inv(information)
     offset = inverse @ part.score.sum(axis=0)
     left = part.score - part.information @ offset
     cut = np.arange(STRETCH, len(left) - STRETCH // 2, STRETCH)
+    scale = [len(left) / np.sqrt(len(piece)) for piece in np.split(left, cut)]
     sums = np.array([piece.sum(axis=0) for piece in np.split(left, cut)])
-    shown = inverse @ (sums.T @ sums) @ inverse * len(sums) / (len(sums) - 1) if len(sums) > 1 else inverse
-    return offset / smallest, shown / np.outer(smallest, smallest)
+    return offset / smallest, sums @ inverse * np.array(scale)[:, np.newaxis] / smallest

@@ -52,6 +52,8 @@ class Charts:
         ratio = self._gain * np.stack([score, -score]) - self._gain * self._middle * information
         if judged is not None:
             ratio = np.where(judged, ratio, 0.0)
+        if np.isnan(ratio).any():  # would stay in the sums, which never reach the threshold again
+            raise ValueError("score or information of a judged component is not a number")
         leaves = (self.sums == 0) & (ratio > 0)
         self.since[leaves] = mark
         self.sums = np.clip(self.sums + ratio, 0.0, self.threshold)

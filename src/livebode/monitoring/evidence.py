@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
-COVARIATE, NO_COVARIATE = "covariate", "no covariate"
+COVARIATE, NO_COVARIATE, UNEXCITED = "covariate", "no covariate", "unexcited"
 """Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
-covariate is outside of the learned range, or has no value."""
+covariate is outside of the learned range, or has no value; no torque at the lines."""
+OFFSET = "offset"
+"""Why changes along what differs between runs are not judged: the windows tell too little of this run's own offset."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from livebode.monitoring.naming import Change, Segment, begin_of, candidates, fa
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.sentences import changed, cleared, corrected, far_away, unknown
+from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
 from livebode.monitoring.standing import Standing
 from livebode.nouns import Event
 
@@ -26,11 +26,12 @@ CHARTS = 2 * len(DIRECTIONS) + 2
 _DECISIVE = 7.0  # nats between the likeliest name and the next: wrong once in a thousand
 _LOOK_WINDOWS = 600  # after so many a change is named by what is likeliest
 _OFTEN, _SELDOM = 40, 10  # windows during which every one, and then every tenth, is an occasion to name it
+_LEFT_WINDOWS = 300  # of motion elsewhere, after which a cell's chart does not keep the run's offset from following
 _LOOK = 0.22  # of the way: a change is a place's only if the rest is not changed, so one looks around
 _PASSED = 2.0  # standard deviations of a place, behind which its middle is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _SMALL = 0.5  # of the smallest change that an alarm is for: less is none
-_STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED}
+_STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED, word.UNEXCITED}
 
 Moment = tuple[float, float, float]
 """Position, newest sample and time of a window."""
@@ -64,6 +65,7 @@ class MachineDetector:
         self.standing = Standing(machine, threshold)
         self._own = RunOffset(machine.between, held, threshold)
         self._recent = Recent(_LOOK_WINDOWS)
+        self._passed = np.full(size, -1)  # mark of the newest window in each cell
         self._pending, self._taken = -1, 0
         self._unknown: set[str] = set()
         self._far = False
@@ -88,7 +90,11 @@ class MachineDetector:
                 events.append(unknown(self._machine, seen, i))
         self.standing.settle()
         self._own.settle(self._oldest(), idle=self._pending < 0 and not self.standing.alarms)
-        return events + self._said(int(seen.sample[-1]), float(seen.time_s[-1]))
+        sample, time_s = int(seen.sample[-1]), float(seen.time_s[-1])
+        if self._own.unreachable and word.OFFSET not in self._unknown:
+            self._unknown.add(word.OFFSET)
+            events.append(offset_unknown(self._machine, self._own.error_reachable, sample, time_s))
+        return events + self._said(sample, time_s)
 
     def finish(self) -> list[Event]:
         """A change that was found but not yet named, named by what is likeliest."""
@@ -134,6 +140,7 @@ class MachineDetector:
             score, information = score / inflation, np.diagonal(information) / inflation
             self._first.step(score, information, mark)
             here = np.arange(len(self._machine.windows)) == self._machine.cell(position_m)
+            self._passed[here] = mark
             self._cells.step(here * score[_STIFFNESS], here * information[_STIFFNESS], mark)
         self._look()
         return events
@@ -204,20 +211,25 @@ class MachineDetector:
         self._pending = -1
 
     def _oldest(self) -> int:
-        """Mark of the first window since which a chart is not at zero: from there on a change may be in them."""
-        since = np.concatenate([chart.since[chart.sums > 0] for chart in (self._first, self._cells)])
+        """Mark of the first window since which a chart is not at zero: from there on a change may be in them.
+
+        The chart of a cell that the cart has left for long stays as it is, whatever the machine does.
+        """
+        visited = (self._cells.sums > 0) & (self._passed > self._taken - _LEFT_WINDOWS)
+        since = np.concatenate([self._first.since[self._first.sums > 0], self._cells.since[visited]])
         return int(since.min(initial=self._taken))
 
     def state(self) -> dict[str, NDArray[Any]]:
         parts = {f"{name}.{key}": array for name, part in self._parts().items() for key, array in part.state().items()}
         numbers = np.array([self._pending, self._taken, self.judged, self._far])
-        return parts | {"numbers": numbers, "unknown": np.array(sorted(self._unknown), dtype="U16")}
+        unknown = np.array(sorted(self._unknown), dtype="U16")
+        return parts | {"numbers": numbers, "passed": self._passed.copy(), "unknown": unknown}
 
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         for name, part in self._parts().items():
             part.load({k.removeprefix(f"{name}."): v for k, v in state.items() if k.startswith(f"{name}.")})
         self._pending, self._taken, self.judged, far = (int(n) for n in state["numbers"])
-        self._far = bool(far)
+        self._far, self._passed = bool(far), np.array(state["passed"])
         self._unknown = {str(name) for name in state["unknown"]}
 
     def _parts(self) -> dict[str, Any]:

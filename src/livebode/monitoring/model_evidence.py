@@ -28,6 +28,7 @@ _SPEED_MARGIN = 0.1
 _OWN = len(DIRECTIONS)
 _LEVEL_MEMORY = 0.9  # per window, of the noise's level
 _LEVEL_RISE_MAX = 4.0
+_UNINFORMED = 1e-6  # of what tells a smallest change to one standard deviation: no run is long enough for that
 _DISTURBED = 20.0  # the mean of six quiet bins is that much above its own level once in 1e40 windows
 
 
@@ -83,6 +84,8 @@ class ModelEvidence:
             known, ripple_score, cross, gram, machine.ripple.spread,
         )  # fmt: skip
         score = score - np.einsum("wjk,wk->wj", information[:, :, :_OWN], rest_of_shift)
+        in_smallest = np.einsum("wjj->wj", information[:, :_OWN, :_OWN]) * machine.held.smallest**2
+        status[(status == word.JUDGED) & (in_smallest.max(axis=1) < _UNINFORMED)] = word.UNEXCITED
         return Evidence(
             score=score[:, :_OWN],
             information=information[:, :_OWN, :_OWN],

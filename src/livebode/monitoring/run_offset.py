@@ -15,6 +15,7 @@ from livebode.monitoring.naming import Segment
 Floats = NDArray[np.float64]
 
 _MEMORY = 600  # windows that have an offset in common: a minute of motion, as a recording to learn from
+_FULL = 0.8  # of the memory: more of it takes minutes to fill
 _PAUSE_S = 60.0  # without judged motion, after which the machine may be at another temperature
 
 
@@ -23,7 +24,8 @@ class RunOffset:
 
     The model moves with the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence
     is projected too: an offset of any size explains what it can of each window. The offset is the mean over the windows
-    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not.
+    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not,
+    and at the latest 600 windows later.
     An offset beyond those of healthy runs has a chart of its own; where that raises an alarm, the baseline itself is
     the reference.
 
@@ -42,7 +44,7 @@ class RunOffset:
         spread = np.array([0.0 if between is None else between.spread])
         self.chart = Charts(4 * spread, 2 * spread, threshold)
         """Of the offset itself."""
-        self._sums = np.zeros(2)  # score and information along the direction
+        self._sums = np.zeros(3)  # score and information along the direction, and windows
         self._queue = np.zeros((0, 3))  # mark, score, information of windows that may belong to a change
         self._fixed = False
         self._last_s = -np.inf
@@ -58,6 +60,22 @@ class RunOffset:
     def known(self) -> bool:
         """Whether the offset is known well enough for evidence along it to count."""
         return self._between is None or self._fixed or bool(self._sums[1] * KNOWN**2 > self._inflation)
+
+    @property
+    def error_reachable(self) -> float:
+        """Standard deviation to which the offset gets known with windows like those so far, in smallest changes.
+
+        Zero before half of the memory is full: what windows tell depends on speed and place.
+        """
+        _, information, windows = self._sums
+        if windows < _MEMORY / 2 or information <= 0:
+            return 0.0
+        return float(np.sqrt(self._inflation * windows / (information * _FULL * _MEMORY)))
+
+    @property
+    def unreachable(self) -> bool:
+        """Whether windows like those so far leave the offset unknown, or known only after minutes."""
+        return not self.known and self.error_reachable > KNOWN
 
     def within_run(self, direction: int) -> bool:
         """Whether changes of this direction are from what the run was before, not from the baseline."""
@@ -79,11 +97,11 @@ class RunOffset:
         if self._between is None:
             return
         if time_s - self._last_s > _PAUSE_S:
-            self._sums, self._queue = np.zeros(2), np.zeros((0, 3))
+            self._sums, self._queue = np.zeros(3), np.zeros((0, 3))
         self._last_s = time_s
         direction = self._between.direction
         along, own = float(score @ direction), float(direction @ information @ direction)
-        self._queue = np.vstack([self._queue, [mark, along, own]])[-_MEMORY:]
+        self._queue = np.vstack([self._queue, [mark, along, own]])
         self.chart.step(np.array([along]) / self._inflation, np.array([own]) / self._inflation, mark)
 
     def fix(self) -> None:
@@ -91,14 +109,18 @@ class RunOffset:
         self._fixed = True
 
     def settle(self, oldest: int, idle: bool) -> None:
-        """At a stretch's end: windows before the mark `oldest` belong to the run; not `idle`, a change is in them."""
+        """At a stretch's end: windows before the mark `oldest` belong to the run; not `idle`, a change is in them.
+
+        So do those that have waited for 600 others: no alarm looks back that far.
+        """
         if not idle:
             self._queue = self._queue[:0]
             return
         self._fixed = False
         enter = self._queue[:, 0] < oldest
+        enter[:-_MEMORY] = True
         for _, score, information in self._queue[enter]:
-            self._sums = (1 - 1 / _MEMORY) * self._sums + (score, information)
+            self._sums = (1 - 1 / _MEMORY) * self._sums + (score, information, 1.0)
         self._queue = self._queue[~enter]
         if self._between is not None:
             self.replayed = self._between.direction * self._sums[0] / (self._sums[1] + self._between.spread**-2)
@@ -111,5 +133,5 @@ class RunOffset:
     def load(self, state: dict[str, NDArray[Any]]) -> None:
         self.chart.load({name.removeprefix("chart."): v for name, v in state.items() if name.startswith("chart.")})
         self._queue, self.replayed = np.array(state["queue"]), np.array(state["replayed"])
-        self._sums, self._fixed = np.array(state["numbers"][:2]), bool(state["numbers"][2])
-        self._last_s = float(state["numbers"][3])
+        self._sums, self._fixed = np.array(state["numbers"][:3]), bool(state["numbers"][3])
+        self._last_s = float(state["numbers"][4])

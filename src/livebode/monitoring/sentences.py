@@ -104,6 +104,23 @@ def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
     return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
 
 
+def offset_unknown(machine: Machine, error: float, sample: int, time_s: float) -> Event:
+    """The windows of this run tell too little of how far it is off the baseline; `error` is in smallest changes."""
+    between, smallest = machine.between, machine.held.smallest
+    assert between is not None
+    along = np.flatnonzero(between.dominant(smallest))
+    what = " and ".join(WHAT[DIRECTIONS[j]] for j in along)
+    size = np.abs(between.direction[along]) * 100
+    beyond = ", ".join(f"{3 * between.spread * s:.2g} %" for s in size)
+    message = (
+        f"The learned runs differ from each other in {what}, and the windows of this run tell its own offset only to "
+        f"± {error * size[0]:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from the "
+        "baseline. Use a stronger excitation, or learn with the cause as a covariate."
+    )
+    details = {"reason": word.OFFSET, "reachable_percent": float(error * size[0])}
+    return Event("baseline-unknown", sample, time_s, message, details)
+
+
 def _not_covered(covariates: Covariates, value: Floats) -> str:
     """The first covariate without a value, or outside of what was learned."""
     for i, name in enumerate(covariates.names):
