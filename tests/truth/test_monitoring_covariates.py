@@ -118,7 +118,7 @@ def test_a_temperature_that_never_changed_cannot_be_learned() -> None:
 
 def test_two_sensors_that_read_the_same_are_refused() -> None:
     value = np.random.default_rng(1).normal(20.0, 2.0, (100, 1))
-    with pytest.raises(InputError, match="'belt' and 'hall' cannot be told apart"):
+    with pytest.raises(InputError, match="'belt' and 'hall' are too strongly correlated"):
         with_range(("belt", "hall"), np.hstack([value, value + 3.0]))
 
 

@@ -104,8 +104,8 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
     if alike.max() > _ALIKE:
         one, other = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
         raise InputError(
-            f"the covariates {one!r} and {other!r} cannot be told apart in these runs (correlation "
-            f"{alike.max():.3f}); name one of them in [monitoring] covariates"
+            f"the covariates {one!r} and {other!r} are too strongly correlated in these runs ({alike.max():.3f}); name "
+            "one of them in [monitoring] covariates"
         )
     n = len(names)
     return Covariates(names, value.mean(axis=0), low, high, np.zeros((4, n)), np.zeros((4, n, n)))
