@@ -81,7 +81,7 @@ CASES = (
         sensor=Sensor(noise_rad_per_s=0.1),
     ),
     Case("hum on a line, with harmonics", noise=hum(50, 0.2), lines=ON_MAINS),
-    Case("hum on a line, seen before the excitation", noise=hum(50, 0), lines=ON_MAINS, silent=2),
+    Case("hum on a line, seen before the excitation", noise=hum(50, 0), lines=ON_MAINS, silent=4),
     Case("white noise, odd lines", noise=white),
     Case("quiet: white noise", noise=white, lines=GRID, options=QUIET),
     Case("quiet: narrow resonance", noise=white, lines=GRID, options=QUIET, damping=13.0),

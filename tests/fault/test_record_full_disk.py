@@ -17,6 +17,8 @@ import pytest
 from livebode.nouns import Block, Channel, Event
 from livebode.records import Run
 from livebode.records.sample_table import as_rows, samples_of
+from livebode.records.segments import journal
+from livebode.records.segments.frames import COMMIT, to_frame
 from livebode.records.segments.limits import Limits
 from livebode.records.segments.store import Store
 from tests.starved import on_a_limited_file
@@ -89,6 +91,60 @@ def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
     assert 0 < missing.size < 2800
     assert paused.sample == 600
     assert [e.sample for e in run.events() if e.kind == "mark"] == list(range(0, 4000, 100))
+
+
+def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal, "_SPARSE_BYTES_MAX", 10_000)
+    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))  # no file can be opened
+        try:
+            taken = [_second(store, k, None, hard) for k in range(20)]
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        unclosed = [event.kind for event in store.drain_events()]
+        assert (tmp_path / "run/open/000001.journal").stat().st_size > 30_000
+        (table,) = Run.open(tmp_path / "run").tables("samples")
+        taken.append(_second(store, 20, None, hard))
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        assert store.last is not None
+        assert store.last.sample == 2100
+        store.finish(SUMMARY, finished=True)
+    assert all(taken)
+    assert unclosed == ["record-unclosed"] * 5  # of 18 attempts the 1st, 2nd, 4th, 8th and 16th
+    assert table.num_rows == 2000
+    assert sum(table.num_rows for table in Run.open(tmp_path / "run").tables("samples")) == 2100
+
+
+def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_path: Path) -> None:
+    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        for k in range(8):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft if k > 3 else 0, hard))
+            _second(store, k, None, hard)
+        store.finish(SUMMARY, finished=True)
+        closing = store.drain_events()
+    assert [event.kind for event in closing] == ["record-unclosed", "record-unclosed", "record-closed"]
+    assert closing[-1].details["attempts"] == 2
+
+
+def test_a_journal_that_holds_what_no_run_writes_ends_no_run(tmp_path: Path) -> None:
+    limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
+    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+        store.begin(SUMMARY, 0, 0.0, {"state": b""})
+        with (tmp_path / "run/open/000001.journal").open("ab") as file:
+            file.write(to_frame(COMMIT, b"no commit"))
+        taken = [_second(store, k, None, 0) for k in range(8)]
+        (event, *_) = store.drain_events()
+    assert all(taken)
+    assert event.kind == "record-unclosed"
+    assert "does not hold what a run writes" in event.message
 
 
 def _second(store: Store, k: int, limit: int | None, hard: int) -> bool:

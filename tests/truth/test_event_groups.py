@@ -87,6 +87,11 @@ def test_a_thousand_events_of_one_cause_are_one_group_and_each_is_exact() -> Non
     assert (last["count"], last["first_s"], last["last_s"]) == (1065, 0.0, 266.0)
 
 
+def test_what_an_event_without_a_group_counts_stays_with_it() -> None:
+    event = Event("phase-slips", 5, 0.1, "two leaps", {"count": 2, "slips": [[5, 1], [9, 1]]})
+    assert [one for line in reported(EventGroups(), [event]) for one in each_event(line)] == [event]
+
+
 def test_a_flood_is_counted_and_its_lines_do_not_grow_with_it() -> None:
     lengths = []
     for rate_hz in (100, 1000):
@@ -99,6 +104,16 @@ def test_a_flood_is_counted_and_its_lines_do_not_grow_with_it() -> None:
         assert len(exact) <= EXACT_MAX + 20 + len(found)
         lengths.append(len(json.dumps([vars(event) for event in found])))
     assert lengths[1] < 1.1 * lengths[0]
+
+
+def test_a_row_is_of_its_own_kind_where_its_newest_events_were_only_counted() -> None:
+    steps = ["loss", "gap", *["loss"] * 1200, *["gap", "loss"] * 50]
+    events = [Event(kind, n, n / 1e3, kind) for n, kind in enumerate(steps)]
+    for lines in (reported(EventGroups(), events), reported(EventGroups(), events)[-1:]):
+        rows = event_rows(lines)
+        assert sorted(row.newest.kind for row in rows) == ["gap", "loss"]
+        assert {row.newest.kind: row.count for row in rows} == counted(lines)
+        assert all(row.newest.message in (row.newest.kind, "counted") for row in rows if row.newest.kind == "gap")
 
 
 def test_a_cause_that_was_silent_begins_another_group() -> None:

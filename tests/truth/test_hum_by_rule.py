@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -131,6 +132,25 @@ def test_inspect_names_the_hum_and_the_lines_that_it_disturbs(excited_s: float, 
     assert hum["amplitude"] == pytest.approx({"y": 0.1, "u": 0.03}, rel=0.01)
     assert hum["disturbed_lines_hz"] == [50.0]
     assert ("excitation" in found) == (excited_s > 0)
+
+
+def test_a_silent_recording_with_a_missing_value_is_looked_at(tmp_path: Path) -> None:
+    log = recording(tmp_path / "log.parquet", 6.0, 0.0)
+    columns = {name: pq.read_table(log)[name].to_numpy().copy() for name in "wuy"}
+    columns["y"][15_000] = np.nan
+    shown = livebode("inspect", write_parquet(log, columns), *LINES, *SIGNALS, "--excitation", "w")
+    assert shown.code == 0, shown.err
+    assert "hum of the mains in 3.75 s without excitation" in shown.out
+
+
+def test_hum_is_shown_where_the_excitation_is_not_recognised(tmp_path: Path) -> None:
+    log = recording(tmp_path / "log.parquet", 4.0, 0.0)
+    columns = {name: pq.read_table(log)[name].to_numpy().copy() for name in "wuy"}
+    columns["w"][-4000:] = np.random.default_rng(3).standard_normal(4000)
+    shown = livebode("inspect", write_parquet(log, columns), *LINES, *SIGNALS, "--excitation", "w")
+    assert shown.code == 0, shown.err
+    assert "hum of the mains in 3 s without excitation" in shown.out
+    assert "The excitation is not recognised" in shown.out
 
 
 def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) -> None:

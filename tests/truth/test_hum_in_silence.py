@@ -55,6 +55,23 @@ def test_a_mode_that_rings_on_at_the_mains_frequency_is_not_hum(damping: float, 
     assert responses.valid[-1, ON_MAINS]
 
 
+@pytest.mark.parametrize("silent", [2, 4])
+@pytest.mark.parametrize("damping", [0.01, 0.002])
+def test_a_mode_that_rings_where_the_data_begins_is_not_hum(silent: int, damping: float) -> None:
+    w = excitation(0, silent, 5)
+    begun = np.concatenate([[100.0], np.zeros(w.size - 1)])
+    _, events = tracked(w, w + ringing(begun, 50.5, damping))
+    assert events == []
+
+
+@pytest.mark.parametrize(("silent", "kinds"), [(3, []), (4, ["hum"])])
+def test_hum_where_the_data_begins_is_found_in_three_whole_periods_behind_the_first(
+    silent: int, kinds: list[str]
+) -> None:
+    w = excitation(0, silent, 5)
+    assert [event.kind for event in tracked(w, w + hum(w.size, 0.1))[1]] == kinds
+
+
 def test_hum_under_a_mode_that_rings_on_is_found_once_that_has_died_away() -> None:
     w = excitation(30, 30, 20)
     y = ringing(w, 50.7, 0.02) + hum(w.size, 0.1)
@@ -82,6 +99,14 @@ def test_hum_that_a_later_silence_does_not_show_is_withdrawn(pieces: int) -> Non
     assert responses.valid[-1, ON_MAINS]
     assert [event.kind for event in events] == ["hum", "hum-gone"]
     assert tracker.found()["judged"]["invalid_lines_hz"] == {}
+
+
+def test_hum_that_a_later_silence_shows_at_two_fifths_of_its_amplitude_is_still_hum() -> None:
+    w = excitation(10, 12, 20, 6, 5)
+    level = np.where(np.arange(w.size) < 30 * N, 1.0, 0.4)
+    responses, events = tracked(w, w + level * hum(w.size, 0.1))
+    assert [event.kind for event in events] == ["hum"]
+    assert not responses.valid[-1, ON_MAINS]
 
 
 @pytest.mark.parametrize("silent", [1.0, 0.5, 0.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,12 @@ import pytest
 
 from examples.closed_loop import RATE_HZ, Drive
 from livebode.excitation import multisine
+from livebode.fitting import mean_response
 from livebode.margins import margins
 from livebode.nouns import Lines
 from livebode.records import Run
+from livebode.records.summary_file import to_document
+from livebode.session.loop_report import loop_of_run
 from tests.command import livebode, write_parquet
 from tests.loops import BELT, Case, parameters, values
 from tests.truth.test_margins import read
@@ -151,6 +155,14 @@ def test_a_true_model_passes_on_fresh_data_and_a_wrong_one_does_not(run: Path) -
     told = livebode("validate", run, "--on", fresh, "--model", "two-mass", "--model", "rigid")
     assert "two-mass passes" in told.out
     assert "rigid was not fitted" in told.out
+
+
+def test_margins_leave_out_the_transient_that_the_run_names(run: Path, tmp_path: Path) -> None:
+    left_out = shutil.copytree(run, tmp_path / "run") / "run.json"
+    left_out.write_bytes(to_document(Run.open(run).summary | {"left_out_samples": 5 * LINES.window}))
+    found, every = loop_of_run(left_out.parent).responses, mean_response(Run.open(run).responses())
+    assert np.array_equal(found.value, mean_response(Run.open(left_out.parent).steady_batches()).value)
+    assert not np.any(found.value == every.value)
 
 
 def test_what_cannot_be_is_refused_with_a_sentence(run: Path, tmp_path: Path) -> None:

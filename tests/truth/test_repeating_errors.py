@@ -43,6 +43,20 @@ def test_noise_alone_is_no_distortion() -> None:
     assert found.coverage["average"][0] <= 0.8  # the bound is not wide for safety's sake
 
 
+@pytest.mark.parametrize(("nonlinear", "noise", "distorted"), [(False, 3.0, 0), (True, 1.0, 20)])
+def test_noise_larger_than_the_output_makes_no_line_distorted_and_as_large_hides_no_distortion(
+    nonlinear: bool, noise: float, distorted: int
+) -> None:
+    """20 runs of 8 verdicts, each significant by chance at most once in 1e4."""
+    lines, rng, found = odd_lines(20, 140, RATE_HZ, 800, seed=1), np.random.default_rng(5), 0
+    for seed in range(20):
+        w = np.tile(multisine(lines, phases="random", seed=seed), 10)
+        y = np.sign(w) + 0.2 * w / w.std() if nonlinear else w
+        y = y + noise * y.std() * rng.standard_normal(w.size)
+        found += "distorted" in [event.kind for event in tracked(y, lines, w)[0].drain_events()]
+    assert found == distorted
+
+
 def tracked(y_of: np.ndarray, lines: Lines, w: np.ndarray, unit: str = "rad") -> tuple[Tracker, Responses]:
     tracker = Tracker(Settings(lines=lines, output="y", input="u", excitation="w"))
     channels = (Channel("w"), Channel("u"), Channel("y", unit))

@@ -65,6 +65,44 @@ def test_a_pause_of_unknown_length_and_a_rate_that_is_not_exact_are_followed() -
     )  # it is judged every minute
 
 
+def test_a_queue_on_the_way_and_known_losses_do_not_redate_a_run() -> None:
+    queue = taken([0.01] * 1000 + [3.0] * 1600 + [0.01] * 2000)  # of 160 s, within 460 s
+    assert len(queue.clock.pieces) == 1
+    relation, now_s = ClockRelation(), time.monotonic()
+    for number in range(3000):
+        start = 2 * SIZE * number  # every second batch is missing, by the sender's numbers
+        at_s, delay_s = (start + SIZE) / RATE_HZ, 2.5 * (number % 3 == 0)
+        arrived_s = now_s + at_s + delay_s
+        relation.take(LiveBlock(np.zeros((1, SIZE)), ("y",), RATE_HZ, start=start, gap=True, arrived_s=arrived_s))
+    assert len(relation.clock.pieces) == 1
+
+
+def test_a_backlog_that_takes_longer_than_the_first_seconds_is_dated_in_the_end() -> None:
+    now_s, relation = time.monotonic(), ClockRelation()
+    for n in range(360):  # an hour of samples within 30 s
+        arrived_s = now_s + 30.0 * n / 360
+        data = np.zeros((1, 1000))
+        relation.take(LiveBlock(data, ("y",), RATE_HZ, start=1000 * n, arrived_s=arrived_s))
+    for n in range(360, 400):
+        arrived_s = now_s + 30.0 + 10.0 * (n + 1 - 360)
+        relation.take(LiveBlock(np.zeros((1, 1000)), ("y",), RATE_HZ, start=1000 * n, arrived_s=arrived_s))
+    began_s = time.time() - time.monotonic() + now_s + 30.0 - 3600.0
+    assert relation.clock.unix_s(60.0) - 60.0 == pytest.approx(began_s, abs=1.0)
+
+
+def test_a_clock_that_is_set_begins_a_piece_and_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    relation, now_s, real = ClockRelation(), time.monotonic(), time.time
+    for n in range(30):
+        if n == 15:
+            monkeypatch.setattr(time, "time", lambda: real() + 7200.0)
+        arrived_s = now_s + 10.0 * (n + 1)
+        relation.take(LiveBlock(np.zeros((1, 1000)), ("y",), RATE_HZ, start=1000 * n, arrived_s=arrived_s))
+    (event,) = relation.drain_events()
+    assert event.kind == "computer-clock"
+    assert "set by +7200 s" in event.message
+    assert np.diff([unix_s for _, unix_s in relation.clock.pieces]) == pytest.approx([7200.0], abs=0.1)
+
+
 def test_moments_are_clock_time_only_where_the_run_has_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TZ", "Europe/Berlin")
     time.tzset()

@@ -58,6 +58,8 @@ def inspect_command(
         _show_hum(found.quiet, console)
     if found.excitation is not None:
         _show_excitation(found, console)
+    if found.unrecognised:
+        console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
 
 
 def _check(

@@ -133,9 +133,9 @@ def _dependence(model: dict[str, Any]) -> str:
     if differ := model["between_runs_percent"]:
         sizes = ", ".join(f"{what} by {percent:g} %" for what, percent in differ.items())
         text += (
-            f"\nThe runs differ from each other: {sizes} (standard deviation). Such a change is seen within a run, and "
-            "from the beginning only beyond three times that. If a temperature explains it, name its channel in "
-            "[monitoring] covariates of the runs."
+            f"\nThe runs differ from each other: {sizes} (standard deviation). A change like that is detected when it "
+            "happens within a run; one that is there from the start only beyond three times that. If a temperature "
+            "explains it, name its channel in [monitoring] covariates of the runs."
         )
     return text
 

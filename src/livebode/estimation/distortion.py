@@ -6,6 +6,7 @@ from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from livebode.estimation.bounds import power
 from livebode.estimation.detection import Groups, Interpolation
@@ -28,6 +29,7 @@ than the rms of the lines, as at a resonance, suffers by as much more.
 _STEPS_MARGIN = 3.0  # how much more than uniform rounding the steps of a sensor may show at a few bins
 _POWERLESS = 1e-4
 _SMOOTH = np.ones(5)  # detection lines over which the noise is averaged before it is compared with
+_CHANCE = 1e-4  # of noise alone to be significant in one verdict
 
 
 def reached(lines: Lines) -> NDArray[np.int64]:
@@ -70,8 +72,10 @@ class Distortion:
         self._groups = Groups(at, self.bins)
         self.dof = float(self._groups.dof.min())
 
-    def variance(self, moments: Moments, lines: slice, beside: slice, instrument: bool, steps: Floats) -> Floats:
-        """Shape (lines,), from Moments of one row at the lines and at `bins`.
+    def variance(
+        self, moments: Moments, lines: slice, beside: slice, instrument: bool, steps: Floats
+    ) -> tuple[Floats, bool]:
+        """Shape (lines,), and whether what repeats is significant, from Moments of one row at the lines and at `bins`.
 
         `steps` (lines,) is the variance that steps of the sensor may have: these change no gain, for the other lines
         carry each line over them, and so do not count three times.
@@ -93,7 +97,9 @@ class Distortion:
         strength = power(numerator[lines])
         stronger = np.maximum(strength / strength.mean(), 1.0)
         coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
-        return np.asarray(_share(mean, noise) * (found + coherent))
+        known = np.isfinite(mean) & np.isfinite(noise)
+        over = _over_noise(mean, noise, known)
+        return np.asarray(_share(over) * (found + coherent)), over > _by_chance(int(known.sum()), float(moments.dof[0]))
 
 
 def _placed(everywhere: NDArray[np.complex128], lines: slice, beside: slice) -> NDArray[np.complex128]:
@@ -102,14 +108,26 @@ def _placed(everywhere: NDArray[np.complex128], lines: slice, beside: slice) -> 
     return placed
 
 
-def _share(mean: Floats, noise: Floats) -> float:
+def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> float:
+    """Power that repeats over that of the noise beside it, mean over the detection lines that are known."""
+    if not known.any():
+        return 0.0
+    smooth = np.convolve(np.where(known, noise, 0.0), _SMOOTH, "same") / np.convolve(known * 1.0, _SMOOTH, "same")
+    return float(np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)[known].mean())
+
+
+def _share(over_noise: float) -> float:
     """How surely what repeats is more than noise: the square of its share of all the power, 0 … 1.
 
     Squared, so that the chance by which noise repeats widens no bound by more than a few percent.
     """
-    known = np.isfinite(mean) & np.isfinite(noise)
-    if not known.any():
-        return 0.0
-    smooth = np.convolve(np.where(known, noise, 0.0), _SMOOTH, "same") / np.convolve(known * 1.0, _SMOOTH, "same")
-    against_noise = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)[known].mean()
-    return float(max(0.0, 1 - 1 / against_noise) ** 2) if against_noise > 0 else 0.0
+    return max(0.0, 1 - 1 / over_noise) ** 2 if over_noise > 0 else 0.0
+
+
+def _by_chance(known: int, dof: float) -> float:
+    """What noise alone exceeds over itself with a probability of 1e-4: a quantile of the F distribution.
+
+    Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.
+    """
+    independent = 2 * min(known, _SMOOTH.size)
+    return float(fdtri(independent, independent * dof, 1 - _CHANCE))

@@ -225,13 +225,14 @@ class RepeatingErrors:
         numerator, denominator = moments.pair[:, 0, self._lines]
         step, window = self._steps_at_lines(channels), self._settings.lines.window
         of_steps = window * step**2 / 12
-        distortion = np.full(len(numerator), np.nan)
+        distortion, significant = np.full(len(numerator), np.nan), False
         if self._distortion is not None:
             instrument = self._settings.method.reference == "excitation"
-            variance = self._distortion.variance(moments, self._lines, self._beside, instrument, of_steps)
+            variance, significant = self._distortion.variance(moments, self._lines, self._beside, instrument, of_steps)
             distortion = np.sqrt(variance) / np.abs(denominator)
         hum = self._silence.lines | self._mains.seen(power(self._output))
-        distorted = distortion > _DISTORTED * np.abs(numerator / denominator)
+        # A mean that has begun again has little significance; what was found before it counts.
+        distorted = (distortion > _DISTORTED * np.abs(numerator / denominator)) & (significant | self._now[1][0])
         self._counts = 2 * np.abs(numerator) / window / step
         # Noise larger than the steps carries any amplitude over them.
         quiet = moments.scatter[0, 0, self._lines] / moments.unbiased[0] < of_steps
@@ -264,7 +265,7 @@ class RepeatingErrors:
     def _reason(self, kind: str, at: int, f: float) -> tuple[str, dict[str, float]]:
         if kind == "hum":
             return (
-                f"{f:g} Hz is a multiple of the mains frequency, and hum of the mains is seen; choose other lines",
+                f"{f:g} Hz is a multiple of the mains frequency: mains hum detected; use other lines",
                 {},
             )
         if kind == "steps":

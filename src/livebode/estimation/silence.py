@@ -13,8 +13,9 @@ _PERIODS = 9
 A mode with a damping ratio of 0.1 % at 50 Hz loses 31 % of its power from the first to the last third of nine periods
 of 0.1 s; in two periods a damping ratio of 0.5 % cannot be told from noise.
 """
+_PERIODS_FIRST = 3  # of silence before the first excitation: thirds that a tone can decay over
 STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
-_GONE = 0.25  # of the power that the hum had: below this it is no longer there
+_GONE = 0.25  # of the power that the hum had: below this, and without a tone, it is no longer there
 _GONE_PERIODS = 2  # in a row
 
 
@@ -23,7 +24,7 @@ class SilentHum:
 
     After the excitation a weakly damped mode rings near its own frequency, and looks like a tone. So a tone counts
     where it is seen in nine periods of silence in a row and does not decay over these; where the data begins without
-    excitation, all that there are do. What was found is withdrawn when a later silence does not show it.
+    excitation, three to eight are enough. What was found is withdrawn when a later silence shows no tone there.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class SilentHum:
         self._counts[0] += 1
         if self._counts[0] >= _PERIODS:
             self._find(_PERIODS)
-        self._low = np.where(power < _GONE * self._found, self._low + 1, 0.0)
+        self._low = np.where((power < _GONE * self._found) & ~stands_out, self._low + 1, 0.0)
         gone = self._low >= _GONE_PERIODS
         self._found[gone] = 0.0
         return np.asarray(gone)
@@ -69,7 +70,7 @@ class SilentHum:
     def end(self) -> None:
         """A period with excitation."""
         silent, excited = self._counts
-        if not excited and 0 < silent < _PERIODS:
+        if not excited and _PERIODS_FIRST <= silent < _PERIODS:
             self._find(int(silent))
         self._counts[:] = 0, 1
         self._power[:] = np.nan
@@ -80,7 +81,7 @@ class SilentHum:
         self._power[:] = np.nan
 
     def _find(self, periods: int) -> None:
-        part, third = self._power[-periods:], max(1, periods // 3)
+        part, third = self._power[-periods:], periods // 3
         first, last = part[:third].mean(axis=0), part[-third:].mean(axis=0)
         steady = np.isfinite(part).all(axis=0) & (last >= STEADY * first)
         self._found = np.where(steady & (self._found == 0), last, self._found)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from livebode.nouns import Event
 
-_FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}
+_FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}  # that a group adds
 
 
 def each_event(event: Event) -> Iterator[Event]:
@@ -18,7 +18,8 @@ def each_event(event: Event) -> Iterator[Event]:
     """
     repeats = _repeats(event)
     if not repeats:
-        yield replace(event, details={name: event.details[name] for name in event.details.keys() - _FIELDS})
+        added = set() if group_of(event) is None else _FIELDS
+        yield replace(event, details={name: event.details[name] for name in event.details.keys() - added})
     yield from repeats
 
 
@@ -73,11 +74,11 @@ class EventRow:
     Attributes
     ----------
     newest
-        The newest of them, or the newest line that reports it.
+        The newest of them with sample, time and message; of those that were only counted, these are not known.
     count
         How many they are.
     first_s, last_s
-        Times of the first and of the newest.
+        Times of the first and of the newest, or of the line that counts it.
     """
 
     newest: Event
@@ -97,13 +98,15 @@ def event_rows(events: Iterable[Event]) -> list[EventRow]:
             continue
         known = {one.kind: one for one in each_event(event)}
         for kind, count in event_counts(event).items():
-            newest = known.get(kind, event)
             row = of.get((group[0], kind))
+            newest = known.get(kind) or (
+                row.newest if row else replace(event, kind=kind, message="counted", details={})
+            )
             if row is None:
                 first_s = next((one.time_s for one in each_event(event) if one.kind == kind), newest.time_s)
                 row = of[group[0], kind] = EventRow(newest, 0, first_s, newest.time_s)
                 rows.append(row)
             fields = {name: event.details[name] for name in ("group", "count") if name in event.details}
             row.newest = replace(newest, details=newest.details | fields)
-            row.count, row.last_s = row.count + count, newest.time_s
+            row.count, row.last_s = row.count + count, known.get(kind, event).time_s
     return rows

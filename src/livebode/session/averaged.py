@@ -84,7 +84,7 @@ class _Counted:
     """What else there is to know of a run's responses."""
 
     def __init__(self, run: Run) -> None:
-        self._window, self._hop = run.lines.window, int(run.summary["found"]["hop"])
+        self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))
         self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
         self.rows, self.incomplete = 0, 0
         self.valid = np.zeros(len(run.lines), dtype=np.int64)

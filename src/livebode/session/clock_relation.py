@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from math import inf
 
+from livebode.nouns import Event
 from livebode.nouns.clock import RunClock
-from livebode.sources.live import LiveBlock
+from livebode.sources.live import LiveBlock, Origin
 
 REFINED_FOR_S = 10.0
 """From its first Block on the relation is that of the Block with the least delay of so many seconds."""
@@ -14,7 +15,9 @@ REFINED_S = 0.05
 """By so much it is better before it is recorded again meanwhile."""
 STEP_S = 1.0
 """By so much the relation is wrong before another one is used from there on."""
-_DRIFT_OVER_S = 60.0
+_JUDGED_S = 60.0
+_DRIFT_MAX = 0.005
+"""Of a sender's rate: what is delayed more from minute to minute waits somewhere."""
 _PIECES_MAX = 1000
 
 
@@ -22,7 +25,8 @@ class ClockRelation:
     """Keeps `clock` from the arrival of the Blocks of a live source.
 
     Samples wait on the way (a broker, a queue), never the other way round, so that the least delayed Block tells the
-    most. A pause of unknown length, and a sender whose rate is not exact, begin another piece of the clock.
+    most. A pause of unknown length, a sender whose rate is not exact, and a computer whose clock is set begin another
+    piece of the clock.
 
     Attributes
     ----------
@@ -32,10 +36,13 @@ class ClockRelation:
 
     def __init__(self) -> None:
         self.clock = RunClock()
-        self._unix_s = time.time() - time.monotonic()
+        self._unix_s = _unix_s_of_monotonic()
         self._since_s: float | None = None
         self._recorded_s: float | None = None
-        self._least = self._least_from_s = self._least_since_s = inf
+        self._stop = 0
+        self._origin: Origin | None = None
+        self._least = self._least_from_s = self._least_since_s = self._followed = inf
+        self._set: list[Event] = []
 
     def take(self, block: LiveBlock) -> bool:
         """Whether the clock is to be recorded again with this Block."""
@@ -44,7 +51,10 @@ class ClockRelation:
         arrived_s, start_s = block.arrived_s, block.origin_s + block.start / block.rate_hz
         unix_s = self._unix_s + arrived_s - (block.origin_s + block.stop / block.rate_hz)
         pieces = self.clock.pieces
-        paused = self._since_s is None or block.gap
+        # Where the sender's numbers go on, they tell how long a pause was.
+        unknown = block.gap and (block.start == self._stop or block.origin != self._origin)
+        paused = self._since_s is None or unknown
+        self._stop, self._origin = block.stop, block.origin
         if not pieces or (paused and abs(unix_s - pieces[-1][1]) > STEP_S):
             self._begin(start_s, unix_s, arrived_s)
             return True
@@ -52,7 +62,12 @@ class ClockRelation:
         if arrived_s - self._since_s <= REFINED_FOR_S:
             pieces[-1] = pieces[-1][0], min(unix_s, pieces[-1][1])
             return self._is_to_be_recorded(REFINED_S)
-        return self._is_to_be_recorded(0.0) or self._drifts(unix_s, start_s, arrived_s)
+        return self._is_to_be_recorded(0.0) or self._judged(unix_s, start_s, block)
+
+    def drain_events(self) -> list[Event]:
+        """What is to be said of this computer's clock since the last call."""
+        found, self._set = self._set, []
+        return found
 
     def _is_to_be_recorded(self, by_more_than_s: float) -> bool:
         newest_s = self.clock.pieces[-1][1]
@@ -64,16 +79,42 @@ class ClockRelation:
         self.clock.pieces.append((from_s, unix_s))
         del self.clock.pieces[:-_PIECES_MAX]
         self._since_s, self._least, self._recorded_s = arrived_s, inf, unix_s
+        self._followed = inf
 
-    def _drifts(self, unix_s: float, start_s: float, arrived_s: float) -> bool:
-        """Whether the least delay of a minute is another one."""
+    def _judged(self, unix_s: float, start_s: float, block: LiveBlock) -> bool:
+        """Whether the relation is another one after a minute: the sender drifts, waited, or the clock was set."""
         if self._least == inf:
-            self._least_from_s, self._least_since_s = start_s, arrived_s
+            self._least_from_s, self._least_since_s = start_s, block.arrived_s
         self._least = min(self._least, unix_s)
-        if arrived_s - self._least_since_s <= _DRIFT_OVER_S:
+        if block.arrived_s - self._least_since_s <= _JUDGED_S:
             return False
         least, self._least = self._least, inf
-        if abs(least - self.clock.pieces[-1][1]) <= STEP_S:
+        if self._was_set(start_s, block):
+            return True
+        piece_s = self.clock.pieces[-1][1]
+        before_s = piece_s if self._followed == inf else self._followed
+        self._followed = min(least, before_s + _DRIFT_MAX * _JUDGED_S)
+        if before_s - least > STEP_S:  # so much at once: all before had waited
+            self.clock.pieces[-1] = self.clock.pieces[-1][0], least
+            return True
+        if abs(self._followed - piece_s) <= STEP_S:
             return False
-        self._begin(self._least_from_s, least, -inf)
+        self._begin(self._least_from_s, self._followed, -inf)
         return True
+
+    def _was_set(self, start_s: float, block: LiveBlock) -> bool:
+        """Whether this computer's clock was set since the last minute; then a piece begins here."""
+        by_s = _unix_s_of_monotonic() - self._unix_s
+        if abs(by_s) <= STEP_S:
+            return False
+        self._unix_s += by_s
+        message = (
+            f"the clock of this computer was set by {by_s:+.4g} s; times of day before {start_s:.6g} s are as it was"
+        )
+        self._set.append(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
+        self._begin(start_s, self._unix_s + block.arrived_s - (block.origin_s + block.stop / block.rate_hz), -inf)
+        return True
+
+
+def _unix_s_of_monotonic() -> float:
+    return time.time() - time.monotonic()

@@ -37,7 +37,7 @@ CAUSES = {
 }
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
 _STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", "layout-changed", "unit-changed"}
-"""Changes of state: who waited for their report would take the state before for the present one."""
+"""Changes of state, which are reported soon: until then the previous state would look like the present one."""
 
 
 @dataclass

@@ -237,17 +237,19 @@ class Tracking:
         axis, source = self.pipeline.axis, self.source
         if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
             return None
-        roles = isinstance(self.recorder, RunDirectory) or not self.recorder.continued
-        transient = not (self._tally.stop or axis.tracking.all_periods or axis.motion)
-        settings = self._follower.settings
-        return LiveChecks(settings, self.pipeline.channels, roles=roles, transient=transient)
+        tally, settings = self._tally, self._follower.settings
+        # Behind a response that is valid the excitation does not begin any more.
+        begins = not (tally.judged or tally.valid_lines or self._goes_on)
+        transient = begins and not (axis.tracking.all_periods or axis.motion)
+        channels = self.pipeline.channels
+        return LiveChecks(settings, channels, roles=not tally.judged, transient=transient, judged=tally.judge)
 
     def _found(self, event: Event) -> None:
         """Record and show what the signals of a live run show."""
         self.to.tell(event)
         self._out.write_event(event)
         if event.kind == "transient":
-            self._renew(left_out_samples=event.sample + event.details["samples"])
+            self._renew(left_out_samples=event.details["samples"])
 
     def _clocked(self) -> Iterator[Block]:
         # What waits in a file or a pipe says by its arrival nothing of when it was sampled.
@@ -255,6 +257,8 @@ class Tracking:
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block):
                 self._set_clock()
+                for event in self._relation.drain_events():
+                    self._out.write_event(event)
             yield block
 
     def _set_clock(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
-from livebode.nouns import Block, Lines
+from livebode.nouns import Block, InputError, Lines
 from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.session.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log
@@ -37,7 +37,7 @@ class ChannelSummary:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What `livebode inspect` says."""
+    """What `livebode inspect` says; `unrecognised` is why an excitation beside a silent stretch is not recognised."""
 
     log: Log
     samples: int
@@ -46,6 +46,7 @@ class Inspection:
     missing: int
     excitation: Excitation | None
     quiet: Quiet | None = None
+    unrecognised: str = ""
 
     @property
     def live_hop(self) -> int:
@@ -87,6 +88,8 @@ class Inspection:
                 "outlying_periods": list(found.outlying),
                 "phase_slips": [[slip.sample, slip.missing] for slip in found.slips],
             }
+        if self.unrecognised:
+            plain["unrecognised"] = self.unrecognised
         return plain
 
 
@@ -123,8 +126,13 @@ def inspect(
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
         quiet = look_for_hum(log, signals, excitation, Lines.parse(lines[0], log.rate_hz, lines[1]))
-    silent = quiet is not None and quiet.samples == samples
-    if excitation is not None and not silent:
-        w = beginning(log, excitation)
-        found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
-    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet)
+    unrecognised = ""
+    if excitation is not None and not (quiet is not None and quiet.constant):
+        try:
+            w = beginning(log, excitation)
+            found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
+        except InputError as error:
+            if quiet is None:
+                raise
+            unrecognised = str(error)
+    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet, unrecognised)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event
+from livebode.nouns import Block, Event, counted
 from livebode.session.aligned import SlipSearch, bridged
 from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions
@@ -32,10 +32,20 @@ class LiveChecks:
         Those of the Blocks that are used.
     roles, transient
         Whether the roles are judged, and whether the run may begin with a transient.
+    judged
+        Called when a stretch was judged, which is done once.
     """
 
-    def __init__(self, settings: Settings, channels: list[str], *, roles: bool, transient: bool) -> None:
-        self._settings, self._channels = settings, channels
+    def __init__(
+        self,
+        settings: Settings,
+        channels: list[str],
+        *,
+        roles: bool,
+        transient: bool,
+        judged: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._settings, self._channels, self._tell_judged = settings, channels, judged
         self._roles, self._transient = roles, transient
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
@@ -56,43 +66,48 @@ class LiveChecks:
         if not len(block):
             return
         if self._roles or self._transient:
-            self._stretch.add(block, self._channels, self._size)
+            if self._stretch.add(block, self._channels, self._size):
+                self._transient = False  # the excitation may have begun in what is not judged
             if self._stretch.samples >= self._size:
                 yield from self._judged(block)
         if self._reference is not None:
             yield from self._slipped(block, self._reference)
 
     def _judged(self, block: Block) -> Iterator[Event]:
-        stretch, settings, self._stretch = self._stretch, self._settings, _Stretch()
-        signals = dict(zip(self._channels, stretch.data))
+        settings = self._settings
+        start, data = self._stretch.hand_out()
+        signals = dict(zip(self._channels, data))
         by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
         spectra = role_spectra(by_role, settings)
-        if spectra is None or spectra.windows < _EXCITED_MIN:
+        if spectra is None:
             return  # nothing is excited yet, so that the next stretch is judged
+        if spectra.windows < _EXCITED_MIN:
+            self._transient = False  # the excitation began in this stretch, and not with the next one
+            return
         if self._roles:
             for one in suspicions(by_role, settings):
-                yield Event("roles-doubtful", stretch.start, _time_s(block, stretch.start), one.message)
+                yield Event("roles-doubtful", start, _time_s(block, start), one.message)
         if self._transient and (periods := transient_periods(signals, settings)):
-            yield transient_event(periods, settings, first=stretch.start, time_s=_time_s(block, stretch.start))
+            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
         self._roles = self._transient = False
+        self._tell_judged()
 
     def _slipped(self, block: Block, name: str) -> Iterator[Event]:
-        found, size = self._searched, _SLIP_PERIODS * self._settings.lines.window
-        if found.broken_by(block):
-            self._slips, found = SlipSearch(self._settings.lines.window), _Stretch()
-            self._searched = found
-        found.add(block, [name], 2 * size)
-        if found.samples < size:
+        size = _SLIP_PERIODS * self._settings.lines.window
+        if self._searched.add(block, [name], 2 * size):
+            self._slips = SlipSearch(self._settings.lines.window)
+        if self._searched.samples < size:
             return
+        start, data = self._searched.hand_out()
         if self._slips.begins_at is None:
-            self._slips.begins_at = found.start
-        self._searched = _Stretch()
-        for slip in self._slips.take(bridged(found.data[0])):
-            many = f"{abs(slip.missing)} sample{'s' * (abs(slip.missing) > 1)}"
+            self._slips.begins_at = start
+        for slip in self._slips.take(bridged(data[0])):
+            way, what = ("forward", "missing") if slip.missing > 0 else ("back", "repeated")
             message = (
-                f"the phase of {name!r} leaps at sample {slip.sample}: {many} "
-                f"{'missing' if slip.missing > 0 else 'repeated'} without a gap in the source's numbers, so that the "
-                "responses of the windows around it are wrong; let the sender number its samples"
+                f"the phase of {name!r} leaps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
+                f"where the source reports no gap: samples are {what}, or the generator was started again; the "
+                "responses of the windows around it are wrong; let the generator run on, and the sender number each "
+                "sample as it is taken"
             )
             details = {"missing_samples": slip.missing}
             yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
@@ -103,25 +118,30 @@ class _Stretch:
 
     def __init__(self) -> None:
         self.start = self.samples = 0
+        self._begun = False
         self._parts: list[NDArray[np.float64]] = []
 
-    @property
-    def data(self) -> NDArray[np.float64]:
-        return np.concatenate(self._parts, axis=1)
+    def hand_out(self) -> tuple[int, NDArray[np.float64]]:
+        """Number of the first sample, and all of them; the next sample is expected right behind them."""
+        start, data = self.start, np.concatenate(self._parts, axis=1)
+        self._begin(start + self.samples)
+        return start, data
 
-    def broken_by(self, block: Block) -> bool:
-        """Whether samples are missing before this Block, and their number is not known."""
-        return bool(self._parts) and block.gap and block.start <= self.start + self.samples
-
-    def add(self, block: Block, channels: list[str], samples_max: int) -> None:
-        """Append, or begin again behind a loss that is too long, or of unknown length."""
+    def add(self, block: Block, channels: list[str], samples_max: int) -> bool:
+        """Append; True where it begins again instead, behind a loss that is too long, or of unknown length."""
         missing = block.start - self.start - self.samples
-        if not self._parts or self.broken_by(block) or not 0 <= missing <= samples_max:
-            self.start, self.samples, self._parts, missing = block.start, 0, [], 0
+        again = self._begun and (not 0 <= missing <= samples_max or (block.gap and not missing))
+        if again or not self._begun:
+            self._begin(block.start)
+            missing = 0
         if missing:
             self._parts.append(np.full((len(channels), missing), np.nan))
         self._parts.append(np.array([block[name] for name in channels]))
         self.samples += missing + len(block)
+        return again
+
+    def _begin(self, start: int) -> None:
+        self.start, self.samples, self._parts, self._begun = start, 0, [], True
 
 
 def _time_s(block: Block, sample: int) -> float:

@@ -111,12 +111,13 @@ def loop_of_run(
         If nobody says what feeds back, or no model could be fitted.
     """
     run = Run.open(directory)
-    responses, own_words = run.responses(), said(run.summary)
+    own_words = said(run.summary)
     loop = axis.loop if axis is not None else LoopSection.model_validate(own_words.get("loop", {}))
     if section is None:
         own = axis.fit if axis is not None else None
         section = own or FitSection.model_validate(own_words.get("fit", {}))
     found, words = fit_run(directory, section)
+    responses = Responses.join(list(run.steady_batches()))  # what was fitted
     return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
 
 

@@ -30,6 +30,8 @@ class Quiet:
         Tones, and the lines that each disturbs.
     units
         Of the signals.
+    constant
+        Whether the excitation never changes in all that was looked at.
     """
 
     lines: Lines
@@ -37,6 +39,7 @@ class Quiet:
     samples: int
     found: list[tuple[Hum, list[float]]]
     units: dict[str, str]
+    constant: bool
 
     def plain(self) -> dict[str, Any]:
         """As plain data, for JSON."""
@@ -60,8 +63,10 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
     names = list(dict.fromkeys([*signals, *([excitation] if excitation else [])]))
     rows = dict(zip(names, beginnings(log, names, _SAMPLES_MAX)))
     silent = np.all([np.isfinite(x) for x in rows.values()], axis=0)
+    constant = True
     if excitation:
         w = rows[excitation]
+        constant = np.unique(w[np.isfinite(w)]).size < 2
         silent[1:] &= (w[1:] == w[:-1]) & np.isfinite(w[1:])
     first, stop = _longest(silent)
     if excitation and stop - first < SECONDS_MIN * lines.rate_hz:
@@ -72,8 +77,9 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
     found = find_hum({name: rows[name][first:stop] for name in dict.fromkeys(signals)}, lines.rate_hz)
     f = lines.frequency_hz
     near = [f[np.abs(f - hum.frequency_hz) <= lines.resolution_hz / 2].tolist() for hum in found]
-    units = {channel.name: channel.unit for channel in log.channels}
-    return Quiet(lines, first, stop - first, list(zip(found, near)), {name: units.get(name, "") for name in signals})
+    known = {channel.name: channel.unit for channel in log.channels}
+    units = {name: known.get(name, "") for name in signals}
+    return Quiet(lines, first, stop - first, list(zip(found, near)), units, constant)
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:

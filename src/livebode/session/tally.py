@@ -34,6 +34,8 @@ class Tally:
         The events of each cause.
     handed_out
         The `stop` at which what was held back had been handed out.
+    judged
+        Whether the signals of a live run were judged at its beginning.
     """
 
     def __init__(self, check: ChannelCheck, started: float, before: Before | None = None) -> None:
@@ -41,6 +43,7 @@ class Tally:
         self._before = {} if before is None else before.counts
         self.responses = self.invalid = self.valid_lines = 0
         self.stop = self.handed_out = 0 if before is None else before.sample
+        self.judged = False
         self.tracked_s = 0.0
         self._started = started
 
@@ -55,6 +58,10 @@ class Tally:
         self.valid_lines += int(np.count_nonzero(responses.valid))
         self.tracked_s += tracked_s
 
+    def judge(self) -> None:
+        """From here on the signals are judged."""
+        self.judged = True
+
     def counts(self, tracker: Mapping[str, int]) -> dict[str, int]:
         """What the tracker has counted in this run."""
         return {name: count - self._before.get(name, 0) for name, count in tracker.items()}
@@ -65,7 +72,7 @@ class Tally:
         """All of it as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
         parts = {"before": self._before, "check": self.check.state(), "groups": self.groups.state()}
-        return json.dumps(numbers | {"run_s": self.run_s} | parts).encode()
+        return json.dumps(numbers | {"run_s": self.run_s, "judged": self.judged} | parts).encode()
 
     def restore(self, snapshot: bytes) -> None:
         """Go on from a snapshot."""
@@ -73,6 +80,7 @@ class Tally:
         for name in self._STATE:
             setattr(self, name, state[name])
         self._started -= state["run_s"]
+        self.judged = state.get("judged", True)  # a record from before this was stored is not judged again
         self._before = state["before"]
         self.check.load(state["check"])
         self.groups.load(state.get("groups", {}))  # a record from before there were groups has none

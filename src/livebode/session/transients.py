@@ -57,7 +57,10 @@ def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
     if np.count_nonzero(np.isfinite(x)) < window:
         return 0
     blocks = cut(filled(x), window)
-    return leading(unlike(blocks, spectra(blocks), excited))
+    # A period that was interpolated differs from the others, and says nothing of the machine.
+    whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
+    count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
+    return int(whole[count - 1]) + 1 if count else 0
 
 
 def _moves(schedule: np.ndarray, window: int) -> bool:
@@ -69,11 +72,12 @@ def _moves(schedule: np.ndarray, window: int) -> bool:
 
 
 def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
-    """What is left out, in an Event at the beginning: sample `first`."""
-    window = settings.lines.window
+    """What is left out, in an Event at sample `first`, with which the excitation begins: all up to the steady state."""
+    samples = first + periods * settings.lines.window
     which = "period differs" if periods == 1 else f"{periods} periods differ"
+    before = "with what came before, " if first else ""
     message = (
-        f"the first {which} from the steady state: {counted(periods * window, 'sample')} "
-        f"({periods * window / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
+        f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
+        f"({samples / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
     )
-    return Event("transient", first, time_s, message, {"periods": periods, "samples": periods * window})
+    return Event("transient", first, time_s, message, {"periods": periods, "samples": samples})

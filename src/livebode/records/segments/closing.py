@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 
+from livebode.nouns import InputError
 from livebode.records.segments.manifest import Segment
 from livebode.records.segments.shelf import Shelf
 
@@ -34,15 +37,15 @@ class Closing:
         self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
         self._thread.start()
 
-    def result(self) -> tuple[list[Segment], OSError | None]:
-        """Wait for the end: the segments that were removed, and what the disk said where it refused.
+    def result(self) -> tuple[list[Segment], OSError | InputError | None]:
+        """Wait for the end: the segments that were removed, and why a journal could not be turned.
 
-        Journals that it refused to turn are tried again with the next `begin`.
+        It and those behind it are tried again with the next `begin`.
         """
         self.wait()
         gone, error = self._gone, self._error
         self._gone, self._error = [], None
-        if error is not None and not isinstance(error, OSError):
+        if error is not None and not isinstance(error, OSError | InputError):
             raise error
         return gone, error
 
@@ -58,5 +61,7 @@ class Closing:
                 if bytes_max is not None:
                     self._gone = self._shelf.make_room(bytes_max)
                 self._shelf.close_journals()
+        except MemoryError:
+            self._error = OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
         except BaseException as error:  # it must not vanish with the thread
             self._error = error

@@ -7,6 +7,7 @@ import errno
 import os
 from pathlib import Path
 
+from livebode.nouns import InputError
 from livebode.records.inside import check_own
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
@@ -19,12 +20,14 @@ _WORDS = {
 }
 
 
-def why(error: OSError) -> str:
+def why(error: OSError | InputError) -> str:
     """What the system says of a failure, in words.
 
     >>> why(OSError(errno.ENOSPC, "No space left on device"))
     'the disk is full'
     """
+    if not isinstance(error, OSError):
+        return str(error)
     return _WORDS.get(error.errno or 0, error.strerror or str(error))
 
 

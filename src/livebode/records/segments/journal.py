@@ -15,7 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.nouns import InputError
-from livebode.records.inside import check_folder, read_bytes
+from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory
 from livebode.records.segments.frames import COMMIT, ROWS, TABLE, Frame, frames, to_frame
@@ -24,7 +24,7 @@ from livebode.records.table import Table
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
-_SIZE_BYTES_MAX = 512 << 20  # sixteen times a full one: it grows while no segment can be closed
+_SPARSE_BYTES_MAX, _SPARSE_RATIO = 512 << 20, 16  # beyond them a file has holes, which no run writes
 _PLACE = "sample", "time_s", "unix_s", "events_bytes"
 
 
@@ -130,7 +130,7 @@ class Journal:
         OSError
             If it cannot be read.
         """
-        data = read_bytes(run, name_of(number), _SIZE_BYTES_MAX)
+        data = _whole(run, name_of(number))
         try:
             return cls()._over(frames(data), after)
         except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
@@ -203,6 +203,22 @@ class Journal:
         step_s = (since.time_s - first.time_s) / passed if passed else 0.0
         place = begin, (end, since.time_s + (end - since.sample) * step_s)
         return Damage(self._broken_bytes, *place, _count(known), at_least=self._counted is None)
+
+
+def _whole(run: Path, name: str) -> bytes:
+    """All of a journal, which grows without a bound while no segment can be closed; InputError for one with holes.
+
+    What is read is at most in proportion to what the disk holds: a journal may come from anybody.
+    """
+    with open_read(run, name) as file:
+        about = os.fstat(file.fileno())
+        held_bytes = 512 * getattr(about, "st_blocks", 0)
+        if about.st_size > max(_SPARSE_BYTES_MAX, _SPARSE_RATIO * held_bytes):
+            raise InputError(
+                f"{str(run / name)!r} is {about.st_size} bytes long, of which the disk holds {held_bytes}; "
+                "a run does not write that; move it away"
+            )
+        return file.read(about.st_size)
 
 
 def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:

@@ -151,7 +151,7 @@ class Store:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
             try:
                 self._close_segment()
-            except OSError as error:
+            except (OSError, InputError) as error:
                 self._not_closed(error, "with the next commit")
         elif self._closing.done:
             self._closed()
@@ -272,7 +272,7 @@ class Store:
         used = self._events.length + JOURNALS * self.limits.journal_bytes_max
         self._closing.begin(None if budget is None else budget - used)
 
-    def _closed(self) -> OSError | None:
+    def _closed(self) -> OSError | InputError | None:
         """Wait until the journal before is turned, and say what was removed or damaged; the error where it failed."""
         gone, error = self._closing.result()
         for retained in self._shelf.retained[self._named :]:
@@ -292,11 +292,11 @@ class Store:
             self._not_closed(
                 error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
             )
-        elif self._attempts and not self._shelf.sealed:
+        elif self._attempts and not self._shelf.sealed and not self._full(self._committed):
             self._say_closed()
         return error
 
-    def _not_closed(self, error: OSError, retried: str) -> None:
+    def _not_closed(self, error: OSError | InputError, retried: str) -> None:
         """Say that a segment cannot be closed: the first, second, fourth, eighth … time."""
         self._attempts += 1
         if self._attempts & (self._attempts - 1):
@@ -311,7 +311,7 @@ class Store:
             f"record remains in {len(waiting)} journal{'s' * (len(waiting) > 1)}",
             attempts=self._attempts,
             journals=waiting,
-            errno=error.errno,
+            errno=getattr(error, "errno", None),
         )
 
     def _say_closed(self) -> None:
