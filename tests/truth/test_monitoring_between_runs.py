@@ -189,6 +189,21 @@ def test_a_stiffness_lost_within_the_run_is_found_and_dated() -> None:
     assert events[0].message.endswith("than before in this run.")
 
 
+def test_a_loss_within_the_run_clears_to_what_the_run_was_before() -> None:
+    detector, known, events = MachineDetector(without_sensor(), 24.0), np.diag(60.0 / SMALLEST**2), []
+    for stretch in range(30):
+        off = BELT.direction * (1.0 + 4.0 * (10 <= stretch < 20))
+        seen = windows(np.random.default_rng(8), np.zeros(4), 10)
+        score = np.tile(known @ (off - detector.offset.logarithms), (10, 1))
+        time_s, position_m = np.arange(10) / 10 + stretch, np.linspace(0.4, 1.4, 10)
+        information = np.tile(known, (10, 1, 1))
+        seen = replace(seen, score=score, information=information, position_m=position_m, time_s=time_s)
+        events += detector.process(seen)
+    assert [event.kind for event in events] == ["change", "change-cleared"]
+    assert [event.details["reference"] for event in events] == ["run", "run"]
+    assert "is as before in this run again" in events[1].message
+
+
 def test_a_loss_of_inertia_from_the_beginning_is_found_whatever_the_temperature() -> None:
     events = judged(without_sensor(), at_temperature(4.0, 20_000, inertia=0.98, seconds=6.0)())
     assert changes(events) == ["inertia"]

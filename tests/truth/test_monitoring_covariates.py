@@ -116,9 +116,20 @@ def test_a_temperature_that_never_changed_cannot_be_learned() -> None:
         with_range(("temperature",), np.full((100, 1), MEAN_C))
 
 
+def test_a_constant_temperature_with_noise_cannot_be_learned_and_a_small_range_beyond_it_can() -> None:
+    generator = np.random.default_rng(3)
+    noise = 0.0025 * generator.standard_normal((2000, 1))
+    with pytest.raises(InputError, match=r"is 21\.99\S* to 22\.00\S*, no more than its noise, in all runs"):
+        with_range(("temperature",), MEAN_C + noise)
+    runs = np.repeat([-0.05, 0.0, 0.05], [600, 700, 700])[:, np.newaxis]
+    assert with_range(("temperature",), MEAN_C + runs + noise).half_range[0] == pytest.approx(
+        0.05 + 3.5 * 0.0025, abs=0.002
+    )
+
+
 def test_two_sensors_that_read_the_same_are_refused() -> None:
-    value = np.random.default_rng(1).normal(20.0, 2.0, (100, 1))
-    with pytest.raises(InputError, match="'belt' and 'hall' cannot be told apart"):
+    value = np.linspace(18.0, 22.0, 100)[:, np.newaxis]
+    with pytest.raises(InputError, match="'belt' and 'hall' are too strongly correlated"):
         with_range(("belt", "hall"), np.hstack([value, value + 3.0]))
 
 

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 COVARIATES_MAX = 4
 _MARGIN = 0.1  # of the learned range, beyond which a value is not known
 _CONSTANT = 1e-6  # of the mean: a smaller range is rounding
+_NOISE = 10.0  # standard deviations of a channel's noise: in 100,000 windows it alone ranges over nine
 _ALIKE = 0.99  # correlation from which two covariates cannot be told apart
 _PARTS = 5  # of each run, where there are fewer than three runs to compare
 _RUNS_MIN = 3
@@ -83,10 +84,12 @@ def window_means(data: Floats, begin: NDArray[np.int64], window: int) -> Floats:
 def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
     """Covariates with the range of these values of learned windows, (windows, covariates), and no influence yet.
 
+    The windows are in the order of time, for what differs from one to the next is a channel's noise.
+
     Raises
     ------
     InputError
-        If one has no value or a constant one, or two cannot be told apart.
+        If one has no value or, but for its noise, a constant one, or two are too strongly correlated.
     """
     if not len(value):
         raise InputError(
@@ -94,18 +97,22 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
             "leave them out of [monitoring] covariates"
         )
     low, high = value.min(axis=0), value.max(axis=0)
-    for name, least, most in zip(names, low, high):
-        if most - least <= _CONSTANT * max(abs(least), abs(most)):
+    # Of Gaussian differences, which the few steps from run to run hardly change.
+    noise = np.sqrt(np.pi) / 2 * np.abs(np.diff(value, axis=0, append=value[-1:])).mean(axis=0)
+    for name, least, most, own in zip(names, low, high, noise):
+        rounding = _CONSTANT * max(abs(least), abs(most))
+        if most - least <= max(rounding, _NOISE * own):
+            what = f"{least:g}" if most - least <= rounding else f"{least:.6g} to {most:.6g}, no more than its noise,"
             raise InputError(
-                f"the covariate {name!r} is {least:g} in all runs, so its influence cannot be learned; add runs at "
-                "other values, or leave it out of [monitoring] covariates"
+                f"the covariate {name!r} is {what} in all runs, so its influence cannot be learned; add runs at other "
+                "values, or leave it out of [monitoring] covariates"
             )
     alike = np.abs(np.atleast_2d(np.corrcoef(value.T))) - np.eye(len(names))
     if alike.max() > _ALIKE:
         one, other = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
         raise InputError(
-            f"the covariates {one!r} and {other!r} cannot be told apart in these runs (correlation "
-            f"{alike.max():.3f}); name one of them in [monitoring] covariates"
+            f"the covariates {one!r} and {other!r} are too strongly correlated in these runs ({alike.max():.3f}); name "
+            "one of them in [monitoring] covariates"
         )
     n = len(names)
     return Covariates(names, value.mean(axis=0), low, high, np.zeros((4, n)), np.zeros((4, n, n)))

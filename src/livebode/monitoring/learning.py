@@ -144,7 +144,7 @@ def _with_noise(machine: Machine, seen: Evidence) -> Machine:
 
 
 def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tuple[Rows, Floats, Floats]:
-    """Responses of single steady windows that are fast enough, their speeds, and the known values of covariates."""
+    """Responses of single steady windows that are fast enough, their speeds, and covariates' known values by time."""
     u, y, centre, speed, covariate = (np.concatenate(part) for part in zip(*_spectra(runs, lines, names)))
     fastest = np.max(np.abs(speed), initial=0.0)
     use = np.flatnonzero((np.abs(speed) >= _SLOWEST * fastest) & np.all(np.abs(u) > 0, axis=1))
@@ -153,9 +153,9 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tu
             f"the runs hold {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that a "
             "model of the moving machine needs; give longer runs, or a shorter window"
         )
+    known = covariate[use][np.isfinite(covariate[use]).all(axis=1)]
     use = use[np.argsort(centre[use], kind="stable")]
     chosen = use[np.unique(np.linspace(0, use.size - 1, _ROWS_MAX).round().astype(int))]
-    known = covariate[use][np.isfinite(covariate[use]).all(axis=1)]
     return Rows(y[chosen] / u[chosen], np.abs(u[chosen]), centre[chosen]), speed[use], known
 
 

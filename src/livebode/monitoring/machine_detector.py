@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.monitoring import evidence as word
-from livebode.monitoring.alarms import Recent
+from livebode.monitoring.alarms import Alarm, Recent
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import Machine
@@ -110,8 +110,12 @@ class MachineDetector:
             return [far_away(self.standing.alarms[-1], sample, time_s)]
         new = self.standing.announced(known)
         wrong = self.standing.corrected() if new and known else []
-        events = [changed(a, sample, time_s, within_run=self._own.within_run(a.change.direction)) for a in new]
-        return events + [corrected(a, told, sample, time_s) for a, told in wrong]
+        events = [changed(a, sample, time_s, within_run=self.within_run(a)) for a in new]
+        return events + [corrected(a, told, sample, time_s, within_run=self.within_run(a)) for a, told in wrong]
+
+    def within_run(self, alarm: Alarm) -> bool:
+        """Whether its amount is from what this run was before, not from the baseline."""
+        return self._own.within_run(alarm.change.direction)
 
     def _window(self, seen: Evidence, i: int) -> list[Event]:
         position_m, sample, time_s = float(seen.position_m[i]), int(seen.sample[i]), float(seen.time_s[i])
@@ -123,7 +127,7 @@ class MachineDetector:
         gone = self.standing.step(score, information, position_m)
         if gone:
             self._reset()
-        events = [cleared(alarm, sample, time_s) for alarm in gone]
+        events = [cleared(alarm, sample, time_s, within_run=self.within_run(alarm)) for alarm in gone]
         if self.standing.hides(position_m):
             return events
         mark, self._taken = self._taken, self._taken + 1

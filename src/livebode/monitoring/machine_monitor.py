@@ -53,7 +53,7 @@ class MachineMonitor:
         """Changes that stand, as plain data."""
         alarms = self.detector.standing.alarms
         far = [about_far(alarms[-1])] if self.detector.standing.far else []
-        return far + [about(alarm) for alarm in self._told()]
+        return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._told()]
 
     def together(self) -> str:
         """Their amounts now, estimated together, in words; empty where none is known."""

@@ -33,14 +33,14 @@ WHAT = {
 
 def changed(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """Something changed, as is known at this sample and time; `within_run`: from what this run was before."""
-    than = "before in this run" if within_run else "in the baseline"
-    message = f"Since {moment(alarm.since_s)} {_amount(alarm.change, alarm.now, alarm.bound)} than {than}"
+    amount = _amount(alarm.change, alarm.now, alarm.bound)
+    message = f"Since {moment(alarm.since_s)} {amount} than {_reference(within_run)}"
     if (rival := alarm.rival) is not None:
         message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
     if alarm.change.place is None and abs(alarm.now) > FAR:
         message += ". That is so far from the baseline that it may be another machine; the amount is rough until all "
         message += "that differs has its name"
-    return Event("change", sample, time_s, message + ".", about(alarm))
+    return Event("change", sample, time_s, message + ".", about(alarm, within_run=within_run))
 
 
 def far_away(alarm: Alarm, sample: int, time_s: float) -> Event:
@@ -58,13 +58,14 @@ def about_far(alarm: Alarm) -> dict[str, Any]:
     return about(alarm) | unknown | {"what": "machine", "may_also_be": None}
 
 
-def corrected(alarm: Alarm, told: float, sample: int, time_s: float) -> Event:
+def corrected(alarm: Alarm, told: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """The amount of a change that was told, once another that looked like a part of it has its name."""
     message = (
-        f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than in the "
-        f"baseline, not {_size(told)} as told before."
+        f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than "
+        f"{_reference(within_run)}, not {_size(told)} as reported earlier."
     )
-    return Event("change-corrected", sample, time_s, message, about(alarm) | {"told_percent": percent(told)})
+    details = about(alarm, within_run=within_run) | {"told_percent": percent(told)}
+    return Event("change-corrected", sample, time_s, message, details)
 
 
 def joint(alarms: list[Alarm]) -> str:
@@ -74,14 +75,15 @@ def joint(alarms: list[Alarm]) -> str:
     return ": " + "; ".join(_amount(alarm.change, alarm.now, alarm.bound) for alarm in alarms)
 
 
-def cleared(alarm: Alarm, sample: int, time_s: float) -> Event:
+def cleared(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """A change that was alarmed has gone."""
     where = _where(alarm.change)
     name = WHAT[DIRECTIONS[alarm.change.direction]]
     message = (
-        f"At {moment(time_s)} {name}{where} is as in the baseline again; it had changed since {moment(alarm.since_s)}."
+        f"At {moment(time_s)} {name}{where} is as {_reference(within_run)} again; it had changed since "
+        f"{moment(alarm.since_s)}."
     )
-    return Event("change-cleared", sample, time_s, message, about(alarm))
+    return Event("change-cleared", sample, time_s, message, about(alarm, within_run=within_run))
 
 
 def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
@@ -90,16 +92,16 @@ def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
     details = {"reason": status, "position_m": float(position_m), "speed_m_per_s": float(speed_m_per_s)}
     if status == word.FAST:
         message = (
-            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis goes at "
-            f"{abs(speed_m_per_s):.3g}; such motion is not judged. Learn from a run that holds it."
+            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis moves at "
+            f"{abs(speed_m_per_s):.3g}: such motion is not monitored. Add a run with such speeds and learn again."
         )
     elif status in (word.COVARIATE, word.NO_COVARIATE):
         message = _not_covered(machine.covariates, seen.covariate[row])
         details |= dict(zip(machine.covariates.names, seen.covariate[row].tolist()))
     else:
         message = (
-            f"The baseline does not know the axis at position {position_m:.3g}; it is not judged there. "
-            "Learn from a run that goes there."
+            f"The baseline does not know the axis at position {position_m:.3g}: it is not monitored there. "
+            "Add a run with such positions and learn again."
         )
     return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
 
@@ -125,17 +127,17 @@ def _not_covered(covariates: Covariates, value: Floats) -> str:
     """The first covariate without a value, or outside of what was learned."""
     for i, name in enumerate(covariates.names):
         if not isfinite(value[i]):
-            return f"The covariate {name!r} has no value; the machine is not judged without it. Check that channel."
+            return f"The covariate {name!r} has no value; the machine is not monitored without it. Check that channel."
     beside = np.maximum(covariates.low - value, value - covariates.high) / covariates.half_range
     i = int(np.argmax(beside))
     return (
         f"The baseline knows {covariates.names[i]!r} from {covariates.low[i]:.4g} to {covariates.high[i]:.4g}, and it "
-        f"is {value[i]:.4g}; the machine is not judged there. Learn from a run that holds it."
+        f"is {value[i]:.4g}: the machine is not monitored there. Add a run with such values and learn again."
     )
 
 
-def about(alarm: Alarm) -> dict[str, Any]:
-    """An alarm as plain data; amounts in percent."""
+def about(alarm: Alarm, *, within_run: bool = False) -> dict[str, Any]:
+    """An alarm as plain data; amounts in percent of the reference: the baseline, or this run before the change."""
     place, rival = alarm.change.place, alarm.rival
     return {
         "what": DIRECTIONS[alarm.change.direction],
@@ -148,6 +150,7 @@ def about(alarm: Alarm) -> dict[str, Any]:
         "named_from_m": alarm.way_m[0],
         "named_to_m": alarm.way_m[1],
         "may_also_be": DIRECTIONS[rival.direction] if rival else None,
+        "reference": "run" if within_run else "baseline",
     }
 
 
@@ -158,6 +161,10 @@ def percent(log_amount: float) -> float:
 def bound_percent(log_amount: float, log_bound: float) -> float:
     """Half-width in percent of the baseline."""
     return 100 * log_bound * exp(log_amount)
+
+
+def _reference(within_run: bool) -> str:
+    return "before in this run" if within_run else "in the baseline"
 
 
 def _amount(change: Change, amount: float, bound: float) -> str:

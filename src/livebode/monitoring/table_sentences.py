@@ -59,8 +59,8 @@ def cleared(table: Table, sample: int, time_s: float) -> Event:
 def unknown(schedule: float, sample: int, time_s: float) -> Event:
     """The machine is where, or goes as, it was not learned."""
     message = (
-        f"The baseline does not know the machine at {schedule:.4g} going this way; it is not judged there. "
-        "Learn from a run that holds it."
+        f"The baseline does not know the machine at {schedule:.4g} going this way: it is not monitored there. "
+        "Add a run with such motion and learn again."
     )
     return Event("baseline-unknown", sample, time_s, message, {"reason": "place", "schedule": schedule})
 
