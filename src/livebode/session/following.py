@@ -285,6 +285,7 @@ class Tracking:
         """Asked by a live source before each Block and while it waits: events of a silent machine are recorded too."""
         if self._tally.stop and time.monotonic() - self._stepped_s > _SILENT_S:
             self._write_events()
+            self._out.report_groups_while_silent(time.monotonic())
             if not isinstance(self.recorder, RunDirectory):
                 self.recorder.commit_while_silent()
         return changing()
