@@ -13,6 +13,7 @@ from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.nouns import Block, Channel, Event, Lines
 from livebode.records import Run
+from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.session.averaged import averaged
 from livebode.session.live_checks import LiveChecks
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
@@ -96,18 +97,24 @@ def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, r
     data = recorded.copy()
     data[1:, : 3 * WINDOW] *= 30.0
     signals = {"excitation": "w", "input": "velocity", "output": "u"}  # exchanged
-    with (
-        Machine(tmp_path) as peer,
-        LiveSession(
-            tmp_path, peer, signals=signals, tracking={}, lines={"frequencies": "20:140:10", "window": WINDOW}
-        ) as session,
-    ):
-        peer.wait_ready()
-        for at in range(0, data.shape[1], 500):
-            channels = tuple(map(Channel, NAMES))
-            peer.send(Batch(at, data[:, at : at + 500].copy(), channels, RATE_HZ, 3))
-        until(lambda: {"roles-doubtful", "transient"} <= {e.kind for e in session.events()}, "both to be recorded")
-    assert {"roles-doubtful", "transient"} <= {event.kind for event in session.told}
+    axis = {"signals": signals, "tracking": {}, "lines": {"frequencies": "20:140:10", "window": WINDOW}}
+    sent = [
+        Batch(at, data[:, at : at + 500].copy(), tuple(map(Channel, NAMES)), RATE_HZ, 3)
+        for at in range(0, data.shape[1], 500)
+    ]
+    with Machine(tmp_path) as peer:
+        with LiveSession(tmp_path, peer, **axis) as session:
+            peer.wait_ready()
+            for batch in sent[:-1]:
+                peer.send(batch)
+            until(lambda: {"roles-doubtful", "transient"} <= {e.kind for e in session.events()}, "both to be recorded")
+        assert {"roles-doubtful", "transient"} <= {event.kind for event in session.told}
+        forget_what_was_found(session.run)
+        peer.hang_up()
+        with LiveSession(tmp_path, peer, **axis) as session:
+            peer.wait_ready()
+            peer.send(sent[-1])
+            until(lambda: "record-continued" in {e.kind for e in session.events()}, "the record to continue")
     run = Run.open(session.run)
     assert run.summary["counts"]["samples"] == data.shape[1]
     left_out = run.summary["left_out_samples"]
@@ -115,3 +122,12 @@ def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, r
     responses = run.responses()
     steady = responses[np.flatnonzero(responses.first >= left_out)]
     assert averaged(run).count == len(steady) < len(responses)
+
+
+def forget_what_was_found(run: Path) -> None:
+    """Leave run.json as a disk does that is full from the beginning of a run on."""
+    summary = dict(Run.open(run).summary)
+    for name in ("left_out_samples", "clock"):
+        summary.pop(name, None)
+    for name in (RUN, COPY):
+        (run / name).write_bytes(to_document(summary))

@@ -176,8 +176,7 @@ def test_a_continued_run_records_what_happens_before_the_machine_sends_new_sampl
                     peer.send(batch)
                 until(lambda n=before: session.events()[n:], "the connection to be recorded")
                 found = [event.kind for event in session.events()]
-            peer._link.close()
-            peer._link = None
+            peer.hang_up()
     assert found[1] == "record-continued"
 
 
