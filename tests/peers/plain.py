@@ -85,6 +85,12 @@ class TcpPeer(Peer):
         assert self._link is not None
         self._link.sendall(b"\0" * 100)
 
+    def hang_up(self) -> None:
+        """Close the connection to a receiver that has ended."""
+        assert self._link is not None
+        self._link.close()
+        self._link = None
+
     def interrupt(self) -> None:
         assert self._link is not None
         old, self._link = self._link, None

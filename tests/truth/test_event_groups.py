@@ -139,6 +139,26 @@ def test_a_change_of_state_is_reported_within_a_second_of_the_flood_around_it() 
     assert all(0 <= tenth - at <= 11 for (tenth, _), at in zip(found, (200, 300)))
 
 
+def test_a_change_of_state_of_a_silent_machine_is_reported_within_a_second_and_no_faster() -> None:
+    groups, found = EventGroups(), []
+    for kind in ["connected", "disconnected"] * AT_ONCE:
+        groups.take(Event(kind, 100, 0.1, kind))
+    for tenth in range(200):  # of a second, while the machine's time does not pass
+        if tenth in (0, 51, 52, 110):
+            groups.take(Event("disconnected" if tenth < 110 else "connected", 100, 0.1, str(tenth)))
+        found += [(tenth, each.message) for one in groups.due_while_silent(tenth / 10) for each in each_event(one)]
+        assert groups.due(0.1) == []
+    assert [message for _, message in found[-4:]] == ["0", "51", "52", "110"]
+    assert [tenth for tenth, _ in found[-4:]] == [10, 51, 61, 161]
+
+
+def test_a_link_that_flaps_adds_a_line_a_second_at_most() -> None:
+    groups, found = EventGroups(), []
+    for n in range(2400):
+        found += groups.take(Event("disconnected" if n % 2 else "connected", n, n / 8, ""))
+    assert AT_ONCE < len(found) <= AT_ONCE + 300
+
+
 class Page(Audience):
     """Keeps what a dashboard would show."""
 

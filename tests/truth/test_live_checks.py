@@ -18,6 +18,7 @@ from livebode.nouns import Block, Channel, Event, Lines
 from livebode.records import Run
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.last_commit import last_commit
+from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.session.averaged import averaged
 from livebode.session.live_checks import LiveChecks
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
@@ -183,10 +184,16 @@ def test_a_run_that_is_continued_before_it_was_judged_is_judged_then(tmp_path: P
 def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, recorded: np.ndarray) -> None:
     data = recorded.copy()
     data[1:, : 3 * WINDOW] *= 30.0
-    with Machine(tmp_path) as peer, LiveSession(tmp_path, peer, **EXCHANGED) as session:
-        send(peer, data)
-        until(lambda: {"roles-doubtful", "transient"} <= {e.kind for e in session.events()}, "both to be recorded")
-    assert {"roles-doubtful", "transient"} <= {event.kind for event in session.told}
+    with Machine(tmp_path) as peer:
+        with LiveSession(tmp_path, peer, **EXCHANGED) as session:
+            send(peer, data, 0, data.shape[1] - 500)
+            until(lambda: {"roles-doubtful", "transient"} <= {e.kind for e in session.events()}, "both to be recorded")
+        assert {"roles-doubtful", "transient"} <= {event.kind for event in session.told}
+        forget_what_was_found(session.run)
+        peer.hang_up()
+        with LiveSession(tmp_path, peer, **EXCHANGED) as session:
+            send(peer, data, data.shape[1] - 500)
+            until(lambda: "record-continued" in {e.kind for e in session.events()}, "the record to continue")
     run = Run.open(session.run)
     assert run.summary["counts"]["samples"] == data.shape[1]
     left_out = run.summary["left_out_samples"]
@@ -194,3 +201,12 @@ def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, r
     responses = run.responses()
     steady = responses[np.flatnonzero(responses.first >= left_out)]
     assert averaged(run).count == len(steady) < len(responses)
+
+
+def forget_what_was_found(run: Path) -> None:
+    """Leave run.json as a disk does that is full from the beginning of a run on."""
+    summary = dict(Run.open(run).summary)
+    for name in ("left_out_samples", "clock"):
+        summary.pop(name, None)
+    for name in (RUN, COPY):
+        (run / name).write_bytes(to_document(summary))

@@ -166,6 +166,20 @@ def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):
         until(lambda: "acknowledged" in [event.kind for event in session.events()], "both to be recorded")
 
 
+def test_a_continued_run_records_what_happens_before_the_machine_sends_new_samples(tmp_path):
+    with TcpPeer(tmp_path) as peer:
+        for sent_again in (40, 1):  # the second time what is recorded already
+            with LiveSession(tmp_path, peer) as session:
+                peer.wait_ready()
+                before = len(session.events())
+                for batch in batches(40, first=0)[:sent_again]:
+                    peer.send(batch)
+                until(lambda n=before: session.events()[n:], "the connection to be recorded")
+                found = [event.kind for event in session.events()]
+            peer.hang_up()
+    assert found[1] == "record-continued"
+
+
 def listens(sender: socket.socket, frame: bytes) -> bool:
     try:
         return bool(sender.send(frame) and sender.send(frame))

@@ -114,6 +114,10 @@ class Outlet:
         """Publish the events that have waited long enough at `time_s` of the machine."""
         self._report(self._groups.due(time_s))
 
+    def report_groups_while_silent(self, now_s: float) -> None:
+        """The same at `now_s` of this computer, while the machine's time does not pass."""
+        self._report(self._groups.due_while_silent(now_s))
+
     def finish_groups(self) -> None:
         """Publish all events that wait: nothing more will come."""
         self._report(self._groups.finish())

@@ -79,14 +79,14 @@ class _Group:
         changed = any(event.kind in _STATES for event in (*self.waiting, *filter(None, [self.newest])))
         return time_s - self.reported_s >= (STATE_S if changed else REPORT_S)
 
-    def report(self) -> Event:
-        """One event for all that wait, which then do not wait any longer."""
+    def report(self, time_s: float = 0.0) -> Event:
+        """One event at `time_s` for all that wait, which then do not wait any longer."""
         exact, counted = self.waiting, Counter(self.counted)
         if self.newest is not None:  # of the newest one everything is in the line anyway
             counted[self.newest.kind] -= 1
             exact = [*exact, self.newest]
         self.waiting, self.counted, self.newest = [], {}, None
-        self.lines, self.reported_s = self.lines + 1, self.last_s
+        self.lines, self.reported_s = self.lines + 1, max(time_s, self.last_s)
         details: dict[str, Any] = {"group": self.name, "count": self.count}
         details |= {"first_s": self.first_s, "last_s": self.last_s}
         message = exact[-1].message
@@ -103,8 +103,9 @@ class EventGroups:
 
     A group is one cause (`CAUSES`) from its first event until it is silent for 60 s of the machine's time. Its first 20
     events are reported at once, one by one, and so is the first event of each kind. What comes then shares a line: the
-    newest event, with the others in its details, after 10 s (after 1 s where a state changed), with 128 of them, or at
-    the end of the group or the run. Until then they are `waiting`, which the record stores with every commit.
+    newest event, with the others in its details, after 10 s (after 1 s where a state changed; of this computer where
+    the machine is silent), with 128 of them, or at the end of the group or the run. Until then they are `waiting`,
+    which the record stores with every commit.
 
     A flood is counted: of a group 1,000 events are reported with sample, time and message of each, and one more each
     second. `livebode.records.grouped_events` reads events back one by one, or counts them.
@@ -125,6 +126,7 @@ class EventGroups:
 
     def __init__(self) -> None:
         self._groups: dict[str, _Group] = {}
+        self._silent_s: dict[str, float] = {}  # since when each cause waits, in `due_while_silent`
 
     def take(self, event: Event) -> list[Event]:
         """What is to be reported now that this happened."""
@@ -141,7 +143,7 @@ class EventGroups:
         if new:
             group.kinds.append(event.kind)
         if new or group.due(event.time_s):
-            found.append(group.report())
+            found.append(group.report(event.time_s))
         return found
 
     def due(self, time_s: float, cause: str | None = None) -> list[Event]:
@@ -152,9 +154,20 @@ class EventGroups:
                 continue
             ended = time_s - group.last_s >= QUIET_S
             if group.waits and (ended or group.due(time_s)):
-                found.append(group.report())
+                found.append(group.report(time_s))
             if ended:
                 del self._groups[name]
+        return found
+
+    def due_while_silent(self, now_s: float) -> list[Event]:
+        """What is to be reported at `now_s` of this computer, while the machine's time does not pass."""
+        found = []
+        for cause, group in self._groups.items():
+            if group.waits:
+                waited_s = now_s - self._silent_s.setdefault(cause, now_s)
+                if group.due(group.reported_s + waited_s):
+                    found.append(group.report())
+                    self._silent_s[cause] = now_s
         return found
 
     def waiting(self) -> list[Event]:

@@ -173,6 +173,8 @@ class Tracking:
         recorder = self.recorder.__enter__()
         if not isinstance(recorder, RunDirectory):
             self._orders.left = recorder.stopped
+            if self._tally.left_out_samples is not None:  # run.json lacks it where the disk was full when it was found
+                self._renew(left_out_samples=self._tally.left_out_samples)
             if recorder.clock:
                 self._relation.clock.pieces = recorder.clock
         return self
@@ -249,7 +251,8 @@ class Tracking:
         self.to.tell(event)
         self._out.write_event(event)
         if event.kind == "transient":
-            self._renew(left_out_samples=event.details["samples"])
+            self._tally.left_out_samples = int(event.details["samples"])
+            self._renew(left_out_samples=self._tally.left_out_samples)
 
     def _clocked(self) -> Iterator[Block]:
         # What waits in a file or a pipe says by its arrival nothing of when it was sampled.
@@ -289,6 +292,7 @@ class Tracking:
         """Asked by a live source before each Block and while it waits: events of a silent machine are recorded too."""
         if self._tally.stop and time.monotonic() - self._stepped_s > _SILENT_S:
             self._write_events()
+            self._out.report_groups_while_silent(time.monotonic())
             if not isinstance(self.recorder, RunDirectory):
                 self.recorder.commit_while_silent()
         return changing()

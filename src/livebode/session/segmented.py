@@ -85,7 +85,7 @@ class SegmentedRun:
     ) -> None:
         self.path = path
         self._position, self._waiting = position, waiting
-        self._followed: Block | None = None
+        self._followed: tuple[int, float] | None = None
         self._new, self._waited = False, waiting()
         self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
         self._more: dict[str, Any] = {} if before is None else {"continues": before.name}
@@ -109,7 +109,8 @@ class SegmentedRun:
                 self._continued = False
             else:
                 self._restore(self._store.last.states)
-                self._continued = True
+                self._continued = self._new = True  # that it continues is an event
+                self._followed = self._store.last.sample, self._store.last.time_s
             self._undo = undo.pop_all()
         self._hear()
         return self
@@ -175,18 +176,21 @@ class SegmentedRun:
             if self._position is not None:
                 self._position.take(block)
             yield block
-            self._followed, self._new = block, True
+            self._followed, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
             if self._store.due(block.stop):
-                self._commit(block)
+                self._commit(*self._followed)
         if self._followed is not None:
-            self._commit(self._followed)
+            self._commit(*self._followed)
 
     def commit_while_silent(self) -> None:
-        """Record what came of the last Block, and the events since, while the next one is waited for."""
-        if self._followed is None or not self._store.due(self._followed.stop):
+        """Record what came of the last Block, and the events since, while the next one is waited for.
+
+        The last one may be of the time before the run was continued.
+        """
+        if self._followed is None or not self._store.due(self._followed[0]):
             return
         if self._new or self._waiting() != self._waited:
-            self._commit(self._followed)
+            self._commit(*self._followed)
 
     def write(self, responses: Responses) -> None:
         """Append responses."""
@@ -230,9 +234,9 @@ class SegmentedRun:
             return offered_again(blocks, last.sample)
         return iter(blocks)
 
-    def _commit(self, block: Block) -> None:
+    def _commit(self, sample: int, time_s: float) -> None:
         self._new, self._waited = False, self._waiting()
-        self._store.commit(block.stop, block.origin_s + block.stop / block.rate_hz, self._states(), self._waited)
+        self._store.commit(sample, time_s, self._states(), self._waited)
         self._hear()
 
     def _hear(self) -> None:

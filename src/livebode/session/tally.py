@@ -32,6 +32,8 @@ class Tally:
         Number of the sample behind the last one that was followed.
     groups
         The events of each cause.
+    left_out_samples
+        Where the transient that a live run began with ends; None without one.
     handed_out
         The `stop` at which what was held back had been handed out.
     judged
@@ -44,6 +46,7 @@ class Tally:
         self.responses = self.invalid = self.valid_lines = 0
         self.stop = self.handed_out = 0 if before is None else before.sample
         self.judged = False
+        self.left_out_samples: int | None = None
         self.tracked_s = 0.0
         self._started = started
 
@@ -71,8 +74,9 @@ class Tally:
     def snapshot(self) -> bytes:
         """All of it as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
-        parts = {"before": self._before, "check": self.check.state(), "groups": self.groups.state()}
-        return json.dumps(numbers | {"run_s": self.run_s, "judged": self.judged} | parts).encode()
+        parts = {"before": self._before, "judged": self.judged, "left_out_samples": self.left_out_samples}
+        parts |= {"check": self.check.state(), "groups": self.groups.state()}
+        return json.dumps(numbers | {"run_s": self.run_s} | parts).encode()
 
     def restore(self, snapshot: bytes) -> None:
         """Go on from a snapshot."""
@@ -84,3 +88,4 @@ class Tally:
         self._before = state["before"]
         self.check.load(state["check"])
         self.groups.load(state.get("groups", {}))  # a record from before there were groups has none
+        self.left_out_samples = state.get("left_out_samples")
