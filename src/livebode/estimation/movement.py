@@ -13,9 +13,7 @@ _PERIODS = 9  # before, with which the schedule is compared
 _BEFORE = _PERIODS + 2  # that are remembered: the oldest value with a bend needs two more
 _BENDS_MIN = 6  # second differences without which the jitter is not known
 _JITTER = 3.0  # times the largest second difference: what noise and a flickering count do not reach
-_FEW = (
-    8  # places: with fewer, second differences miss vibration, and what wanders slowly is larger; twice as many times
-)
+_FEW = 8  # places: with fewer, second differences miss vibration, so that twice as many times their size count
 
 
 class Movement:

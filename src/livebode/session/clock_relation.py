@@ -108,9 +108,7 @@ class ClockRelation:
         if abs(by_s) <= STEP_S:
             return False
         self._unix_s += by_s
-        message = (
-            f"the clock of this computer was set by {by_s:+.4g} s; times of day before {start_s:.6g} s are as it was"
-        )
+        message = f"this computer's clock was set by {by_s:+.4g} s; times of day before {start_s:.6g} s remain"
         self._set.append(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
         self._begin(start_s, self._unix_s + block.arrived_s - (block.origin_s + block.stop / block.rate_hz), -inf)
         return True

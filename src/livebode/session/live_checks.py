@@ -15,7 +15,7 @@ from livebode.session.roles import ROLES, suspicions
 from livebode.session.transients import transient_event, transient_periods
 
 _WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # of a stretch that is judged, whichever is longer
-_EXCITED_MIN = 16  # windows of it with power, so that noise is told from an answer
+_EXCITED_MIN = 16  # windows of it with power, to distinguish noise from an answer
 _SLIP_PERIODS = 32  # that are searched at a time
 
 
@@ -55,7 +55,7 @@ class LiveChecks:
         self._searched = _Stretch()
 
     def over(self, blocks: Iterable[Block], say: Callable[[Event], None]) -> Iterator[Block]:
-        """The same Blocks; what they show is said before the next one is asked for."""
+        """The same Blocks; what they show is reported before the next one is asked for."""
         for block in blocks:
             yield block
             for event in self.take(block):
