@@ -104,6 +104,47 @@ def test_a_very_long_line_far_down(tmp_path):
     assert "line 100002" in refused(text(tmp_path, f"t,u\n{rows}1,{'2' * 9_000_000}\n"), rate_hz=1)
 
 
+SLOW_READ = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <time.h>
+#include <unistd.h>
+ssize_t read(int file, void *into, size_t size) {
+    ssize_t (*real)(int, void *, size_t) = (ssize_t (*)(int, void *, size_t))dlsym(RTLD_NEXT, "read");
+    struct timespec delay = {0, size < 1000000 ? 0 : 50000000};
+    nanosleep(&delay, 0);
+    return real(file, into, size);
+}
+"""
+
+READ_ANOTHER_FILE_AFTER_THE_FIRST_ROWS = """
+import sys
+from pathlib import Path
+from livebode.sources.delimited import DelimitedRecording
+recording = DelimitedRecording(Path(sys.argv[1]))
+chunks = recording.chunks(recording.columns, 1000)
+next(chunks)
+chunks.close()
+with Path(sys.argv[1]).open("rb") as another:
+    read = another.read()
+sys.exit(len(read) != Path(sys.argv[1]).stat().st_size)
+"""
+
+
+def test_a_recording_left_early_takes_no_bytes_from_the_file_opened_next(tmp_path):
+    """On a disk of 50 ms a read, Arrow's threads still read ahead when the recording is closed."""
+    recording = text(tmp_path, "t,u\n" + "".join(f"{k},1\n" for k in range(400_000)))
+    (tmp_path / "slow.c").write_text(SLOW_READ)
+    subprocess.run(["gcc", "-shared", "-fPIC", "slow.c", "-o", "slow.so", "-ldl"], cwd=tmp_path, check=True)
+    finished = subprocess.run(
+        [sys.executable, "-c", READ_ANOTHER_FILE_AFTER_THE_FIRST_ROWS, str(recording)],
+        env={**os.environ, "LD_PRELOAD": str(tmp_path / "slow.so")},
+        capture_output=True,
+        text=True,
+    )
+    assert (finished.returncode, finished.stderr) == (0, "")
+
+
 def test_paths_that_are_no_recordings(tmp_path):
     assert "there is no file" in refused(tmp_path / "none.csv")
     os.mkfifo(tmp_path / "pipe.csv")

@@ -109,7 +109,9 @@ class DelimitedRecording(Recording):
                 raw.seek(dialect.offset)
                 yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)
         else:
-            with pa.OSFile(str(self.path)) as file:
+            # Arrow reads ahead in threads of its own. It would go on reading from the number of a descriptor that
+            # pa.OSFile has closed, which by then may be another file's; a file of Python's refuses it.
+            with self.path.open("rb") as file:
                 file.seek(dialect.offset)
                 yield file
 
