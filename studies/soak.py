@@ -30,11 +30,11 @@ from examples.closed_loop import RATE_HZ, Drive
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
 from livebode.nouns import Block, Channel, Lines
-from livebode.session import Audience, Axis, Destination, Relay, Session, fit_budget
+from livebode.session import Audience, Axis, Destination, Relay, Session
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
 
-AXES, BATCH, AHEAD = 4, 1000, 3000
+AXES, BATCH, AHEAD = 4, 2000, 2000
 WINDOW = 400
 LINES = Lines.parse("20:220:10", RATE_HZ, WINDOW)
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
@@ -140,8 +140,6 @@ def measured(hours: float) -> Curve:
     context = multiprocessing.get_context("spawn")
     end, done = context.Event(), [context.Value("q", 0) for _ in range(AXES)]
     listeners = [socket.create_server(("127.0.0.1", 0)) for _ in range(AXES)]
-    # The budget of the fits is earned with real time, which runs slower here than the machine's.
-    fit_budget.SHARE = 1e6
     ports = [listener.getsockname()[1] for listener in listeners]
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     names = [f"x{i}" for i in range(AXES)]

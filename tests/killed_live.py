@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from livebode.records import Run
+from livebode.records.grouped_events import each_event
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
 from livebode.session.live import run_live
@@ -127,7 +128,9 @@ def check_exact(directory: Path, channel: str, *, whole: bool) -> int:
     assert np.all(sample - number == sample[0] - number[0]), "a sample is at a wrong time"
     holes = np.flatnonzero(np.diff(sample) != 1)
     truth = {int(sample[at + 1]): int(sample[at + 1] - sample[at] - 1) for at in holes}
-    named = {e.sample: e.details["missing_samples"] for e in Run.open(directory).events() if e.kind == "loss"}
-    assert {at: missing for at, missing in named.items() if at <= sample[-1]} == truth
+    events = [one for event in Run.open(directory).events() for one in each_event(event)]
+    named = {event.sample: event.details["missing_samples"] for event in events if event.kind == "loss"}
+    found = {at: missing for at, missing in named.items() if at <= sample[-1]}
+    assert found == truth, sorted(found.items() ^ truth.items())
     assert not whole or not truth
     return max(truth.values(), default=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 SET_S = 1.0
@@ -64,6 +65,7 @@ def _shown(reading: ClockReading) -> str:
     return datetime.fromtimestamp(reading.unix_s, UTC).isoformat(" ", "seconds")
 
 
+@cache
 def _boot() -> str:
     try:
         return _BOOT.read_text("ascii").strip()
