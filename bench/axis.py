@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import time
 
+from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes
 from tests.truth.test_axis_motion_equations import stroke_error
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.browser import chromium
+from livebode.core import Block, Lines, Parameters, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.nouns import Block, Lines, Parameters, Responses
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
 FRAMES_MIN, CPU_MAX = 50.0, 0.10

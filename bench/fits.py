@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import least_squares
 
+from livebode.core import Lines, Responses
 from livebode.fitting import Fitter, Grid, TwoMass, two_masses
-from livebode.nouns import Lines, Responses
 
 TARGET_MS = 0.25
 LINES = Lines.parse("20:120:5", rate_hz=4000, window=800)

@@ -22,8 +22,8 @@ import pyarrow.parquet as pq
 import scipy.fft
 from scipy.signal import ShortTimeFFT
 
+from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 
 RATE_HZ, SECONDS, WINDOW, HOP = 4000, 600, 400, 20
 LINES = Lines.parse("20:220:10", rate_hz=RATE_HZ, window=WINDOW)

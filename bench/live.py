@@ -23,8 +23,8 @@ import numpy as np
 
 from bench.browser import chromium
 from bench.job import LINES, RATE_HZ, WINDOW, signals
+from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
-from livebode.nouns import Block, Channel, Responses
 from livebode.session import Audience, Axis, Destination, Relay, Session
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 

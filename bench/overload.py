@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW
+from livebode.core import Block, Channel
 from livebode.excitation import multisine
-from livebode.nouns import Block, Channel
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
 from livebode.session import Audience, Axis, Destination, Orders, run_live

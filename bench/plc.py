@@ -10,11 +10,11 @@ import argparse
 
 import numpy as np
 
+from livebode.core import Lines
 from livebode.excitation import multisine as multisine_period
 from livebode.excitation import schroeder_phases
 from livebode.kernel import SlidingDFT
 from livebode.kernel.twin import TwinDFT
-from livebode.nouns import Lines
 from livebode.structured_text import multisine, sliding_dft
 from tests.structured_text import Instance, Machine
 from tests.structured_text.types import Array, Scalar

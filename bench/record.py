@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, best_s, signals
+from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, Channel
 from livebode.session.axis import RecordSection
 from livebode.session.checks import ChannelCheck
 from livebode.session.segmented import SegmentedRun

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
-from livebode.nouns import Block, Channel, Lines
 
 RATE_HZ, PERIODS, TURNS = 4000.0, 100, 8
 CHANNELS = (Channel("w"), Channel("u"), Channel("y", "rad"))

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from bench.job import LINES
 from bench.record import NAMES, tracker_at
-from livebode.nouns import Block, Channel
+from livebode.core import Block, Channel
 from livebode.records import Run
 from livebode.records.query import query
 from livebode.session.axis import RecordSection

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import Block, SlidingDFT
+from livebode.core import NOT_WHOLE, SpectraLayout
 from livebode.estimation.centre import Centre
-from livebode.nouns import NOT_WHOLE, SpectraLayout
 from livebode.sources.live import SpectraBatch
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from examples.kernel_drive import KernelDrive
 from livebode import Channel, Lines, multisine
-from livebode.nouns import InputError, SpectraLayout
+from livebode.core import InputError, SpectraLayout
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode.sources.live import Batch, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Lines, Responses
 from livebode.fitting import Fitter, Grid, TwoMass, fit
 from livebode.fitting.extended import LAG, MODE, Extended
-from livebode.nouns import Lines, Responses
 from livebode.simulation import BeltAxis, Mechanics
 from studies.result import Verdict
 

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, Event
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
-from livebode.nouns import Block, Event
 from livebode.simulation import Drive, Friction, FrictionChange, Limits, Mechanics, Sensor, Strokes, TensionLoss
 from studies.monitoring_axis import CHANNELS, HIGH_M, LINES, LOW_M, RADIUS_M, RATE_HZ, SPEED_M_PER_S, axis, run
 

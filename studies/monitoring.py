@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, Event
 from livebode.monitoring import Evidence, Machine, MachineDetector, MachineMonitor, learn_machine, seconds_between
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine_detector import CHARTS
-from livebode.nouns import Block, Event
 from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, TensionLoss
 from studies.monitoring_axis import (
     HIGH_M,

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.nouns import Block, Lines
 from livebode.simulation import BeltAxis, Friction, Limits, Sensor, SimulatedAxis, Strokes
 
 RATE_HZ, WINDOW = 4000.0, 400

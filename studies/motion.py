@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from livebode.core import Block, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.fitting.windows import fit_windows
 from livebode.motion import MotionCorrection
-from livebode.nouns import Block, Responses
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes
 from studies.common import RATE_HZ, WINDOW, correct, decibels, lines, rms
 from studies.drawing import LIGHT, figure_of

@@ -10,10 +10,10 @@ import argparse
 
 import numpy as np
 
+from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.monitoring import Apart, Rows, Table, TableMonitor, learn_table, places, seconds_between
-from livebode.nouns import Lines, Responses
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Standstill, TensionLoss
 
 RATE_HZ, WINDOW, START_S = 4000.0, 1000, 30.0

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, Channel, Event
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
-from livebode.nouns import Block, Channel, Event
 from livebode.simulation import Friction, Mechanics, TensionLoss
 from studies.healthy import ASKED, NAMES, AnyStart
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, RADIUS_M, axis, run

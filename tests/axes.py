@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 from livebode.simulation import Strokes
 
 RATE_HZ = 4000.0

@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from livebode.cli import main
+from livebode.core import Lines
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 
 RATE_HZ, WINDOW = 1000, 100
 LINES = Lines.parse("50,100,200", RATE_HZ, WINDOW)

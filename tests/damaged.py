@@ -15,10 +15,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from livebode.core import DamageWarning, Event, InputError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
-from livebode.nouns import DamageWarning, Event, InputError
 from livebode.records import Run
 from livebode.records.query import query
 from livebode.session.axis import FitSection, RecordSection

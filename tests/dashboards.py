@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from examples.closed_loop import RATE_HZ, Drive
+from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Block, Channel, Lines, Responses
 from livebode.records import Run
 from livebode.session.axis import FitSection, LoopSection, RecordSection
 from livebode.session.fits import Fits

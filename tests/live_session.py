@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from livebode.nouns import Block, Event
+from livebode.core import Block, Event
 from livebode.records import Run
 from livebode.session import Audience, Axis, Destination, Orders, run_live
 from livebode.sources.live import Batch, SourceSettings

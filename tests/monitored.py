@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, Event
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
 from livebode.monitoring.accuracy import Accuracy
 from livebode.motion import Curve, MovingModel
 from livebode.motion.model import basis
-from livebode.nouns import Block, Event
 from livebode.simulation import Mechanics, SimulatedAxis
 from studies.monitoring_axis import CHANNELS, HIGH_M, LINES, LOW_M, RADIUS_M, RandomStrokes, axis, healthy_runs
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, Channel, Event, Responses
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
 from livebode.session.axis import RecordSection

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.nouns import Event, Lines, Responses
+from livebode.core import Event, Lines, Responses
 from livebode.records import RunDirectory
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from hypothesis import strategies as st
 
-from livebode.nouns import Lines, Responses
+from livebode.core import Lines, Responses
 
 UNITS = ("", "rad/s/A", "µm/(N m)", 'a,b "c"')
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.nouns import Block, Event
+from livebode.core import Block, Event
 from livebode.records import Run
 from tests.command import RATE_HZ
 from tests.peers.machine import CHANNELS, Machine, data

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from livebode.nouns import Event
+from livebode.core import Event
 from tests.recorded import check_beginning, check_whole, machine, record_machine
 
 SAMPLES, FROM, UNTIL = 8000, 2550, 6120

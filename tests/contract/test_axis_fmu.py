@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, InputError
 from livebode.simulation import DivergenceError, Drive, FmuAxis, Sensor, Standstill
 from tests.axes import LINES, MULTISINE, RATE_HZ, fast_stroke
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import Block, InputError
+from livebode.core import Block, InputError
 from livebode.simulation import (
     BeltAxis,
     Drive,

@@ -15,9 +15,9 @@ import pytest
 from playwright.sync_api import Browser
 
 from examples.closed_loop import RATE_HZ
+from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
-from livebode.nouns import Block, Channel, Event, Lines, Parameters
 from livebode.sources.live import LiveBlock
 from tests.browser import Tab, chromium
 from tests.dashboards import LINES, SETTINGS, UNITS, begin, data

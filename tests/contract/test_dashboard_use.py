@@ -18,8 +18,8 @@ from playwright.sync_api import Browser
 from scipy.io import loadmat
 
 from examples.closed_loop import RATE_HZ
+from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.nouns import Event, Lines
 from livebode.records import Run
 from tests.browser import TABLET, Tab, chromium, until
 from tests.dashboards import LINES, Watched, begin, whole_run

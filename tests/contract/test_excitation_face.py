@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from livebode import excitation
-from livebode.nouns import Lines
+from livebode.core import Lines
 
 FOUND = excitation.recognise(np.tile(excitation.multisine(Lines.parse("20:140:20", 4000, 200)), 5), 4000)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from livebode.core import InputError
 from livebode.monitoring import seconds_between
-from livebode.nouns import InputError
 
 DAY_S = 86400.0
 

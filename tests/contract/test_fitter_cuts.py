@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import InputError, Lines, Parameters, Responses
 from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
 from livebode.fitting.weighing import epsilon_for
-from livebode.nouns import InputError, Lines, Parameters, Responses
 from tests.truth.test_fits import LINES, TRUTH, noisy
 
 BELT = TwoMass(radius_m=0.019)

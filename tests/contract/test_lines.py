@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.nouns import GridError, InputError, Lines
+from livebode.core import GridError, InputError, Lines
 
 
 @given(window=st.integers(8, 5000), rate_hz=st.sampled_from([1000, 2500, 4000, 8000.0]), data=st.data())

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live import KINDS, LiveBlock, LiveSource, SourceSettings, open_source
 from livebode.sources.live.opening import MODULES
 from tests.peers.broker import MqttPeer

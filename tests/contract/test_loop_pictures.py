@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, Responses
 from livebode.fitting import Fit, Grid, fit
 from livebode.margins import Margins, OpenLoop, margins
-from livebode.nouns import Block, Responses
 from livebode.report import save_loop_picture, save_validation_picture
 from livebode.validation import validate
 from tests.loops import BELT, MODEL, Case, parameters

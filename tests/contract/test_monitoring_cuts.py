@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
-from livebode.nouns import Block, InputError
 from livebode.simulation import TensionLoss
 from studies.monitoring_axis import LINES
 from tests.monitored import machine, pieces, recorded, told

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode import InputError, Lines, MotionCorrection, Responses, Settings, Tracker, multisine
-from livebode.nouns import Block
+from livebode.core import Block
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from tests.contract.test_tracker_cuts import assert_same
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib import pyplot
 
-from livebode.nouns import (
+from livebode.core import (
     PID,
     Block,
     Cascade,

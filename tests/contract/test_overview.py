@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import Lines, Responses
+from livebode.core import Lines, Responses
 from livebode.session.overview import Overview
 
 LINES = Lines((4,), 100, 1000.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources import open_log
 from livebode.sources.formats import FORMATS
 from tests.recordings import RATE_HZ, WRITERS, signals, with_time, write

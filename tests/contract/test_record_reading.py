@@ -16,8 +16,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.core import Block, Event, InputError
 from livebode.estimation import Tracker
-from livebode.nouns import Block, Event, InputError
 from livebode.records import Run, RunDirectory
 from livebode.records.grouped_events import each_event
 from livebode.session.axis import RecordSection

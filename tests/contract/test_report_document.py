@@ -17,8 +17,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pypdf import PdfReader
 
-from livebode.nouns import Event
-from livebode.nouns.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
+from livebode.core import Event
+from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
 from livebode.report.html import to_html
 from livebode.report.pdf import save_pdf
 from livebode.session.reporting.run_report import run_report

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from livebode.nouns import Lines, Responses
+from livebode.core import Lines, Responses
 from livebode.report import bode_figure, save_pictures, terminal_bode, tracking_figure
 
 

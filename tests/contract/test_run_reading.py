@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, DamageWarning, InputError, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, DamageWarning, InputError, Lines
 from livebode.records import Run
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, Channel, Lines
 from livebode.session.axis import RecordSection
 from livebode.session.event_groups import REPEATS_MAX
 from livebode.session.tracking import record

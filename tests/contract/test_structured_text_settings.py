@@ -11,8 +11,8 @@ from blark.parse import parse as parse_file
 from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Lines
 from livebode.kernel import SlidingDFT
-from livebode.nouns import Lines
 from livebode.sources.live.ring import HEADER, read_ring
 from livebode.structured_text import (
     Project,

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Block, InputError, Lines, Responses
 from livebode.estimation import RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Block, InputError, Lines, Responses
 
 WINDOW, RATE_HZ, SAMPLES = 60, 1000.0, 700
 LINES = Lines((4, 8, 13), WINDOW, RATE_HZ, quiet=(5, 6, 7, 9, 10, 11, 12))

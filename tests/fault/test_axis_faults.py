@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, InputError
 from livebode.simulation import (
     Backlash,
     BeltAxis,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.session import ConfigurationFile
 from livebode.session.axis import Axis
 from livebode.session.configuration import axes_of

@@ -17,8 +17,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from livebode.core import InputError
 from livebode.dashboard import Dashboard, Serving, asked
-from livebode.nouns import InputError
 from tests.dashboards import Watched
 
 CASES = int(os.environ.get("LIVEBODE_DASHBOARD_FUZZ", "4000"))

@@ -16,10 +16,10 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
+from livebode.core import Event, InputError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access, TooManyTriesError
 from livebode.dashboard.guard import Guard
-from livebode.nouns import Event, InputError
 from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium
 from tests.dashboards import Watched

@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
+from livebode.core import InputError
 from livebode.design import QUANTITIES, Bearable, Wish, choose, measured_machine
 from livebode.design.machine import MOTION_KEYS
-from livebode.nouns import InputError
 from livebode.simulation import BeltAxis
 
 AXIS = BeltAxis()

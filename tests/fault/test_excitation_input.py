@@ -5,8 +5,8 @@ import contextlib
 import numpy as np
 import pytest
 
+from livebode.core import InputError, Lines
 from livebode.excitation import multisine, recognise
-from livebode.nouns import InputError, Lines
 
 GOOD = np.tile(multisine(Lines.parse("20:140:20", 4000, 200)), 5)
 

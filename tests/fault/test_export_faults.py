@@ -16,9 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.core import InputError, Lines
 from livebode.export import at, save, write_csv, write_mat, write_netcdf, write_uff
 from livebode.fitting import mean_response
-from livebode.nouns import InputError, Lines
 from tests.command import livebode, signals, write_parquet
 from tests.responses import made
 

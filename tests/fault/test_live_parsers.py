@@ -15,8 +15,8 @@ import zlib
 import numpy as np
 import pytest
 
+from livebode.core import Channel, InputError, Spectra, SpectraLayout
 from livebode.estimation import Settings, SpectraTracker
-from livebode.nouns import Channel, InputError, Spectra, SpectraLayout
 from livebode.sources.live import (
     Batch,
     FrameDecoder,

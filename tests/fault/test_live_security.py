@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pyads.testserver import PLCVariable
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.session import Axis
 from livebode.sources.live import SourceSettings, encode_layout, encode_samples, make_source, open_source
 from tests.peers.broker import TOPIC, Mosquitto, publisher, stop

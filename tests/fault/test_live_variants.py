@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.opcua import INCOMPLETE_MAX, Gathered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, MAGIC, Ring, new_rows, read_ring, ring_batch

@@ -21,7 +21,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources import open_log, sinumerik_spectra
 from livebode.sources.safexml import parse
 from tests.recordings import WRITERS, dspace, signals, with_time, write, write_dspace73

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import DamageWarning, Event, InputError
+from livebode.core import DamageWarning, Event, InputError
 from livebode.records import Run
 from livebode.records.segments.damage import total
 from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame

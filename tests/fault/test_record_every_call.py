@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from tests.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
 
 SAMPLES = 2000

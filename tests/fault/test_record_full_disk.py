@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.nouns import Block, Channel, Event
+from livebode.core import Block, Channel, Event
 from livebode.records import Run
 from livebode.records.sample_table import as_rows, samples_of
 from livebode.records.segments import journal

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.figure import Figure
 
-from livebode.nouns import DamageWarning, InputError
+from livebode.core import DamageWarning, InputError
 from livebode.records import Run, RunDirectory
 from livebode.records.query import query
 from livebode.records.segments.json_lines import to_line

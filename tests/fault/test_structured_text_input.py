@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 from livebode.structured_text import Project, multisine, ring_block, ring_type, sliding_dft
 from tests.command import livebode
 

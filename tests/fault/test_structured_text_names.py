@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 from livebode.session.axis import Axis
 from livebode.session.plc import plc_project
 from livebode.structured_text import Project, sliding_dft

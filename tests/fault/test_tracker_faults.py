@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError, Lines, Loop
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Block, InputError, Lines, Loop
 
 WINDOW, RATE_HZ = 100, 1000.0
 LINES = Lines.parse("50,100,200", RATE_HZ, WINDOW)

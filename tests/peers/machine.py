@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from livebode.nouns import Channel
+from livebode.core import Channel
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from tests.command import RATE_HZ, signals
 from tests.peers.plain import TcpPeer

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from livebode.nouns import Channel
+from livebode.core import Channel
 from livebode.sources.live import Batch
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))

@@ -8,8 +8,8 @@ import pytest
 
 from examples.closed_loop import Drive as Example
 from examples.closed_loop import Plant
+from livebode.core import Block, as_model
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, as_model
 from livebode.simulation import (
     BeltAxis,
     BeltResponse,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from livebode.nouns import Block
+from livebode.core import Block
 from livebode.simulation import Backlash, BeltAxis, Friction, Mechanics, SimulatedAxis, Strokes, Truth
 from tests.axes import MULTISINE, RATE_HZ, fast_stroke
 

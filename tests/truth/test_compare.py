@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
-from livebode.nouns import PER_LINE, Block, Lines, Responses
 from livebode.records import Run
 from livebode.session.reporting.difference import ALPHA, Difference, compare
 from tests import command

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
+from livebode.core import Response
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.overlays import grid_hz
 from livebode.estimation.quantities import convert
@@ -19,7 +20,6 @@ from livebode.fitting import Grid, model_named
 from livebode.monitoring import Baseline, Table
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.table import BACK, FORTH
-from livebode.nouns import Response
 from livebode.records import Run
 from livebode.records.summary_file import to_document
 from livebode.session.axis import LoopSection

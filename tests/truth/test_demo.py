@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Event, InputError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
-from livebode.nouns import Event, InputError
 from livebode.records import Run
 from livebode.session.audience import Audience
 from livebode.session.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings

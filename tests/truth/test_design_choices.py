@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import GridError, InputError
 from livebode.design import Bearable, Wish, belt_machine, choose
 from livebode.design.grid import grid
 from livebode.estimation.settings import default_hop
-from livebode.nouns import GridError, InputError
 from livebode.simulation import BeltAxis, Sensor, Strokes
 
 MACHINE = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.05)))

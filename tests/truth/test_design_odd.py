@@ -10,10 +10,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from livebode.core import InputError
 from livebode.design import Wish, belt_machine, choose
 from livebode.design.grid import grid
 from livebode.excitation import multisine, recognise
-from livebode.nouns import InputError
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 
 RATE_HZ = 4000.0

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from livebode.core import InputError
 from livebode.design import Bearable, Wish, belt_machine, choose, worst, write
-from livebode.nouns import InputError
 from livebode.records import Run
 from livebode.session.experiment import Experiment
 from livebode.simulation import BeltAxis, SimulatedAxis

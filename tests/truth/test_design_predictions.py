@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.design import Bearable, Wish, accuracy_of, belt_machine, choose, measured_machine, peaks, worst
 from livebode.design.waveform import Waveform
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import chirp, chirp_lines, multisine, prbs
-from livebode.nouns import Lines
 from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from tests.experiments import RUN_IN_S, extremes
 

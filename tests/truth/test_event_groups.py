@@ -12,9 +12,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Block, Channel, Event, Lines
 from livebode.dashboard.notices import Notices, event_id
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, Channel, Event, Lines
 from livebode.records import Run
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query

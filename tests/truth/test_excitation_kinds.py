@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Lines
 from livebode.excitation import (
     chirp,
     chirp_lines,
@@ -19,7 +20,6 @@ from livebode.excitation import (
     stepped_lines,
     stepped_sine,
 )
-from livebode.nouns import Lines
 from studies.crest import LONG, row
 
 

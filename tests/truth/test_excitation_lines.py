@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.excitation import multisine, recognise
 from livebode.excitation.significance import find_lines, significant
 from livebode.excitation.snr import snr_db
-from livebode.nouns import Lines
 
 LINES = Lines(tuple(range(11, 251)), 2500, 2500.0)
 PERIOD = multisine(LINES)

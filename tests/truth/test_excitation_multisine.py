@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Lines
 from livebode.excitation import multisine, schroeder_phases
-from livebode.nouns import Lines
 
 
 @settings(max_examples=40, deadline=None)

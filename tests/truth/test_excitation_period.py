@@ -6,8 +6,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from livebode.core import InputError, Lines
 from livebode.excitation import multisine, recognise
-from livebode.nouns import InputError, Lines
 
 SEVEN = multisine(Lines.parse("20:140:20", rate_hz=4000, window=200))
 

@@ -16,8 +16,8 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings
 
+from livebode.core import InputError, Lines, Responses
 from livebode.export import at, to_xarray, write_csv, write_mat, write_netcdf, write_uff
-from livebode.nouns import InputError, Lines, Responses
 from livebode.sources import open_log
 from tests.responses import any_responses, cut, made
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Lines, Responses
 from livebode.fitting import Grid, TwoMass, fit
-from livebode.nouns import Lines, Responses
 from studies.fit_bounds import BELT, cases, measure, responses_of
 
 RUNS = 6

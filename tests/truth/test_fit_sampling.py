@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import InputError
 from livebode.fitting import Grid, Parameter, PhysicalModel, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
 from livebode.fitting.hold import to_continuous, to_discrete
 from livebode.fitting.modal import chain_of
 from livebode.fitting.transfer import Transfer, roots
-from livebode.nouns import InputError
 from livebode.simulation import BeltAxis, Mechanics
 
 RATE_HZ = 4000.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError, Lines, Parameters, Response, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import Fitter, Grid, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
 from livebode.fitting.problem import Measured, Problem
-from livebode.nouns import Block, InputError, Lines, Parameters, Response, Responses
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill
 from studies.fits import AFTER_S, least_variance, moving, standing
 from tests.axes import MULTISINE

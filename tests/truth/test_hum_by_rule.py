@@ -16,10 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+from livebode.core import Block, InputError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.hum import find_hum
 from livebode.excitation import multisine, odd_lines, recognise
-from livebode.nouns import Block, InputError, Lines
 from tests.command import livebode, write_parquet
 
 RATE_HZ, N = 4000.0, 800

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from livebode.core import Block, Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
-from livebode.nouns import Block, Event, Lines, Responses
 
 RATE_HZ, N = 4000.0, 400
 LINES = Lines.of_bins([3, 5, 7, 11, 13], N, RATE_HZ)  # 50 Hz is one of the lines

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Block, InputError, Lines
 from livebode.session.checks import check_some_valid
 
 LINES = Lines.parse("30:130:20", 1000.0, 100)

@@ -12,13 +12,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.core import Block, Channel, InputError, Lines
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Machine, Rows, learn_table
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.motion import Curve, MovingModel
-from livebode.nouns import Block, Channel, InputError, Lines
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import Batch
 from livebode.sources.live.ndjson import encode_line

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, Channel, InputError, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
-from livebode.nouns import Block, Channel, InputError, Responses
 from livebode.records import Run
 from livebode.session.averaged import averaged
 from tests.command import livebode

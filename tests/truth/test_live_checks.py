@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.core import Block, Channel, Event, Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.nouns import Block, Channel, Event, Lines
 from livebode.records import Run
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.last_commit import last_commit

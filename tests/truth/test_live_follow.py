@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.session.continuing import StreamPosition
 from livebode.sources import open_log
 from livebode.sources.live import LiveBlock, SourceSettings, make_source, open_source

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.nouns import Channel, Event
+from livebode.core import Channel, Event
 from livebode.records import Run
 from livebode.session import Audience
 from livebode.sources.live import Batch, encode_layout, encode_samples

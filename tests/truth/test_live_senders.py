@@ -11,7 +11,7 @@ import pytest
 
 from bench.bandwidth import TARGETS, measure
 from examples.sender import CHANNELS, frames, layout, spectra_frames
-from livebode.nouns import Channel, SpectraLayout
+from livebode.core import Channel, SpectraLayout
 from livebode.sources.live import (
     Batch,
     FrameDecoder,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import Channel
+from livebode.core import Channel
 from livebode.sources.live import Batch, LiveBlock, Position, Sequencer
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.said import BURST, Said

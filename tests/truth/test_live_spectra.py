@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from examples.kernel_drive import KernelDrive
+from livebode.core import Block, Channel, InputError, Lines, SpectraLayout
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.nouns import Block, Channel, InputError, Lines, SpectraLayout
 from livebode.records import Run
 from livebode.session.axis import Axis
 from livebode.session.spectra_plan import check_spectra

@@ -12,10 +12,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from examples.closed_loop import RATE_HZ, Drive
+from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
 from livebode.margins import margins
-from livebode.nouns import Lines
 from livebode.records import Run
 from livebode.records.summary_file import to_document
 from livebode.session.loop_report import loop_of_run

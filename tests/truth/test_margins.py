@@ -10,9 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from livebode.core import PID, InputError, Lines, Loop, Responses
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import Margins, OpenLoop, against_lines, margins
-from livebode.nouns import PID, InputError, Lines, Loop, Responses
 from tests.loops import BELT, MODEL, Case, parameters, values
 
 LINES = Lines.parse("20:140:5", rate_hz=4000, window=800)

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
+from livebode.core import Block, InputError, Lines, Response, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
-from livebode.nouns import Block, InputError, Lines, Response, Responses
 from tests.responses import any_responses, cut, made
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from livebode.core import Block, Event
 from livebode.monitoring import Machine, MachineMonitor, seconds_between
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
@@ -14,7 +15,6 @@ from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.run_offset import RunOffset
-from livebode.nouns import Block, Event
 from livebode.simulation import TensionLoss
 from studies.healthy import ASKED, NAMES
 from studies.monitoring_axis import LINES

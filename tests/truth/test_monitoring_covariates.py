@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, Event, InputError
 from livebode.monitoring import Baseline, Machine, MachineMonitor
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
-from livebode.nouns import Block, Event, InputError
 from livebode.session import Axis, Destination, run
 from livebode.session.learning import learn
 from livebode.simulation import TensionLoss

@@ -8,9 +8,9 @@ from functools import cache
 
 import pytest
 
+from livebode.core import Block, Event, InputError
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
-from livebode.nouns import Block, Event, InputError
 from livebode.simulation import Fault, SimulatedAxis, Strokes, TensionLoss
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, SPEED_M_PER_S, axis
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import InputError
 from livebode.monitoring import Rows, TableMonitor, learn_table, seconds_between
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
-from livebode.nouns import InputError
 
 NAMES = ("20 Hz", "60 Hz", "100 Hz")
 TRUE = np.array([1.4 + 0.2j, 4.0 - 1.0j, 0.5 - 1.1j])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from livebode import MotionCorrection, Responses, Tracker
-from livebode.nouns import Block
+from livebode.core import Block
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Standstill, Strokes
 from studies.motion import SETTINGS, axis, corrected, truth_at
 from tests.axes import MULTISINE

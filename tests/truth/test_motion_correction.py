@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from livebode.core import PID, Block, InputError, Loop, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.motion import MotionCorrection
-from livebode.nouns import PID, Block, InputError, Loop, Responses
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from studies.motion import LINES, SETTINGS, corrected, judge
 from tests.axes import MULTISINE

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Block
 from livebode.motion import MotionCorrection
-from livebode.nouns import Block
 from livebode.simulation import SimulatedAxis
 from studies.monitoring_axis import RADIUS_M, RATE_HZ
 from studies.motion import SETTINGS, axis

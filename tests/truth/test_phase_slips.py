@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Lines
 from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
-from livebode.nouns import Lines
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
 from livebode.session.aligned import AlignedLog

@@ -6,9 +6,9 @@ import control
 import numpy as np
 import pytest
 
+from livebode.core import InputError, Lines, Responses
 from livebode.fitting import Grid, Rational, TwoMass, fit_rational, rational_of
 from livebode.fitting.hold import to_discrete
-from livebode.nouns import InputError, Lines, Responses
 from tests.truth.test_fits import TRUTH, noisy
 
 RATE_HZ = 2000.0

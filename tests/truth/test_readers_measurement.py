@@ -7,7 +7,7 @@ import nptdms
 import numpy as np
 import pytest
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources import open_log
 
 RATE_HZ = 4000.0

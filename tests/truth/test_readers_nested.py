@@ -11,7 +11,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources import open_log
 from tests.recordings import dspace, write_dspace73
 

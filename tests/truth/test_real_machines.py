@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from livebode.core import Block, Gain, Lines, Loop, PositionPD, Response, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block, Gain, Lines, Loop, PositionPD, Response, Responses
 from livebode.sources import open_log, sinumerik_spectra
 from tests.real_recordings import recording
 

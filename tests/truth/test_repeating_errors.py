@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Block, Channel, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
-from livebode.nouns import Block, Channel, Lines, Responses
 from studies.repeating import CASES, Case, measure
 
 RATE_HZ = 4000.0

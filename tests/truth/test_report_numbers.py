@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from livebode.core.document import Document, Picture, Table
 from livebode.fitting import mean_response
-from livebode.nouns.document import Document, Picture, Table
 from livebode.records import Run
 from livebode.report.figures import drawn
 from livebode.report.svg import inline_svg

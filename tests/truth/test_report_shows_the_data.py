@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from livebode.nouns import Lines, Responses
+from livebode.core import Lines, Responses
 from livebode.report import bode_figure, terminal_bode, tracking_figure
 from livebode.report.summary import BOUND_C, PROBABILITY, quantiles, unwrapped
 from livebode.report.tracking import is_falling, spread, with_holes

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Block, InputError, Lines, Responses
 from livebode.estimation import RippleOrder, Settings, Tracker, ripple_power
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Rows, learn_table
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
-from livebode.nouns import Block, InputError, Lines, Responses
 from livebode.session import Axis
 from livebode.session.plan import live_follower
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes

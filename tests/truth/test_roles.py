@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Block, Gain, Lines, Loop
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.nouns import Block, Gain, Lines, Loop
 from livebode.session.plan import beginnings
 from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions

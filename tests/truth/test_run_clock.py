@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core.clock import RunClock, moment, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.nouns.clock import RunClock, moment, moments_by
 from livebode.records import Run
 from livebode.records.query import query
 from livebode.session.clock_relation import STEP_S, ClockRelation

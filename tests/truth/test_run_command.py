@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.core import Block
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Block
 from tests.command import LINES, RATE_HZ, livebode, signals, write_csv, write_parquet
 
 JOINT = ("--excitation", "w", "--input", "u", "--output", "y")

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Lines
 from livebode.records import Run
 from tests.command import livebode, signals, write_parquet
 from tests.peers.machine import Machine

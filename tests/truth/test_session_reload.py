@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from livebode.core import Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.nouns import Event, Lines, Responses
 from livebode.records import Run
 from tests.command import livebode
 from tests.peers.machine import Machine

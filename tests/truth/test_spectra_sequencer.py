@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from livebode.nouns import Channel, SpectraLayout
+from livebode.core import Channel, SpectraLayout
 from livebode.sources.live import Batch, Sequencer, SpectraBatch
 from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import JUMP_S

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive
 from examples.kernel_drive import KernelDrive
+from livebode.core import PID, Block, Cascade, Channel, InputError, Lines, Loop, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import PID, Block, Cascade, Channel, InputError, Lines, Loop, Responses, Spectra, SpectraLayout
 from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
 
 WINDOW, PERIODS = 400, 12

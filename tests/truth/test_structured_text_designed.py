@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.design import Waveform, write
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 from livebode.structured_text import multisine as block_text
 from tests.command import livebode
 from tests.structured_text import Machine

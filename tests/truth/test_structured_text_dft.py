@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.kernel import SlidingDFT
-from livebode.nouns import Lines
 from livebode.structured_text import sliding_dft
 from tests.structured_text import Instance, Machine
 

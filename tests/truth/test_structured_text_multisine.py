@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from livebode.core import Lines
 from livebode.excitation import multisine as multisine_period
-from livebode.nouns import Lines
 from livebode.structured_text import multisine
 from tests.structured_text import Instance, Machine
 

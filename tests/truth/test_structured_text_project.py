@@ -9,9 +9,9 @@ import numpy as np
 from pyads import constants
 from pyads.testserver import PLCVariable
 
+from livebode.core import Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 from livebode.sources.live import SourceSettings, open_source
 from livebode.sources.live.ring import FILETIME_1970, HEADER, new_rows, read_ring, ring_batch
 from livebode.sources.live.settings import named_channels

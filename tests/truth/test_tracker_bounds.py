@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
+from livebode.core import PID, Block, Cascade, Lines, Loop, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import PID, Block, Cascade, Lines, Loop, Responses
 
 RUNS, SIGMA = 1000, 0.1
 PERIODS = 10

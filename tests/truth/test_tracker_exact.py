@@ -7,9 +7,9 @@ import pytest
 
 from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 from examples.loop_costs import costs
+from livebode.core import PID, Block, Cascade, Lines, Loop, Response
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.nouns import PID, Block, Cascade, Lines, Loop, Response
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 TRUTH = Plant().response(LINES.frequency_hz)

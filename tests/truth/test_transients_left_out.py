@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.core import Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.nouns import Lines
 from livebode.records import Run
 from livebode.session.aligned import AlignedLog
 from livebode.session.early_spikes import early_spikes

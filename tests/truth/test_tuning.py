@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
+from livebode.core import PID, InputError, Loop
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import OpenLoop, low_pass, notch, peak_sensitivity_at_lines, tuning, worst
 from livebode.margins.filters import notch_over
-from livebode.nouns import PID, InputError, Loop
 from tests.loops import BELT, MODEL, Case, parameters
 from tests.truth.test_margins import BAND_HZ, LINES, responses_of
 

@@ -9,10 +9,10 @@ import pytest
 from scipy import linalg, signal
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
+from livebode.core import Block, InputError, Lines, Loop, Response
 from livebode.excitation import multisine
 from livebode.fitting import Fit, fit
 from livebode.fitting.transfer import Transfer
-from livebode.nouns import Block, InputError, Lines, Loop, Response
 from livebode.validation import validate
 from livebode.validation.chain import respond
 from livebode.validation.correlation import correlation, own_correlation

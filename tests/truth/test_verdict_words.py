@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.core import Event
+from livebode.core.clock import moment
 from livebode.fitting import mean_response
-from livebode.nouns import Event
-from livebode.nouns.clock import moment
 from livebode.report.html import to_html
 from livebode.session.reporting.compare_report import Comparison
 from livebode.session.reporting.difference import Difference

@@ -12,8 +12,8 @@ import pytest
 from scipy.signal import chirp
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
+from livebode.core import Block, InputError
 from livebode.estimation import welch
-from livebode.nouns import Block, InputError
 
 
 @cache

@@ -33,7 +33,7 @@ from livebode.cli.run_command import run_command
 from livebode.cli.terminal import protect, unchecked_output
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
-from livebode.nouns import DamageWarning, InputError
+from livebode.core import DamageWarning, InputError
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from livebode.cli.terminal import console
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.session import Session, StoppedError
 from livebode.session.axis_thread import AxisThread
 

@@ -14,7 +14,7 @@ from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
-from livebode.nouns import Responses
+from livebode.core import Responses
 from livebode.records import to_json
 from livebode.session import Relay
 from livebode.session.axis import ServeSection

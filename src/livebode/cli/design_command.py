@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.nouns import InputError, counted
+from livebode.core import InputError, counted
 from livebode.records import to_json
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.nouns import InputError
-from livebode.nouns.document import Document
+from livebode.core import InputError
+from livebode.core.document import Document
 
 _NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or print the page from a browser"
 

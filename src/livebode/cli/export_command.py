@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.nouns import InputError, Responses
+from livebode.core import InputError, Responses
 from livebode.records import Run
 
 _IN_PYTHON = {

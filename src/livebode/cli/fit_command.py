@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records import Run, to_json
 from livebode.session import Axis
 

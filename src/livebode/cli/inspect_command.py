@@ -11,8 +11,8 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
+from livebode.core import InputError
 from livebode.estimation.settings import default_hop
-from livebode.nouns import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:

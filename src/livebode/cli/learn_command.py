@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from shutil import get_terminal_size
 from typing import Any
 
 from livebode.cli.terminal import is_terminal, print_drawn
+from livebode.core import Model, Responses
+from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
-from livebode.nouns import Model, Responses
-from livebode.nouns.clock import RunClock, moment, moments_by
 from livebode.session import Draw, Outcome
 
 _ALARMS_SHOWN = 8

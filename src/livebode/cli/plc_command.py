@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 

@@ -24,7 +24,7 @@ def report_command(
 
     A report in the run's own directory is replaced. The PDF needs the extra `pdf`.
     """
-    from livebode.nouns.clock import RunClock, moments_by
+    from livebode.core.clock import RunClock, moments_by
     from livebode.records import Run
     from livebode.session.reporting.material import Judged
     from livebode.session.reporting.run_report import run_report

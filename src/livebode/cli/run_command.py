@@ -12,7 +12,7 @@ from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import AudienceOf, served
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.records import to_json
 from livebode.session import (
     Audience,

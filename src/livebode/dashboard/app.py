@@ -14,6 +14,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
+from livebode.core import InputError, Responses
 from livebode.dashboard import asked
 from livebode.dashboard.access import COOKIE, SESSION_S, TooManyTriesError
 from livebode.dashboard.board import Board
@@ -24,7 +25,6 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.places import Place
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
-from livebode.nouns import InputError, Responses
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from livebode.core import InputError, Quantity
 from livebode.dashboard.quantities import QUANTITIES
-from livebode.nouns import InputError, Quantity
 
 MESSAGE_BYTES_MAX = 1024
 _FORMATS = ("csv", "mat")

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from livebode.core import InputError
 from livebode.dashboard.access import Access
 from livebode.dashboard.client import Pulse
 from livebode.dashboard.notices import acknowledgement
 from livebode.dashboard.places import Places
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.nouns import InputError
 
 UPDATES_PER_S = 30.0
 _IDLE_S = 0.5

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from livebode.core import InputError, Responses
 from livebode.dashboard.asked import Wish, wish
 from livebode.dashboard.frames import frame
 from livebode.dashboard.past import Past
-from livebode.nouns import InputError, Responses
 from livebode.records import to_json
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
+from livebode.core import InputError
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.nouns import InputError
 
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096

@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Quantity, Responses
 from livebode.dashboard.quantities import QUANTITIES
-from livebode.nouns import Quantity, Responses
 from livebode.report.summary import unwrapped
 
 KINDS = ("newest", "moment", "reference", "baseline", "model", "rows", "history")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.core import Block, Event, Parameters, Responses
 from livebode.session import Audience
 from livebode.session.overview import Overview
 from livebode.sources.live import Health, LiveBlock

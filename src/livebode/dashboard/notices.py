@@ -7,7 +7,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 from livebode.records.grouped_events import event_counts, group_of
 
 ACKNOWLEDGED = "acknowledged"

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
 from livebode.fitting import Grid, PhysicalModel
-from livebode.nouns import InputError, Lines, Quantity, Responses
 from livebode.session.axis import FitSection
 from livebode.session.fits import chosen_model
 from livebode.session.said import said

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.core import InputError, Responses
 from livebode.dashboard.state import State
-from livebode.nouns import InputError, Responses
 from livebode.records import Run
 from livebode.session.overview import Overview
 

@@ -10,8 +10,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines, Loop, Quantity, Responses
 from livebode.estimation.quantities import convert
-from livebode.nouns import InputError, Lines, Loop, Quantity, Responses
 from livebode.records.run import lines_in
 from livebode.session.axis import LoopSection
 from livebode.session.said import said

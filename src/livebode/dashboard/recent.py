@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 
 ROWS_MAX = 2400
 EVERY_S = 0.05

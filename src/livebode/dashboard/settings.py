@@ -10,7 +10,7 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.session.axis import ServeSection
 from livebode.sources.live.secret import secret
 

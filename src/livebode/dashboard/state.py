@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Event, InputError, Quantity, Responses
+from livebode.core.clock import RunClock
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.notices import Notices
@@ -22,8 +24,6 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
-from livebode.nouns import Event, InputError, Quantity, Responses
-from livebode.nouns.clock import RunClock
 from livebode.records import Run, to_json
 from livebode.session.overview import Overview
 from livebode.session.said import said

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Parameters
+from livebode.core import Parameters
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import Rows
-from livebode.nouns import Event, Responses
 from livebode.records import Run
 from livebode.records.grouped_events import still_waiting
 

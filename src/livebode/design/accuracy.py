@@ -8,9 +8,9 @@ from math import ceil, inf, log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.design.machine import Machine
 from livebode.design.waveform import Waveform
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from livebode.core import Lines
 from livebode.design.choose import Design
 from livebode.estimation.settings import DETECTION_LINES_MIN
-from livebode.nouns import Lines
 
 
 def axis_text(

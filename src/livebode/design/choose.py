@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import InputError, rounded_down
 from livebode.design.accuracy import Accuracy, Floats, accuracy_of
 from livebode.design.encoder import encoder_counts
 from livebode.design.explain import Choice, explained
@@ -19,7 +20,6 @@ from livebode.design.peaks import Peak, peaks, worst
 from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
-from livebode.nouns import InputError, rounded_down
 
 # Of the room that the limits leave: what the prediction may err by.
 _RESERVE = 0.1

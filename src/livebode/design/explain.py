@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from livebode.core import counted
 from livebode.design.encoder import encoder_words
 from livebode.design.grid import Grid
 from livebode.design.limits import Bearable
 from livebode.design.machine import UNITS, Quantity
 from livebode.design.mains import mains_words
 from livebode.design.peaks import Peak, worst
-from livebode.nouns import counted
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0

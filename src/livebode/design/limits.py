@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan
 
+from livebode.core import InputError
 from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.design.peaks import Peak
-from livebode.nouns import InputError
 
 
 @dataclass(frozen=True, kw_only=True)

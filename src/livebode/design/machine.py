@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError, Loop, Model
+from livebode.core import InputError, Loop, Model
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Lines
+from livebode.core import Lines
 
 MAINS_HZ = (50.0, 60.0)
 _NEAR_BINS = 0.5  # from a harmonic: a window sees at most 40 % of its power farther away

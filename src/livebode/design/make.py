@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines
 from livebode.design.grid import Grid
 from livebode.design.machine import Machine
 from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
 from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 

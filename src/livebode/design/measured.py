@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import GridError, InputError, Loop, Responses
+from livebode.core.controllers import integral
+from livebode.core.model import Algebra, Gain, Model, as_model
 from livebode.design.machine import STANDING, Extremes, Machine, Place, within
-from livebode.nouns import GridError, InputError, Loop, Responses
-from livebode.nouns.controllers import integral
-from livebode.nouns.model import Algebra, Gain, Model, as_model
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

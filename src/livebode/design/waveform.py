@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines
 from livebode.excitation import quantised
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,10 +8,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from livebode.core import InputError
 from livebode.design.mains import MAINS_HZ
 from livebode.excitation import Phases, check_order
 from livebode.excitation.chirp import Sweep
-from livebode.nouns import InputError
 
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]

@@ -8,10 +8,10 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event, Responses
 from livebode.estimation import snapshots
 from livebode.estimation.counted import Counted
 from livebode.estimation.line_stage import LineStage
-from livebode.nouns import Event, Responses
 
 Floats = NDArray[np.float64]
 W = TypeVar("W", bound=Counted)

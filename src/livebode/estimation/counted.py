@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Event
+from livebode.core import Block, Event
 
 
 class Counted:

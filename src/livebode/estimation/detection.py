@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines
 from livebode.estimation.bounds import power
 from livebode.estimation.settings import DETECTION_LINES_MIN
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

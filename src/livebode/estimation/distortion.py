@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtri
 
+from livebode.core import Lines
 from livebode.estimation.bounds import power
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.moments import Moments
-from livebode.nouns import Lines
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 
 Complex = NDArray[np.complex128]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.signal import detrend
 from scipy.signal.windows import hann
 
+from livebode.core import InputError
 from livebode.estimation.mains import HARMONICS, MAINS_HZ, stands_out_by
 from livebode.estimation.silence import STEADY
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Channel, Event, Responses
 from livebode.estimation.bounds import between_periods, contained, power, unbiased
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
@@ -19,7 +20,6 @@ from livebode.estimation.quantities import convert
 from livebode.estimation.repeating import Repeating
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows
-from livebode.nouns import Channel, Event, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -7,7 +7,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Lines
+from livebode.core import Lines
 
 Floats = NDArray[np.float64]
 

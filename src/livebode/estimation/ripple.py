@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 
 Floats = NDArray[np.float64]
 

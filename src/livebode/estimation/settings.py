@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from math import isqrt
 from typing import Literal
 
+from livebode.core import InputError, Lines, Loop, Quantity
 from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
 from livebode.estimation.ripple import RippleOrder
-from livebode.nouns import InputError, Lines, Loop, Quantity
 
 DETECTION_LINES_MIN = 4
 """Detection lines that noise can be taken from."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 Arrays = dict[str, NDArray[np.generic]]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import NOT_WHOLE, SPIKE, Block, InputError, Responses, Spectra, SpectraLayout
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
@@ -15,7 +16,6 @@ from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
 from livebode.estimation.spectra_watch import SpectraWatch
-from livebode.nouns import NOT_WHOLE, SPIKE, Block, InputError, Responses, Spectra, SpectraLayout
 
 Floats = NDArray[np.float64]
 

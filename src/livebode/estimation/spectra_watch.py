@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Spectra
 from livebode.estimation.counted import Counted
-from livebode.nouns import InputError, Spectra
 
 _KINDS = {
     "not-whole": "a window is not whole (the drive says so, or its sums are not finite)",

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Event, InputError, Responses
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
@@ -16,7 +17,6 @@ from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
 from livebode.estimation.watch import Watch
-from livebode.nouns import Block, Event, InputError, Responses
 
 
 class Tracker(AroundLines[Watch]):
@@ -38,7 +38,7 @@ class Tracker(AroundLines[Watch]):
     A plant of gain 2 with a sample of delay:
 
     >>> import numpy as np
-    >>> from livebode.nouns import Block, Lines
+    >>> from livebode.core import Block, Lines
     >>> w = np.sin(2 * np.pi * 5 * np.arange(400) / 100)
     >>> block = Block(np.array([w, 2 * np.roll(w, 1)]), ("w", "y"), rate_hz=1000)
     >>> lines = Lines.parse("50", rate_hz=1000, window=100)

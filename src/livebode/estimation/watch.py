@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from livebode.core import Block, InputError
 from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
-from livebode.nouns import Block, InputError
 
 _KINDS = {
     "non-finite": "a sample is not finite",

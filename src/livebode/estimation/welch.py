@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from livebode.core import Block, InputError, Lines, Response
 from livebode.estimation.bounds import power
-from livebode.nouns import Block, InputError, Lines, Response
 
 
 def welch(

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import GridError, InputError, Lines
+from livebode.core.lines import check_window
 from livebode.excitation.odd import check_band, wider
-from livebode.nouns import GridError, InputError, Lines
-from livebode.nouns.lines import check_window
 
 Floats = NDArray[np.float64]
 Sweep = Literal["linear", "logarithmic"]

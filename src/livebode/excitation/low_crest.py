@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
+from livebode.core import InputError
 from livebode.excitation.descent import PEAK, VALLEY, Stages, descend, descend_together, period, samples_for
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 Bins = NDArray[np.int64]

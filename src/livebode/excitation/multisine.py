@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Lines
 from livebode.excitation.low_crest import low_crest_phases
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 Phases = Literal["schroeder", "random", "low crest"]

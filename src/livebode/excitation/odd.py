@@ -8,8 +8,8 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import GridError, Lines
-from livebode.nouns.lines import WINDOW_MAX, check_window
+from livebode.core import GridError, Lines
+from livebode.core.lines import WINDOW_MAX, check_window
 
 _GROUP_MIN = 2
 _DRAWS = 100

@@ -7,13 +7,13 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
 from livebode.excitation.prepare import clipped, whitened
 from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 

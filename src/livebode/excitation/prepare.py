@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 Floats = NDArray[np.float64]
 

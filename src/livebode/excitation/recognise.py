@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Lines
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.crest import peak_and_rms
 from livebode.excitation.period import find_period
@@ -15,7 +16,6 @@ from livebode.excitation.significance import FLOOR_DB, GAP_DB, Found, find_lines
 from livebode.excitation.slips import Slip, find_slips, realigned
 from livebode.excitation.snr import snr_db
 from livebode.excitation.transient import leading, unlike
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Lines, counted
+from livebode.core.lines import WINDOW_MAX
 from livebode.excitation.multisine import each, multisine
-from livebode.nouns import InputError, Lines, counted
-from livebode.nouns.lines import WINDOW_MAX
 
 Floats = NDArray[np.float64]
 

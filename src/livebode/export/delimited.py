@@ -13,8 +13,8 @@ import pyarrow as pa
 from pyarrow.csv import CSVWriter, WriteOptions
 
 from livebode.arrow import from_numpy
+from livebode.core import InputError, Responses
 from livebode.export.written import Written
-from livebode.nouns import InputError, Responses
 
 
 def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] | None = None) -> Written:

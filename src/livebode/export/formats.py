@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 
 import pyarrow as pa
 
+from livebode.core import InputError, Responses
 from livebode.export.delimited import write_csv
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
 from livebode.export.parameters import write_parameters_csv, write_parameters_mat
 from livebode.export.universal import write_uff
 from livebode.export.written import Written
-from livebode.nouns import InputError, Responses
 
 FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], Written]] = {
     "csv": write_csv,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from livebode.core import InputError, Responses
 from livebode.export.written import Written, whole
-from livebode.nouns import InputError, Responses
 
 if TYPE_CHECKING:
     import xarray

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Responses
 from livebode.export.written import Written, whole
-from livebode.nouns import Responses
 
 VARIABLE = "livebode"
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from livebode.core import InputError
 from livebode.export.delimited import begin
 from livebode.export.matlab import VARIABLE
 from livebode.export.written import VALUES_MAX, Written
-from livebode.nouns import InputError
 
 COLUMNS = ("time_s", "schedule", "name", "value", "sigma", "unit", "model", "status")
 _NUMBERS = ("time_s", "schedule", "value", "sigma")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from livebode.nouns import InputError, Response, Responses
+from livebode.core import InputError, Response, Responses
 
 
 def at(parts: Iterable[Responses], time_s: float) -> Response:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Response, Responses
 from livebode.export.written import Written
-from livebode.nouns import InputError, Response, Responses
 
 _LABEL, _ID = 20, 80  # letters that the format has for a unit and for a line of text
 _LINES_MIN = 2

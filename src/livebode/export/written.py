@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from livebode.nouns import InputError, Responses
+from livebode.core import InputError, Responses
 
 VALUES_MAX = 1 << 23
 """Most values (responses times lines) that a format takes which is not written in parts: some 2 GB of memory."""

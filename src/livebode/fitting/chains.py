@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.fitting.modal import chain_of, scan
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay, free_friction
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.parameters import OK
 from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, Extended
 from livebode.fitting.physical import DELAY, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import Fitted, fit_rows
 from livebode.fitting.weighing import misfit, weights
-from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

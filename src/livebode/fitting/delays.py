@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.parameters import OK
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, Fitted, fit_rows
 from livebode.fitting.weighing import misfit
-from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 

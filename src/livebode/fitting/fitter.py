@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event, InputError, Lines, Parameters, Responses
+from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
 from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured, Problem
 from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, Fitted, fit_rows
 from livebode.fitting.weighing import epsilon_for, squares
-from livebode.nouns import Event, InputError, Lines, Parameters, Responses
-from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 

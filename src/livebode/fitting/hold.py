@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError
 from livebode.fitting.transfer import Transfer, roots
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

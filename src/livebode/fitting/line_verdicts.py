@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 
 _FIRST_VERDICT = 3  # windows that may be valid before what repeats is known: three periods, of which two are whole
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Responses
 from livebode.fitting.line_verdicts import LineVerdicts
-from livebode.nouns import InputError, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

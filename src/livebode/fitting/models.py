@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from livebode.core import InputError
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.physical import PhysicalModel
 from livebode.fitting.three_mass import ThreeMass
 from livebode.fitting.unknown_gain import TwoMassGain
-from livebode.nouns import InputError
 
 MODELS: dict[str, type[PhysicalModel]] = {m.name: m for m in (Rigid, TwoMass, ThreeMass, TwoMassGain)}
 

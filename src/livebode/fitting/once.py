@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Parameters, Response, Responses
 from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.extended import WORDS
 from livebode.fitting.fitter import Fitter
@@ -18,7 +19,6 @@ from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, Grid, Hold, PhysicalModel
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import SENTENCES, fit_rows
-from livebode.nouns import InputError, Parameters, Response, Responses
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Lines
 from livebode.fitting.transfer import Transfer
-from livebode.nouns import InputError, Lines
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, missing_channel
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.physical import Grid, PhysicalModel
-from livebode.nouns import InputError, missing_channel
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -7,12 +7,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Parameters, Response, Responses
+from livebode.core.parameters import OK
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.problem import Measured
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
 from livebode.fitting.weighing import chi_squared, own_epsilon, squares, weights
-from livebode.nouns import InputError, Parameters, Response, Responses
-from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from livebode.core import InputError, Parameters
 from livebode.fitting.hold import to_continuous
 from livebode.fitting.transfer import Transfer
-from livebode.nouns import InputError, Parameters
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core.parameters import OK
 from livebode.fitting.friction import held_by_friction
 from livebode.fitting.problem import Measured, Problem, Solution
 from livebode.fitting.weighing import chi_squared, lacks_more_than, own_epsilon, squares, weights
-from livebode.nouns.parameters import OK
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.fitting.modal import QUALITY, scan
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from livebode.core import Loop, Responses
 from livebode.margins.margins import CONTRADICTED, NAMES, NONE, Margins
-from livebode.nouns import Loop, Responses
 
 _CHANCE = 0.01  # of all lines of a row together
 

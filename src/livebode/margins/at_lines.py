@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Loop, Responses
+from livebode.core import Loop, Responses
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from math import atan, pi, sqrt, tan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError
-from livebode.nouns.model import Algebra
+from livebode.core import InputError
+from livebode.core.model import Algebra
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError, Parameters
-from livebode.nouns.parameters import OK, half_width
-from livebode.nouns.rows import joined
+from livebode.core import InputError, Parameters
+from livebode.core.parameters import OK, half_width
+from livebode.core.rows import joined
 
 Floats = NDArray[np.float64]
 

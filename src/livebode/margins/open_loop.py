@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Loop, Model
 from livebode.fitting import Grid, PhysicalModel
 from livebode.fitting.physical import Hold
-from livebode.nouns import InputError, Loop, Model
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

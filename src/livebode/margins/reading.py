@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Parameters
 from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
 from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.open_loop import OpenLoop
 from livebode.margins.slopes import Fits, Slopes, moved, peak_moved, slopes
 from livebode.margins.stability import stable
-from livebode.nouns import InputError, Parameters
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Parameters
 from livebode.margins.filters import Biquad, low_pass, notch_over
 from livebode.margins.margins import NAMES, Margins
 from livebode.margins.open_loop import OpenLoop
 from livebode.margins.reading import margins
-from livebode.nouns import InputError, Parameters
 
 Floats = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from livebode.core import InputError, Lines
 from livebode.estimation import Settings
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.rows import PLACES, places
 from livebode.monitoring.table import Table
-from livebode.nouns import InputError, Lines
 
 ROLES = ("output", "input", "excitation", "schedule")
 

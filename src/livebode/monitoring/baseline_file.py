@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.baseline import ROLES, Baseline
 from livebode.monitoring.baseline_part import Part
@@ -22,7 +23,6 @@ from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.table import Table
 from livebode.motion import Curve, MovingModel
-from livebode.nouns import InputError, Lines
 
 _FORMAT = "livebode baseline"
 _VERSION = 4

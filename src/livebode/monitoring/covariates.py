@@ -8,7 +8,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import isfinite, log
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 DEFAULT = "one in 30 days of motion"
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, InputError, Lines
 from livebode.monitoring.accuracy import Accuracy, accuracy
 from livebode.monitoring.between_runs import KNOWN, between_runs
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
@@ -22,7 +23,6 @@ from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.stretches import Stretches
 from livebode.motion.fit import Fit, Rows
-from livebode.nouns import Block, InputError, Lines
 
 Floats = NDArray[np.float64]
 Run = Callable[[], Iterable[Block]]

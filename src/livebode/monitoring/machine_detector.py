@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event
 from livebode.monitoring import evidence as word
 from livebode.monitoring.alarms import Alarm, Recent
 from livebode.monitoring.charts import Charts
@@ -18,7 +19,6 @@ from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
 from livebode.monitoring.standing import Standing
-from livebode.nouns import Event
 
 CHARTS = 2 * len(DIRECTIONS) + 2
 """That take a step with a window: up and down for each direction, and for stiffness in the cell where the cart is."""

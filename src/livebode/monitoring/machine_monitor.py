@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Event, Lines
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import threshold
@@ -16,7 +17,6 @@ from livebode.monitoring.machine_detector import CHARTS, MachineDetector
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.sentences import about, about_far, joint
 from livebode.monitoring.stretches import Stretch, Stretches
-from livebode.nouns import Block, Event, Lines
 
 Look = Callable[[Evidence], object]
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Lines
 from livebode.monitoring import evidence as word
 from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
@@ -17,7 +18,6 @@ from livebode.monitoring.sensitivity import DIRECTIONS, Replay
 from livebode.monitoring.stretches import LEAD_S, Stretch
 from livebode.motion.orders import shaft_position
 from livebode.motion.replay import without_drift
-from livebode.nouns import Lines
 
 Floats = NDArray[np.float64]
 

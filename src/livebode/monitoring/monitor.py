@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Event, Parameters, Responses
 from livebode.estimation import Settings, snapshots
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT, seconds_between
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.rows import Apart, places
 from livebode.monitoring.table_monitor import TableMonitor
-from livebode.nouns import Block, Event, Parameters, Responses
 
 
 class Monitor:

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Lines
 from livebode.monitoring.evidence import JUDGED
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.stretches import Stretches
 from livebode.motion.orders import OrderSpectrum
-from livebode.nouns import Block, Lines
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Parameters, Responses
+from livebode.core import Parameters, Responses
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event
+from livebode.core.clock import moment
 from livebode.monitoring import evidence as word
 from livebode.monitoring.offset import FAR
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.nouns import Event
-from livebode.nouns.clock import moment
 
 if TYPE_CHECKING:
     from livebode.monitoring.alarms import Alarm

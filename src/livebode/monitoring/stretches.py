@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block
+from livebode.core import Block
 
 Floats = NDArray[np.float64]
 

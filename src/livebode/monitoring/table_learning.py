@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.monitoring.accuracy import STRETCH, Accuracy, accuracy
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import Table
 from livebode.monitoring.table_sentences import cleared, differs, unknown
-from livebode.nouns import Event
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event
+from livebode.core.clock import moment as clock_moment
 from livebode.monitoring.table import Table
-from livebode.nouns import Event
-from livebode.nouns.clock import moment as clock_moment
 
 Floats = NDArray[np.float64]
 

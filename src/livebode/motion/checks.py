@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from livebode.core import InputError
 from livebode.estimation import Settings
-from livebode.nouns import InputError
 
 
 def check(

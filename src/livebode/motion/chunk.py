@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Lines
 from livebode.estimation.implausible import PlausibleRange
-from livebode.nouns import Block, Lines
 
 Floats = NDArray[np.float64]
 

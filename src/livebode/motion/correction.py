@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Channel, Event, InputError, Responses
 from livebode.estimation import Settings, Tracker, snapshots
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
@@ -19,7 +20,6 @@ from livebode.motion.residual import Scatter, residual
 from livebode.motion.ripple_watch import RippleWatch
 from livebode.motion.standstill import Standstill, without
 from livebode.motion.waiting import Waiting
-from livebode.nouns import Block, Channel, Event, InputError, Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -84,7 +84,7 @@ class MotionCorrection:
     Examples
     --------
     >>> from livebode.excitation import multisine
-    >>> from livebode.nouns import Lines
+    >>> from livebode.core import Lines
     >>> from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     >>> lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
     >>> axis = BeltAxis(motion=Strokes(), excitation_n_m=multisine(lines), seconds=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.nouns import PID, Cascade, InputError, Loop
+from livebode.core import PID, Cascade, InputError, Loop
 from livebode.simulation.settings import Drive
 
 

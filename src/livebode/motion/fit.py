@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
 from livebode.fitting.windows import scan
 from livebode.motion.model import Curve, MovingModel, basis
-from livebode.nouns import InputError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Responses
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
 from livebode.motion.fit import Fit, Rows, sampled
@@ -15,7 +16,6 @@ from livebode.motion.model import Curve, MovingModel
 from livebode.motion.residual import Residual
 from livebode.motion.standstill import turns
 from livebode.motion.steady import FLAT_M, steady_rows
-from livebode.nouns import Responses
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

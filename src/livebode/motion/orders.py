@@ -10,8 +10,8 @@ from scipy.ndimage import median_filter
 from scipy.signal.windows import blackmanharris
 from scipy.stats import gamma
 
+from livebode.core import Lines
 from livebode.motion.replay import without_drift
-from livebode.nouns import Lines
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import shift
 
+from livebode.core import InputError
 from livebode.motion.model import MovingModel
-from livebode.nouns import InputError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.mechanics import Mechanics

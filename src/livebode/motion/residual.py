@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Channel, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.motion.chunk import Chunk
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_torque, without_drift
-from livebode.nouns import Block, Channel, Responses
 
 Floats = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event, Responses
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
 from livebode.motion.residual import Residual
 from livebode.motion.steady import steady_rows
-from livebode.nouns import Event, Responses
 
 Floats = NDArray[np.float64]
 

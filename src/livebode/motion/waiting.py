@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import PER_LINE, PER_RESPONSE, Lines, Responses
+from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses
 
 _ARRAYS = PER_LINE + PER_RESPONSE
 

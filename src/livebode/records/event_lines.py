@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 from livebode.records.inside import open_read
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.json_lines import in_line

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from livebode.nouns import Event
+from livebode.core import Event
 
 _FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}  # that a group adds
 

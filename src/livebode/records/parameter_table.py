@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import from_numpy, text
-from livebode.nouns import Parameters
+from livebode.core import Parameters
 from livebode.records.table import Table
 
 SCHEMA = pa.schema(

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.records.inside import open_read
 from livebode.records.segments.damage import KIND
 

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
-from livebode.nouns import Event, InputError
-from livebode.nouns.clock import RunClock, moment, moments_by
+from livebode.core import Event, InputError
+from livebode.core.clock import RunClock, moment, moments_by
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
 from livebode.records.run import Files, Run

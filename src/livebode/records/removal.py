@@ -8,7 +8,7 @@ import re
 import stat
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.inside import is_folder
 from livebode.records.summary_file import read_summary
 

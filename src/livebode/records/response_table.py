@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import from_numpy
-from livebode.nouns import Responses
+from livebode.core import Responses
 from livebode.records.table import Table
 
 SCHEMA = pa.schema(

@@ -1,4 +1,4 @@
-"""A run read back: what its directory holds, as the nouns that were written."""
+"""A run read back: what its directory holds, as the objects that were written."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
-from livebode.nouns import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
+from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece

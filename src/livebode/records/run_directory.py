@@ -15,7 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.nouns import Event, InputError, Parameters, Responses
+from livebode.core import Event, InputError, Parameters, Responses
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.piece import parts_of
 from livebode.records.removal import check_removable, remove

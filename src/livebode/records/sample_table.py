@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import from_numpy
-from livebode.nouns import Block, Channel
+from livebode.core import Block, Channel
 from livebode.records.table import Table
 
 _OWN = ("sample", "time_s")

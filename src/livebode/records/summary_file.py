@@ -9,7 +9,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.inside import read_bytes
 from livebode.records.plain_json import to_json
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Model, Response, Responses, counted
-from livebode.nouns.clock import moment
+from livebode.core import Model, Response, Responses, counted
+from livebode.core.clock import moment
 from livebode.report import ticks, words
 from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
 from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, decibels, summarised

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Response, counted
+from livebode.core import Response, counted
 from livebode.report.bode import frequency_axis
 from livebode.report.map import frequency_edges
 from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from livebode.nouns.document import Picture
+from livebode.core.document import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from livebode.nouns.document import Document, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
 from livebode.report.figures import drawn
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import inline_svg

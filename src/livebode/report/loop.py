@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Responses
 from livebode.fitting import Fit
 from livebode.margins import Margins, OpenLoop
-from livebode.nouns import Responses
 from livebode.report.bode import frequency_axis
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, style

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 from livebode.report import ticks, words
 from livebode.report.style import Style, plain
 from livebode.report.summary import decibels, quantiles

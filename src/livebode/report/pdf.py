@@ -26,7 +26,7 @@ from reportlab.platypus import (
 from reportlab.platypus import Paragraph as Words
 from reportlab.platypus import Table as Grid
 
-from livebode.nouns.document import Document, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
 from livebode.report.figures import WIDTH_IN, drawn
 from livebode.report.html import readable
 from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, draw_on, register_fonts

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from livebode.nouns import Model, Responses
+from livebode.core import Model, Responses
 from livebode.report.style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:

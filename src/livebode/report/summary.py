@@ -14,7 +14,7 @@ from math import log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Response, Responses
+from livebode.core import Response, Responses
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses, counted
+from livebode.core import Responses, counted
 from livebode.report import ticks, words
 from livebode.report.style import shortened
 from livebode.report.summary import Summary, summarised

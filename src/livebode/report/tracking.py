@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 from livebode.report import ticks, words
 from livebode.report.map import draw_maps
 from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style

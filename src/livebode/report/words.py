@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.nouns import Responses, counted
-from livebode.nouns.clock import moment, moment_of_start
+from livebode.core import Responses, counted
+from livebode.core.clock import moment, moment_of_start
 from livebode.report.style import shortened
 from livebode.report.ticks import frequency_label
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from livebode.core import Block, Channel, Event, counted
 from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
-from livebode.nouns import Block, Channel, Event, counted
 from livebode.sources import Log
 
 _PART = 1 << 20  # samples that are searched at a time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from livebode.nouns import Event
+from livebode.core import Event
 
 _EACH = {"restart", "replaced", "computer-clock"}
 _FIRST = {"foreign"}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from livebode.nouns import Block, Event, Parameters, Responses
+from livebode.core import Block, Event, Parameters, Responses
 from livebode.records import RunDirectory
 from livebode.session.event_groups import EventGroups
 from livebode.session.overview import Overview

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Response, Responses
 from livebode.estimation import Movement
 from livebode.fitting import RunningMean
-from livebode.nouns import Response, Responses
 from livebode.records import Run
 from livebode.session.overview import Overview
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from livebode.nouns import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity, counted
+from livebode.core import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity, counted
 from livebode.session.toml_file import one_line, read_table, shortened
 from livebode.sources.live import SourceSettings, checked_address
 
@@ -87,7 +87,7 @@ class _ControllerSection(_Section):
 
 
 class PIDSection(_ControllerSection):
-    """[loop.velocity] and [loop.position]: see `livebode.nouns.PID`."""
+    """[loop.velocity] and [loop.position]: see `livebode.core.PID`."""
 
     gain: float
     integral_time_s: Annotated[float, Field(gt=0)] = inf
@@ -97,7 +97,7 @@ class PIDSection(_ControllerSection):
 
 
 class PositionPDSection(_ControllerSection):
-    """[loop.position_pd]: see `livebode.nouns.PositionPD`."""
+    """[loop.position_pd]: see `livebode.core.PositionPD`."""
 
     position_gain: float
     velocity_gain: float

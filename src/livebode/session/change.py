@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline

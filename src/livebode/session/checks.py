@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import NOT_WHOLE, Block, InputError, Spectra, rms
 from livebode.estimation import Settings
-from livebode.nouns import NOT_WHOLE, Block, InputError, Spectra, rms
 from livebode.session.follower import Follower
 
 # A DFT leaves 1e-30 of a signal's power at a line where there is none.

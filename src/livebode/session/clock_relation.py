@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from math import inf
 
-from livebode.nouns import Event
-from livebode.nouns.clock import RunClock
+from livebode.core import Event
+from livebode.core.clock import RunClock
 from livebode.sources.live import LiveBlock, Origin
 
 REFINED_FOR_S = 10.0

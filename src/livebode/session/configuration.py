@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.session.axis import Axis
 from livebode.session.fits import check_fit
 from livebode.session.toml_file import parse_table, read_bytes, shortened

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from livebode.nouns import Block, InputError
+from livebode.core import Block, InputError
 from livebode.sources.live import LiveBlock, Position
 from livebode.sources.live.computer_clock import ClockReading
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from livebode.core import InputError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
-from livebode.nouns import InputError, Lines
 from livebode.session.audience import Audience
 from livebode.session.axis import FitSection, LoopSection, PIDSection
 from livebode.session.destination import Draw, Progress

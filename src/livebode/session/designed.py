@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines
 from livebode.design import Waveform
-from livebode.nouns import InputError, Lines
 
 _RAMP_S_MAX = 3600.0
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from livebode.core import InputError
 from livebode.design import FORMATS, Design, axis_text, choose, write
-from livebode.nouns import InputError
 from livebode.records import to_json
 from livebode.session.experiment import Experiment
 from livebode.structured_text import PERIOD_MAX

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from livebode.nouns import Event, Model, Responses
+from livebode.core import Event, Model, Responses
 from livebode.session.audience import Audience
 
 Progress = Callable[[int, int | None], None]

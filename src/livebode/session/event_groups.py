@@ -7,7 +7,7 @@ from copy import deepcopy
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 
 QUIET_S = 60.0
 """A cause that is silent for so long has ended; the next event of it begins another group."""

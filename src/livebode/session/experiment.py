@@ -12,8 +12,8 @@ from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from livebode.core import InputError
 from livebode.design import Bearable, Machine, Wish, belt_machine
-from livebode.nouns import InputError
 from livebode.session.axis import LoopSection, nearest
 from livebode.session.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes

@@ -8,8 +8,8 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from livebode.core import Event, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, PhysicalModel, best_of, fit, fit_of, model_named
-from livebode.nouns import Event, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import FitSection

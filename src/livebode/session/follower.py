@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from numpy import float64
 from numpy.typing import NDArray
 
+from livebode.core import Block, Event, Responses
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event, Responses
 
 
 class Follower(Protocol):

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
+from livebode.core import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.estimation import response_unit
 from livebode.fitting import Fit
-from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
 from livebode.records import RunDirectory
 from livebode.session import summary
 from livebode.session.announcing import Announcing

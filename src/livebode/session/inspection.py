@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Block, InputError, Lines
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
-from livebode.nouns import Block, InputError, Lines
 from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
 from livebode.session.quiet import Quiet, look_for_hum
 from livebode.sources import Log, open_log

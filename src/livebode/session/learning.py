@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from livebode.core import Block, InputError
 from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table, places
-from livebode.nouns import Block, InputError
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
 from livebode.session.fits import fitter_of

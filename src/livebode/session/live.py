@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from livebode.nouns import Event, InputError
-from livebode.nouns.clock import moments_by
+from livebode.core import Event, InputError
+from livebode.core.clock import moments_by
 from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.clock_relation import ClockRelation

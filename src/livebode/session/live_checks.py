@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, Event, counted
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event, counted
 from livebode.session.aligned import SlipSearch, bridged
 from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions

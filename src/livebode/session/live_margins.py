@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from livebode.core import Loop, Parameters, Responses
 from livebode.fitting import Fitter
 from livebode.margins import OpenLoop, against_lines, margins
-from livebode.nouns import Loop, Parameters, Responses
 
 
 def live_margins(fits: Parameters, responses: Responses, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:

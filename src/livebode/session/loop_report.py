@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import InputError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.margins import (
     Margins,
@@ -20,7 +21,6 @@ from livebode.margins import (
     worst,
 )
 from livebode.margins.margins import CONTRADICTED
-from livebode.nouns import InputError, Loop, Parameters, Responses
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection, LoopSection
 from livebode.session.fits import fit_run

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from livebode.core import InputError
 from livebode.design import Machine, MeasuredResponse, measured_machine
 from livebode.design.machine import MOTION_KEYS
 from livebode.design.measured import Output
 from livebode.fitting import mean_response
-from livebode.nouns import InputError
 from livebode.records import Run
 from livebode.session.axis import LoopSection
 from livebode.session.fits import output_of

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 from livebode.session.axis import RecordSection
 from livebode.session.pipeline import Pipeline
 from livebode.sources.live import LiveSource

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 
 _ROWS_MAX = 2048
 _PARTS_MAX = 64

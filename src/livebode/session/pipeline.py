@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from livebode.nouns import InputError, missing_channel
+from livebode.core import InputError, missing_channel
 from livebode.session.axis import Axis
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from livebode.core import Block, InputError, Lines, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.settings import nearest_hop
-from livebode.nouns import Block, InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 from livebode.session.checks import PERIODS_COMPARED, check_length, check_period
 from livebode.session.follower import Follower

@@ -7,10 +7,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError, Lines, counted
 from livebode.design import Waveform
 from livebode.design.files.facts import as_lines
 from livebode.excitation import multisine
-from livebode.nouns import InputError, Lines, counted
 from livebode.session.axis import SAME_RATE, Axis
 from livebode.sources.live.settings import named_channels
 from livebode.structured_text import SMALLEST, Project, check_rate, check_signals

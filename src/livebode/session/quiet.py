@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import InputError, Lines
 from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
-from livebode.nouns import InputError, Lines
 from livebode.session.plan import beginnings
 from livebode.sources import Log
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+from livebode.core import Event
 from livebode.estimation import Tracker
-from livebode.nouns import Event
 from livebode.session.aligned import AlignedLog, slip_event, slips_of
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination

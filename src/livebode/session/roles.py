@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.estimation import Settings
 from livebode.estimation.estimators import Role
-from livebode.nouns import InputError
 from livebode.session.role_shapes import direct, lags, limit, mean_deg, sized, slope, wide
 from livebode.session.role_spectra import RoleSpectra, role_spectra
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.session.axis import FitSection, LoopSection
 
 _SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Block, Channel, Event, InputError, Parameters, Responses
-from livebode.nouns.clock import RunClock
+from livebode.core import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.core.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
 from livebode.records.removal import check_removable, remove

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.session.axis import Axis
 from livebode.session.axis_thread import AxisThread
 from livebode.session.change import Change, change_of

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from livebode.nouns import Event, Responses
+from livebode.core import Event, Responses
 from livebode.session.fit_budget import FitBudget
 from livebode.sources.live import LiveSource
 

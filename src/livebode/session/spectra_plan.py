@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from livebode.nouns import InputError, Lines, SpectraLayout
+from livebode.core import InputError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 
 

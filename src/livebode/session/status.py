@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Block, Event, Responses
+from livebode.core import Block, Event, Responses
 from livebode.session.audience import Audience, Relay
 from livebode.sources.live import Health, LiveBlock
 

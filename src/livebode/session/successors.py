@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.summary_file import read_summary
 
 

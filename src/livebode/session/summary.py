@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core import Responses
+from livebode.core.clock import moment
 from livebode.fitting import Fit
 from livebode.kernel import instruction_set
-from livebode.nouns import Responses
-from livebode.nouns.clock import moment
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
 from livebode.session.loop_report import loop_report

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from livebode.nouns import Responses
+from livebode.core import Responses
 from livebode.session.checks import ChannelCheck
 from livebode.session.continuing import Before
 from livebode.session.event_groups import EventGroups

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 FILE_BYTES_MAX = 1 << 20
 _SHOWN = 120

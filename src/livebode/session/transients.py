@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Event, counted
 from livebode.estimation import Movement, Settings
 from livebode.estimation.movement import PLACES
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.prepare import filled
 from livebode.excitation.transient import leading, unlike
-from livebode.nouns import Event, counted
 from livebode.session.aligned import AlignedLog
 from livebode.session.plan import beginnings
 from livebode.session.roles import ROLES

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.nouns import Block, InputError
+from livebode.core import Block, InputError
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
 from livebode.session.fits import fit_run

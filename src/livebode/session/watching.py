@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from livebode.core import Block, Event, InputError, Parameters, Responses
 from livebode.estimation import Settings
-from livebode.nouns import Block, Event, InputError, Parameters, Responses
 from livebode.session.axis import Axis, MonitoringSection
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns.model import Algebra
+from livebode.core.model import Algebra
 from livebode.simulation.linear import StateSpace
 from livebode.simulation.settings import Drive, Sensor
 

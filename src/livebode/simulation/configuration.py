@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition, Fault, SoftSpot, condition_at
 from livebode.simulation.linear import StateSpace, linear

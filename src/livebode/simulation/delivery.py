@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.core import Block, Channel, InputError, missing_channel
 
 CHANNELS = (
     Channel("w", "N m"),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError, missing_channel
+from livebode.core import Block, Channel, InputError, missing_channel
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.motion import Motion, Standstill

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
-from livebode.nouns.model import Algebra
+from livebode.core.model import Algebra
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.settings import Friction
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.simulation.values import nonnegative, positive
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.simulation.settings import Limits
 from livebode.simulation.values import nonnegative, positive
 

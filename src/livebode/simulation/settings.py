@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan, pi
 
-from livebode.nouns import PID, Cascade, InputError, Loop
+from livebode.core import PID, Cascade, InputError, Loop
 from livebode.simulation.values import count, nonnegative, positive
 
 DELAY_TICKS_MAX = 64

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError
+from livebode.core import Block, Channel, InputError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at

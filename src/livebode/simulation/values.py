@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 
 def positive(owner: object, *names: str) -> None:

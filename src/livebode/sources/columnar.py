@@ -8,7 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode import arrow
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
 from livebode.sources.units import split_units
 

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.cells import EMPTY, Kind
 from livebode.sources.columnar import to_numpy
 from livebode.sources.dialect import find_dialect

@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.cells import EMPTY, Kind, is_comment, is_value, kind_of, zoned
 from livebode.sources.header import find_header, fits
 from livebode.sources.recording import COLUMNS_MAX

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.recording import Recording, contained
 
 HEAD_BYTES = 1024

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.arrays import array_columns
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 

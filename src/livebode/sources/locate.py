@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.cells import EMPTY, Kind, is_comment, is_moment, is_number
 from livebode.sources.dialect import Dialect
 

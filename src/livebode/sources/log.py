@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError
+from livebode.core import Block, Channel, InputError
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, stacked
 from livebode.sources.timing import Clock, Timing

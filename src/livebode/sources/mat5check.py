@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 HEADER_BYTES = 128
 COMPRESSED, MATRIX = 15, 14

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.arrays import array_columns
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import list_variables

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.hdf5 import add_dataset, dataset_chunks, import_h5py
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
 

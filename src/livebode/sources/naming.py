@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from livebode.nouns import InputError, missing_channel
+from livebode.core import InputError, missing_channel
 from livebode.sources.recording import Column
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.arrays import Slot, array_columns
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 

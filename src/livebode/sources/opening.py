@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 Chunk = list[NDArray[Any]]
 """One array for each column asked for, all of one length, numbers of any type; int64 nanoseconds for temporal ones."""
@@ -90,7 +90,7 @@ def contained(path: Path, kind: str) -> Iterator[None]:
     ...     raise KeyError("mdtype 77")
     Traceback (most recent call last):
         ...
-    livebode.nouns.errors.InputError: cannot read a.mat as MATLAB: mdtype 77; is the file whole and of this kind?
+    livebode.core.errors.base.LivebodeError: cannot read a.mat as MATLAB: mdtype 77; is the file whole and of this kind?
     """
     try:
         with warnings.catch_warnings():

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 BYTES_MAX = 1 << 28
 DEPTH_MAX = 64

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.base85 import decode
 from livebode.sources.recording import Chunk, Column, Recording, contained
 from livebode.sources.rounding import exact_rate_hz

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 GAP_TOLERANCE = 0.25
 """How far from a whole number of periods a gap may be, in periods."""

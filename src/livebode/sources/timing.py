@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError, missing_channel
+from livebode.core import InputError, missing_channel
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps

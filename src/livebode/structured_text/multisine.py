@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns import InputError, rounded_down
+from livebode.core import InputError, rounded_down
 from livebode.structured_text.names import check_name
 from livebode.structured_text.text import array, check_rate, comment, real, section
 

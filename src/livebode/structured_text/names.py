@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 NAME_LENGTH_MAX = 32
 """Characters that every controller tells apart."""

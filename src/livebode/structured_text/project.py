@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 from livebode.structured_text.multisine import multisine
 from livebode.structured_text.names import check_names
 from livebode.structured_text.ring import LENGTH, ring_block, ring_type

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from livebode.nouns import InputError, counted
+from livebode.core import InputError, counted
 from livebode.structured_text.names import check_name, check_names
 from livebode.structured_text.text import array, check_bytes, check_rate, comment, real, section
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import factorial
 from typing import Literal
 
-from livebode.nouns import InputError, Lines
+from livebode.core import InputError, Lines
 from livebode.structured_text.names import check_name, check_names
 from livebode.structured_text.text import Declared, array, check_bytes, comment, real, section
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import isfinite
 
-from livebode.nouns import InputError, counted
+from livebode.core import InputError, counted
 
 BYTES_MAX = 8 << 20
 """Most memory of one block or ring: what livebode reads from a PLC, and more than most PLCs leave free."""

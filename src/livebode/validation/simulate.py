@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import InputError
 from livebode.fitting import Fit
 from livebode.fitting.physical import DELAY
 from livebode.fitting.transfer import Transfer
-from livebode.nouns import InputError
 from livebode.validation.chain import respond
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Block, InputError, Loop
 from livebode.fitting import Fit
-from livebode.nouns import Block, InputError, Loop
 from livebode.validation.correlation import SMALL, Correlation, correlation, own_correlation
 from livebode.validation.simulate import Simulated, simulate
 

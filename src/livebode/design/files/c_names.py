@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 LETTERS_MAX = {"C": 63, "MATLAB": 31}  # that C99 tells apart; that a MATLAB v5 file holds of a struct's name
 _C = """
@@ -37,7 +37,7 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.nouns.errors.InputError: the name 'double' is a keyword or macro of C or C++; take for example 'double_w'
+    livebode.core.errors.base.LivebodeError: the name 'double' is a keyword or macro of C or C++; take for example 'double_w'
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:

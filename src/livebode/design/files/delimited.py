@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from livebode.core import InputError
 from livebode.design.files.facts import as_lines, facts
 from livebode.design.waveform import Waveform
-from livebode.nouns import InputError
 
 
 def write_csv(path: Path, waveform: Waveform, name: str) -> None:

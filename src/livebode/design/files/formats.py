@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 
+from livebode.core import InputError
 from livebode.design.files.arrays import write_mat, write_npz
 from livebode.design.files.c_header import write_c_header
 from livebode.design.files.delimited import write_csv
 from livebode.design.files.structured_text import write_st
 from livebode.design.waveform import Waveform
-from livebode.nouns import InputError
 
 FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
     ".csv": write_csv,

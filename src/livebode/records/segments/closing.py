@@ -6,7 +6,7 @@ import errno
 import os
 import threading
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.segments.manifest import Segment
 from livebode.records.segments.shelf import Shelf
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 
 KIND = "record-damaged"
 _SHOWN = 3

@@ -7,7 +7,7 @@ import errno
 import os
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.inside import check_own
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)

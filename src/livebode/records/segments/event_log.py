@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.json_lines import to_line
 

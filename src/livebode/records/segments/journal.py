@@ -14,7 +14,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory

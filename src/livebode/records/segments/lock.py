@@ -6,7 +6,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 
 class Lock:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.records.inside import read_bytes
 from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of

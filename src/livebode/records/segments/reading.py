@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.records.inside import is_folder
 from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of

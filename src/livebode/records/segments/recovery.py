@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.removal import foreign, remove
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal

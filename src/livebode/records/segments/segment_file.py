@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.records.inside import open_read
 from livebode.records.segments.manifest import Segment
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.nouns import Event, InputError
+from livebode.core import Event, InputError
 from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.nouns import Event
-from livebode.nouns.document import Finding, Tone
+from livebode.core import Event
+from livebode.core.document import Finding, Tone
 from livebode.records import Run
 from livebode.session.reporting.happenings import EventSummary
 from livebode.session.reporting.wording import many

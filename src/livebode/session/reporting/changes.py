@@ -7,9 +7,9 @@ from math import hypot, isfinite
 
 import numpy as np
 
+from livebode.core import InputError
 from livebode.fitting import Fit
 from livebode.margins import Margins, OpenLoop, against_lines, margins
-from livebode.nouns import InputError
 from livebode.session.axis import FitSection, LoopSection
 from livebode.session.fits import fit_averaged
 from livebode.session.reporting.difference import ALPHA, Compared

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from livebode.nouns.clock import moment
-from livebode.nouns.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.core.clock import moment
+from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
 from livebode.session.reporting.changes import Change, Changes, changes, percent

@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.document import Finding, Tone
+from livebode.core.document import Finding, Tone
 from livebode.session.reporting.alarms import alarms
 from livebode.session.reporting.changes import Change, Changes, percent
 from livebode.session.reporting.difference import Compared, Difference, Place

@@ -8,8 +8,8 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import PER_LINE, InputError, Lines, Response, Responses, widened
 from livebode.fitting import RunningMean
-from livebode.nouns import PER_LINE, InputError, Lines, Response, Responses, widened
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import TrackingSection

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from livebode.nouns import Event
-from livebode.nouns.clock import moment
-from livebode.nouns.document import Paragraph, Part, Table
+from livebode.core import Event
+from livebode.core.clock import moment
+from livebode.core.document import Paragraph, Part, Table
 from livebode.records.grouped_events import each_event, event_counts
 from livebode.session.reporting.wording import many
 

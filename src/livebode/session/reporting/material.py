@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from livebode.core import InputError, Responses
+from livebode.core.clock import moment
 from livebode.fitting import Fit
-from livebode.nouns import InputError, Responses
-from livebode.nouns.clock import moment
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
 from livebode.session.axis import FitSection, LoopSection

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.nouns.document import Paragraph, Section
+from livebode.core.document import Paragraph, Section
 from livebode.session.reporting.material import Material
 from livebode.session.reporting.wording import duration, many, pairs
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.parameters import OK
+from livebode.core.parameters import OK
 from livebode.records import Run
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from livebode.nouns.clock import moment
-from livebode.nouns.document import Document, Paragraph, Section
+from livebode.core.clock import moment
+from livebode.core.document import Document, Paragraph, Section
 from livebode.session.reporting import sections
 from livebode.session.reporting.material import Judged, Material, read, written
 from livebode.session.reporting.measured import how

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from livebode.core.clock import moment
+from livebode.core.document import Listing, Paragraph, Part, Picture, Section, Table
 from livebode.margins.words import WORDS
-from livebode.nouns.clock import moment
-from livebode.nouns.document import Listing, Paragraph, Part, Picture, Section, Table
 from livebode.session.reporting.alarms import alarms
 from livebode.session.reporting.material import Material, by_schedule
 from livebode.session.reporting.parameter_track import MARGINS, Track

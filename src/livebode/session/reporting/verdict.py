@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import isfinite
 
+from livebode.core.document import Finding, Tone
 from livebode.margins import worst
-from livebode.nouns.document import Finding, Tone
 from livebode.session.reporting.alarms import alarms
 from livebode.session.reporting.material import Material
 from livebode.session.reporting.parameter_track import MARGINS, failed

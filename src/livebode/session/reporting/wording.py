@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from livebode.nouns import Response
-from livebode.nouns.document import Table
+from livebode.core import Response
+from livebode.core.document import Table
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 BOUND_95 = float(np.sqrt(np.log(20.0)))

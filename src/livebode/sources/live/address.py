@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 PORTS: dict[str, int | None] = {
     "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.address import Address
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch

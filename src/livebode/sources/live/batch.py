@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Block, Channel, InputError
+from livebode.core import Block, Channel, InputError
 from livebode.sources.live.position import Mark, Origin
 
 CHANNELS_MAX = 1024

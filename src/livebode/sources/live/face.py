@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.nouns import Channel, SpectraLayout
+from livebode.core import Channel, SpectraLayout
 from livebode.sources.live.said import Said
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch

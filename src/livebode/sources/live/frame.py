@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from livebode.nouns import Channel, InputError, SpectraLayout
+from livebode.core import Channel, InputError, SpectraLayout
 from livebode.sources.live.batch import Batch, check_channels
 from livebode.sources.live.framing import (
     CRC,

@@ -10,7 +10,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 
 MAGIC = b"LBOD"
 VERSION = 1

@@ -7,7 +7,7 @@ import select
 import sys
 from typing import ClassVar
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
 from livebode.sources.live.source import TICK_S, LiveSource
 

@@ -6,7 +6,7 @@ import socket
 import ssl
 from typing import Any, ClassVar
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.framing import FRAME_BYTES_MAX

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.live.batch import CHANNELS_MAX, VALUES_MAX, Batch
 from livebode.sources.live.settings import named_channels
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.live.batch import Batch
 
 Sample = tuple[int, float, NDArray[np.float64]]

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
 from livebode.sources.live.numbered import Numbered

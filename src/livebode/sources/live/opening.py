@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.address import Address, parse_address
 from livebode.sources.live.follow import FollowSource
 from livebode.sources.live.settings import SourceSettings, check_keys

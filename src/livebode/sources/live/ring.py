@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.live.batch import CHANNELS_MAX, SAMPLE_MAX, VALUES_MAX, Batch
 
 MAGIC = 0x474E524C  # "LRNG"

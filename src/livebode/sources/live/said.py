@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from livebode.nouns import Event
+from livebode.core import Event
 
 KINDS = (
     "connected", "disconnected", "refused", "loss", "repeat", "reordered", "restart", "clock-jump", "wrong-rate",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.settings import SourceSettings
 
 SECRET_BYTES_MAX = 1 << 16

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.nouns import Channel, InputError
+from livebode.core import Channel, InputError
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]

@@ -13,7 +13,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from livebode.nouns import Channel, Event, InputError, SpectraLayout, missing_channel
+from livebode.core import Channel, Event, InputError, SpectraLayout, missing_channel
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause

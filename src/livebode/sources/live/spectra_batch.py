@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Channel, InputError, Spectra, SpectraLayout, rms
+from livebode.core import Channel, InputError, Spectra, SpectraLayout, rms
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
 from livebode.sources.live.position import Origin
 

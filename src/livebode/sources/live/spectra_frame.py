@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns import Channel, InputError, SpectraLayout
+from livebode.core import Channel, InputError, SpectraLayout
 from livebode.sources.live.batch import check_channels
 from livebode.sources.live.framing import FLOAT64, SPECTRA, SPECTRA_LAYOUT, Header, framed
 from livebode.sources.live.spectra_batch import SpectraBatch

@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from typing import ClassVar
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.framing import FrameSplitter
 from livebode.sources.live.source import TICK_S, LiveSource

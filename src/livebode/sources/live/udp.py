@@ -6,7 +6,7 @@ import socket
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import ClassVar
 
-from livebode.nouns import InputError
+from livebode.core import InputError
 from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.settings import SourceSettings

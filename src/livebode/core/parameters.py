@@ -9,8 +9,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.errors import InputError
-from livebode.nouns.rows import joined
+from livebode.core.errors import InputError
+from livebode.core.rows import joined
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns.errors import InputError
-from livebode.nouns.model import Model, as_model
+from livebode.core.errors import InputError
+from livebode.core.model import Model, as_model
 
 Logged = Literal["before", "after"]
 Complex = NDArray[np.complex128]

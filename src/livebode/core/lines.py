@@ -9,7 +9,7 @@ from math import ceil, floor, lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.errors import GridError, InputError
+from livebode.core.errors import GridError, InputError
 
 # A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then holds a
 # whole number of periods to a millionth, and the leakage is below every other error.
@@ -95,7 +95,7 @@ class Lines:
         >>> Lines.parse("25", rate_hz=4000, window=400)
         Traceback (most recent call last):
         ...
-        livebode.nouns.errors.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; the \
+        livebode.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; the \
 nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         """
         check_window(window, rate_hz)

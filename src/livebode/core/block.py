@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.errors import InputError
+from livebode.core.errors import InputError
 
 
 @dataclass(frozen=True)

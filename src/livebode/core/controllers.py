@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns.errors import InputError
-from livebode.nouns.model import Algebra
+from livebode.core.errors import InputError
+from livebode.core.model import Algebra
 
 Rule = Literal["backward", "forward", "trapezoidal", "continuous"]
 Hold = Literal["zero-order", "none"]

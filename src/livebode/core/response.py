@@ -9,9 +9,9 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns.errors import GridError, InputError
-from livebode.nouns.lines import Lines
-from livebode.nouns.rows import joined
+from livebode.core.errors import GridError, InputError
+from livebode.core.lines import Lines
+from livebode.core.rows import joined
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 Floats = NDArray[np.float64]

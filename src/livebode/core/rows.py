@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.nouns.errors import InputError
+from livebode.core.errors import InputError
 
 
 def joined(parts: Sequence[Any], names: Sequence[str], what: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.nouns.errors import InputError
+from livebode.core.errors import InputError
 
 
 @runtime_checkable

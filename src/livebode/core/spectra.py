@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.nouns.block import Block, Channel
-from livebode.nouns.errors import GridError, InputError
-from livebode.nouns.lines import WINDOW_MAX, Lines
+from livebode.core.block import Block, Channel
+from livebode.core.errors import GridError, InputError
+from livebode.core.lines import WINDOW_MAX, Lines
 
 NOT_WHOLE, SPIKE = 1, 2
 """Bits of a window's state: it holds a start, a gap or a sample that is not finite; it holds a spike."""

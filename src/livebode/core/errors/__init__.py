@@ -1,0 +1,43 @@
+"""All errors that livebode raises on purpose; docs/errors.md lists their codes.
+
+Wrong use by a programmer (a wrong type, a call in the wrong order) is a TypeError, ValueError or RuntimeError instead.
+"""
+
+from livebode.core.errors.base import LivebodeError
+from livebode.core.errors.baseline import BaselineError
+from livebode.core.errors.config import ConfigError
+from livebode.core.errors.damage import DamageWarning
+from livebode.core.errors.design import DesignError
+from livebode.core.errors.extra import ExtraError
+from livebode.core.errors.fit import FitError
+from livebode.core.errors.grid import GridError
+from livebode.core.errors.output import OutputError
+from livebode.core.errors.record import RecordError
+from livebode.core.errors.recording import RecordingError
+from livebode.core.errors.server import ServerError
+from livebode.core.errors.signal import SignalError
+from livebode.core.errors.simulation import SimulationError
+from livebode.core.errors.source import SourceError
+from livebode.core.errors.usage import UsageError
+
+InputError = LivebodeError  # TRANSITION: until every raise has its code
+
+__all__ = [
+    "BaselineError",
+    "ConfigError",
+    "DamageWarning",
+    "DesignError",
+    "ExtraError",
+    "FitError",
+    "GridError",
+    "InputError",
+    "LivebodeError",
+    "OutputError",
+    "RecordError",
+    "RecordingError",
+    "ServerError",
+    "SignalError",
+    "SimulationError",
+    "SourceError",
+    "UsageError",
+]

@@ -1,0 +1,5 @@
+"""A warning, not an error: the rest is read."""
+
+
+class DamageWarning(UserWarning):
+    """A file of a run is damaged; its damaged part is left out, and the rest is read."""
