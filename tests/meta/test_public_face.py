@@ -39,7 +39,8 @@ def test_every_documented_parameter_exists(name: str) -> None:
     section = re.search(r"Parameters\n-+\n(.*?)(?:\n\n[A-Z][a-z]+\n-+\n|\Z)", inspect.getdoc(thing) or "", re.S)
     if section is None:
         return
-    documented = {n.strip().lstrip("*") for line in re.findall(r"^(\S.*)$", section.group(1), re.M) for n in line.split(",")}
+    names = [name for line in re.findall(r"^(\S.*)$", section.group(1), re.M) for name in line.split(",")]
+    documented = {name.strip().lstrip("*") for name in names}
     known = set(inspect.signature(thing).parameters)
     if dataclasses.is_dataclass(thing):
         known |= {field.name for field in dataclasses.fields(thing)}

@@ -37,7 +37,7 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.core.errors.base.LivebodeError: the name 'double' is a keyword or macro of C or C++; take for example 'double_w'
+    livebode.core.errors.base.LivebodeError: the name 'double' is a keyword or macro of C or C++; ...
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:

@@ -1,0 +1,29 @@
+"""`python -m tools.error_codes > docs/errors.md`: the page of error codes, from the classes."""
+
+from __future__ import annotations
+
+import inspect
+
+from livebode.core import LivebodeError
+
+HEAD = """# Errors and their codes
+
+Every error that livebode raises on purpose is a `LivebodeError` of one of these classes. It has a stable `code`, a
+`message`, a `remedy` and its `facts`, each of which is also an attribute; `as_dict()` gives them as plain data, and
+commands with `--json` print that on standard error. A code never changes its meaning; new ones may come.
+"""
+
+
+def page() -> str:
+    """The page in Markdown."""
+    kinds = sorted(LivebodeError.__subclasses__(), key=lambda kind: kind.__name__)
+    return "\n".join([HEAD, *map(_section, kinds)])
+
+
+def _section(kind: type[LivebodeError]) -> str:
+    codes = "\n".join(f"| `{kind.area}.{code}` | {text} |" for code, text in kind.codes.items())
+    return f"## {kind.__name__}\n\n{inspect.getdoc(kind)}\n\n| code | meaning |\n|---|---|\n{codes}\n"
+
+
+if __name__ == "__main__":
+    print(page(), end="")
