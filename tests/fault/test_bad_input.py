@@ -253,5 +253,5 @@ def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, t
     result = livebode("run", log, *JOINT, *GRID, "--out", tmp_path / "run")
     assert result.code == 1
     assert "ZeroDivisionError" in result.err
-    assert "fault in livebode" in result.err
+    assert "internal error" in result.err
     assert not (tmp_path / "run").exists()

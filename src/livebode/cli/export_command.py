@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.core import InputError, Responses
+from livebode.core import Responses, UsageError
 from livebode.records import Run
 
 _IN_PYTHON = {
@@ -59,10 +59,26 @@ def export_command(
 
 def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tuple[str, ...]) -> None:
     if to in _IN_PYTHON:
-        raise InputError(f"{to} is no file; in Python it is {_IN_PYTHON[to]} (docs/export.md)")
+        raise UsageError(
+            "not-one-of",
+            f"{to} is not a file format",
+            f"in Python use {_IN_PYTHON[to]} (docs/export.md)",
+            argument="to",
+            value=to,
+            allowed=list(formats),
+        )
     if to not in formats:
         what = "parameters" if parameters else "responses"
-        raise InputError(f"--to {to!r} is not a format for {what}; take {', '.join(formats[:-1])} or {formats[-1]}")
+        raise UsageError(
+            "not-one-of",
+            f"{to!r} is not a format for {what}",
+            f"choose {', '.join(formats[:-1])} or {formats[-1]}",
+            argument="to",
+            value=to,
+            allowed=list(formats),
+        )
     given = [name for name, said in (("--at", at is not None), ("--mean", mean), ("--parameters", parameters)) if said]
     if len(given) > 1:
-        raise InputError(f"{given[0]} and {given[1]} do not go together; give one of them")
+        raise UsageError(
+            "conflict", f"{given[0]} and {given[1]} exclude each other", "give one of them", options=given[:2]
+        )

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.core import InputError
+from livebode.core import OutputError
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
@@ -62,7 +62,12 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
     for name in files:
         path = folder / name
         if path.is_dir() or (not force and (path.exists() or path.is_symlink())):
-            raise InputError(f"{str(path)!r} exists already; take another --out, or --force to replace it")
+            raise OutputError(
+                "exists",
+                f"{str(path)!r} exists already",
+                "choose another --out, or replace it with --force",
+                path=str(path),
+            )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".partial-", dir=folder) as partial:
@@ -72,4 +77,9 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
                 (Path(partial) / name).replace(folder / name)
     except OSError as error:
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-        raise InputError(f"{str(folder)!r} could not be written: {why}; nothing was left there") from None
+        raise OutputError(
+            "not-written",
+            f"{str(folder)!r} could not be written: {why}; nothing was left there",
+            path=str(folder),
+            reason=why,
+        ) from None

@@ -12,4 +12,7 @@ class OutputError(LivebodeError):
     """A file that was asked for cannot be written."""
 
     area: ClassVar[str] = "output"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "exists": "The file exists already, and may be replaced only on request.",
+        "not-written": "The disk or its permissions prevented the output from being written.",
+    }

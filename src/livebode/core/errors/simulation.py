@@ -12,4 +12,10 @@ class SimulationError(LivebodeError):
     """A machine with these parameters cannot be simulated."""
 
     area: ClassVar[str] = "simulation"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "diverged": "The state of the simulated machine is not finite, or its cart left the machine.",
+        "fmu-unusable": "The FMU cannot be read, started, or simulated on this computer.",
+        "parameters-impossible": "No machine has these parameters together.",
+        "stroke-beyond-machine": "The stroke with its overrun reaches beyond the pulleys.",
+        "unstable": "The closed loop is unstable.",
+    }

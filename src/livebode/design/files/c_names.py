@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from livebode.core import InputError
+from livebode.core import DesignError
 
 LETTERS_MAX = {"C": 63, "MATLAB": 31}  # that C99 tells apart; that a MATLAB v5 file holds of a struct's name
 _C = """
@@ -29,7 +29,7 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
 
     Raises
     ------
-    InputError
+    DesignError
         If it does not; the sentence has the nearest one that it takes.
 
     >>> identifier("w_1")
@@ -37,17 +37,29 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.core.errors.base.LivebodeError: the name 'double' is a keyword or macro of C or C++; ...
+    livebode.DesignError: the name 'double' is a keyword or macro of C or C++; ...
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:
         whose = "keyword or macro of C or C++" if language == "C" else f"keyword of {language}"
-        raise InputError(f"the name {name!r} is a {whose}; take for example {f'{name}_w'!r}")
+        raise DesignError(
+            "name-forbidden",
+            f"the name {name!r} is a {whose}",
+            f"take for example {f'{name}_w'!r}",
+            argument="name",
+            name=name,
+            language=language,
+        )
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
         return name
-    raise InputError(
-        f"the name {name!r} is none in {language} (letters, digits and single underscores, a letter first, at most "
-        f"{most}); take for example {_nearest(name, most, KEYWORDS[language])!r}"
+    raise DesignError(
+        "name-forbidden",
+        f"the name {name!r} is not valid in {language} (letters, digits and single "
+        f"underscores, a letter first, at most {most})",
+        f"take for example {_nearest(name, most, KEYWORDS[language])!r}",
+        argument="name",
+        name=name,
+        language=language,
     )
 
 
