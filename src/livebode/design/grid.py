@@ -51,20 +51,28 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     """
     found = _found(wish, rate_hz)
     if len(found.lines) > _LINES_MAX:
-        f, many = found.lines.frequency_hz, len(found.lines)
-        if wish.order is not None:
-            fewer = f"take order {wish.order - ceil(log2(many / _LINES_MAX))}"
-        else:  # the period of a PRBS is rounded up to a power of two
-            finest_hz = (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)
-            fewer = f"the finest resolution of this band is {ceil(1000 * finest_hz) / 1000:g} Hz"
-        raise GridError(
-            "too-many-lines",
-            f"{many} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}",
-            f"{fewer}, or narrow the band",
-            lines=many,
-            lines_max=_LINES_MAX,
-        )
+        raise _too_many(wish, found.lines)
     return found
+
+
+def _too_many(wish: Wish, lines: Lines) -> GridError:
+    """With the order, or the resolution, that leaves few enough."""
+    f, many = lines.frequency_hz, len(lines)
+    facts: dict[str, float] = {}
+    if wish.order is not None:
+        order = wish.order - ceil(log2(many / _LINES_MAX))
+        facts["order_max"], fewer = order, f"take order {order}"
+    else:  # the period of a PRBS is rounded up to a power of two
+        finest_hz = ceil(1000 * (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)) / 1000
+        facts["resolution_hz_min"], fewer = finest_hz, f"take lines {finest_hz:g} Hz or more apart"
+    return GridError(
+        "too-many-lines",
+        f"{many} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}",
+        f"{fewer}, or narrow the band",
+        lines=many,
+        lines_max=_LINES_MAX,
+        **facts,
+    )
 
 
 def _found(wish: Wish, rate_hz: float) -> Grid:
@@ -152,7 +160,7 @@ def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]
             f"take {apart * rate_hz / WINDOW_MAX:.3g} Hz or more at {rate_hz:g} Hz",
             argument="resolution_hz",
             resolution_hz=resolution_hz,
-            window=round(asked),
+            resolution_hz_min=apart * rate_hz / WINDOW_MAX,
             window_max=WINDOW_MAX,
         )
     if asked < 2 * apart + 1 - 1e-9:
@@ -162,7 +170,7 @@ def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]
             f"take {apart * rate_hz / (2 * apart + 1):.4g} Hz or less",
             argument="resolution_hz",
             resolution_hz=resolution_hz,
-            rate_hz=rate_hz,
+            resolution_hz_max=apart * rate_hz / (2 * apart + 1),
         )
     shortest = ceil(asked * (1 - 1e-9))
     why = f"{apart} × {rate_hz:g} Hz / {resolution_hz:g} Hz"
@@ -226,6 +234,7 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
                 resolution_hz=wish.resolution_hz,
                 order=order,
                 order_max=ORDER_MAX,
+                resolution_hz_min=finest,
             )
     window = (2**order - 1) * held
     if window > WINDOW_MAX:

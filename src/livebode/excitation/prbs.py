@@ -68,7 +68,8 @@ def check_order(order: int) -> None:
             f"the {order=} of a PRBS is not a whole number from {ORDER_MIN} to {ORDER_MAX}",
             f"take {near}, the nearest, with a period of {2**near - 1} bits",
             argument="order",
-            value=str(order),
+            value=order,
+            nearest=near,
             low=ORDER_MIN,
             high=ORDER_MAX,
         )

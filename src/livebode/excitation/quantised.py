@@ -44,6 +44,7 @@ def quantised(period: Floats, step: float) -> Floats:
             f"raise its peak above {step / 2:g}, or take steps below {2 * peak:g}",
             peak=peak,
             step=step,
+            step_max=2 * peak,
         )
     beyond = counts - period / step
     excess = round(float(np.sum(beyond)))

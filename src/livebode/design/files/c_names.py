@@ -42,25 +42,14 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:
         whose = "keyword or macro of C or C++" if language == "C" else f"keyword of {language}"
-        raise DesignError(
-            "name-forbidden",
-            f"the name {name!r} is a {whose}",
-            f"take for example {f'{name}_w'!r}",
-            argument="name",
-            name=name,
-            language=language,
-        )
-    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
+        why, nearest = f"is a {whose}", f"{name}_w"
+    elif re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
         return name
-    raise DesignError(
-        "name-forbidden",
-        f"the name {name!r} is not valid in {language} (letters, digits and single "
-        f"underscores, a letter first, at most {most})",
-        f"take for example {_nearest(name, most, KEYWORDS[language])!r}",
-        argument="name",
-        name=name,
-        language=language,
-    )
+    else:
+        why = f"is not valid in {language} (letters, digits and single underscores, a letter first, at most {most})"
+        nearest = _nearest(name, most, KEYWORDS[language])
+    facts = {"argument": "name", "name": name, "language": language, "nearest": nearest}
+    raise DesignError("name-forbidden", f"the name {name!r} {why}", f"take for example {nearest!r}", **facts)
 
 
 def _nearest(name: str, most: int, keywords: frozenset[str]) -> str:
