@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.core import DamageWarning, Event, InputError
+from livebode.core import DamageWarning, Event, LivebodeError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
@@ -99,7 +99,7 @@ def by_query(path: Path) -> dict[str, list[str]]:
         for name in TABLES:
             try:
                 answer = query(Run.open(path), f"FROM {name}", _MOST)
-            except InputError as error:
+            except LivebodeError as error:
                 if "does not exist" not in str(error):
                     raise
                 found[name] = []
@@ -134,7 +134,7 @@ def run_commands(path: Path, out: Path) -> None:
     for call in commands(path, out).values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DamageWarning)
-            with contextlib.suppress(InputError):
+            with contextlib.suppress(LivebodeError):
                 call()
 
 

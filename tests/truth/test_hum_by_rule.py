@@ -177,10 +177,10 @@ def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) ->
     refused = livebode("inspect", excited, *LINES, *SIGNALS, "--excitation", "w")
     assert (refused.code, "'w' pauses for 0.5 s at most" in refused.err) == (2, True)
     for missing, words in (
-        (LINES, "name --output"),
-        (("--lines", "50", "--output", "y"), "--lines and --window belong together"),
-        (("--input", "u"), "name --lines and --window too"),
-        (("--output", "y"), "name --excitation, or --lines and --window"),
+        (LINES, "give --output"),
+        (("--lines", "50", "--output", "y"), "--lines and --window need each other"),
+        (("--input", "u"), "give --lines and --window too"),
+        (("--output", "y"), "give --excitation, or --lines and --window"),
     ):
         refused = livebode("inspect", quiet, *missing)
         assert (refused.code, words in refused.err) == (2, True), refused.err

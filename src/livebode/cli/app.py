@@ -20,7 +20,7 @@ from livebode.cli.compare_command import compare_command
 from livebode.cli.demo_command import demo_command
 from livebode.cli.design_command import design_command
 from livebode.cli.export_command import export_command
-from livebode.cli.failures import disk_full, failure_of, json_wanted, name_option, unparsed
+from livebode.cli.failures import disk_full, failure_of, json_wanted, name_options, unparsed
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
@@ -67,11 +67,11 @@ class _Command(TyperCommand):
             raise unparsed(error, info_name) from None
 
     def invoke(self, ctx: Any) -> Any:
-        """As Typer does; an error names the option of this command that it is about."""
+        """As Typer does; an error names the options of this command that it is about."""
         try:
             return super().invoke(ctx)
         except LivebodeError as error:
-            name_option(error, self.params)
+            name_options(error, self.params)
             raise
 
 

@@ -10,8 +10,8 @@ from livebode.core.document import Document
 _NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or print the page from a browser"
 
 
-def write_documents(document: Document, out: Path, *, force: bool) -> list[str]:
-    """Write `out` with .html and, if it can be, .pdf; each whole or not at all. What was written, line by line.
+def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:
+    """Write `out` with .html and, if it can be, .pdf; each whole or not at all. The files, and what was not possible.
 
     Raises
     ------
@@ -34,6 +34,6 @@ def write_documents(document: Document, out: Path, *, force: bool) -> list[str]:
     try:
         from livebode.report.pdf import save_pdf
     except ImportError:
-        return [str(page), _NO_PDF]
+        return [page], _NO_PDF
     save(paper, lambda partial: save_pdf(document, partial), force=force)
-    return [str(page), str(paper)]
+    return [page, paper], ""

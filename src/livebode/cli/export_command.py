@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from livebode.cli.options import Json
 from livebode.core import Responses, UsageError
-from livebode.records import Run
+from livebode.records import Run, to_json
 
 _IN_PYTHON = {
     "xarray": "to_xarray(Run.open(path).responses()); --to netcdf writes a file that xarray opens",
@@ -31,6 +32,7 @@ def export_command(
         bool, typer.Option("--parameters", help="The fitted parameters instead of the responses; csv or mat.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write what a run measured in a format that other programs read."""
     from livebode import export
@@ -42,7 +44,8 @@ def export_command(
     if parameters:
         table = export.ParameterTable(record.path, partial(record.tables, "parameters"))
         written = export.save(path, lambda path: export.TABLES[to](path, table), force=force)
-        print(f"{path}: {written.rows} parameter values")
+        found = {"file": str(path), "rows": written.rows}
+        print(to_json(found) if as_json else f"{path}: {written.rows} parameter values")
         return
     if at is not None:
         parts = iter([Responses.of(export.at(record.batches(), at))])
@@ -53,6 +56,9 @@ def export_command(
     else:
         parts = record.batches()
     written = export.save(path, lambda path: export.FORMATS[to](path, parts, record.summary), force=force)
+    if as_json:
+        print(to_json({"file": str(path), "rows": written.rows, "left_out": written.left_out}))
+        return
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
     print(f"{path}: {written.rows} response{'s' * (written.rows != 1)} at {len(record.lines)} lines{left_out}")
 

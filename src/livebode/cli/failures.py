@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from livebode.core import LivebodeError, OutputError, UsageError
 
+_OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
 _UNITS = frozenset({"hz", "s", "n", "m", "db", "deg", "rad"})
 _FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 
@@ -41,8 +42,8 @@ def failure_of(error: Exception) -> Failure:
         lines = "".join(traceback.format_exception(error))
         message, remedy = "internal error in livebode", "please report it with the lines above"
         return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), 1)
-    option = known.facts.get("option", "")
-    named = f" (option {option})" if option and option not in str(known) else ""
+    options = [option for option in known.facts.get("options", ()) if option not in str(known)]
+    named = f" (option{'s' * (len(options) > 1)} {', '.join(options)})" if options else ""
     return Failure(f"livebode: {known}{named}", _written(known), 2)
 
 
@@ -60,19 +61,24 @@ def _internal(error: Exception, lines: str) -> dict[str, Any]:
     }
 
 
-def name_option(error: LivebodeError, parameters: Iterable[Any]) -> None:
-    """Add the option of the command that the error's argument or key belongs to as its fact `option`."""
-    options = {
+def name_options(error: LivebodeError, parameters: Iterable[Any]) -> None:
+    """Add the options of the command that the error's argument or key belongs to as its fact `options`."""
+    known = {
         parameter.name.rstrip("_"): max(parameter.opts, key=len)
         for parameter in parameters
         if parameter.param_type_name == "option"
     }
-    for fact in ("argument", "key"):
-        parts = str(error.facts.get(fact, "")).rpartition(".")[2].split("_")
-        while parts[1:] and "_".join(parts) not in options and parts[-1] in _UNITS:
-            parts.pop()
-        if option := options.get("_".join(parts)):
-            error.facts.setdefault("option", option)
+    names = [error.facts.get("argument"), error.facts.get("key"), *_OPTIONS_BY_CODE.get(error.code, ())]
+    options = [option for name in names if name and (option := _option(str(name), known))]
+    if options:
+        error.facts.setdefault("options", options)
+
+
+def _option(name: str, known: Mapping[str, str]) -> str | None:
+    parts = name.rpartition(".")[2].split("_")
+    while parts[1:] and "_".join(parts) not in known and parts[-1] in _UNITS:
+        parts.pop()
+    return known.get("_".join(parts))
 
 
 def unparsed(error: Exception, command: str | None) -> UsageError:
