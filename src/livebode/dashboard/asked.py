@@ -170,7 +170,7 @@ def _whole(text: str, low: int, high: int, name: str) -> int:
     raise UsageError(
         "out-of-range",
         f"{name}={text[:20]!r} is not a whole number from {low} to {high}",
-        "correct it",
+        f"choose one from {low} to {high}",
         argument=name,
         value=text[:20],
         low=low,

@@ -35,7 +35,7 @@ class RippleOrder:
                 raise UsageError(
                     "out-of-range",
                     f"ripple: {name} = {getattr(self, name)} is not a positive number",
-                    "correct it",
+                    "choose a number above 0",
                     argument=name,
                     value=getattr(self, name),
                 )

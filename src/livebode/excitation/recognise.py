@@ -172,7 +172,7 @@ def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike |
         raise UsageError(
             "out-of-range",
             f"{rate_hz=} is not a positive number of samples per second",
-            "correct it",
+            "give the samples per second",
             argument="rate_hz",
             value=rate_hz,
         )

@@ -28,7 +28,7 @@ def checked_block_samples(block_samples: int) -> None:
         raise UsageError(
             "out-of-range",
             f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}",
-            "correct it",
+            "choose for example 4096",
             argument="block_samples",
             low=1,
             high=BLOCK_SAMPLES_MAX,

@@ -168,7 +168,7 @@ def _share_below_1(loss: float) -> None:
         raise UsageError(
             "out-of-range",
             f"loss={loss} is not a fraction from 0 to below 1",
-            "correct it",
+            "choose a fraction, such as 0.1",
             argument="loss",
             value=loss,
             low=0,

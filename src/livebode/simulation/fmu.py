@@ -83,7 +83,7 @@ class FmuAxis:
             raise UsageError(
                 "wrong-shape",
                 "excitation_n_m is not one period of finite numbers, N m",
-                "correct it",
+                "give one period, shape (samples,)",
                 argument="excitation_n_m",
                 shape=list(self.excitation_n_m.shape),
             )

@@ -15,7 +15,7 @@ def positive(owner: object, *names: str) -> None:
             raise UsageError(
                 "out-of-range",
                 f"{name}={value} is not a finite number above 0",
-                "correct it",
+                "choose a number above 0",
                 argument=name,
                 value=value,
             )
@@ -29,7 +29,7 @@ def nonnegative(owner: object, *names: str) -> None:
             raise UsageError(
                 "out-of-range",
                 f"{name}={value} is not a finite number of at least 0",
-                "correct it",
+                "choose 0 or a number above it",
                 argument=name,
                 value=value,
             )
@@ -42,7 +42,7 @@ def count(owner: object, name: str, most: int) -> None:
         raise UsageError(
             "out-of-range",
             f"{name}={value} is not a whole number from 0 to {most}",
-            "correct it",
+            f"choose a whole number from 0 to {most}",
             argument=name,
             value=value,
             low=0,
