@@ -11,7 +11,7 @@ import pytest
 from scipy.io import loadmat
 
 from livebode import Lines, open_log
-from livebode.core import DesignError
+from livebode.core import LivebodeError
 from livebode.design import Waveform, choose, write
 from livebode.excitation import multisine
 from livebode.records import Run
@@ -20,7 +20,6 @@ from livebode.session.experiment import Experiment
 from livebode.simulation import SimulatedAxis
 from tests.command import livebode, write_parquet
 from tests.structured_text import Machine
-from tests.support.errors import refused
 
 ROOT = Path(__file__).parents[2]
 BELT = """
@@ -192,7 +191,7 @@ def test_structured_text_plays_the_period_to_the_bit_and_names_its_seed(tmp_path
         played.append(block["w"])
     assert np.array_equal(played[-80:], np.tile(waveform.samples, 2))
     assert "seed: 7" in text
-    with refused(DesignError, "name-forbidden", name="belt__w"):
+    with pytest.raises(LivebodeError, match="belt__w"):
         write(tmp_path / "bad.st", waveform, "belt__w")
     assert not (tmp_path / "bad.st").exists()
 
