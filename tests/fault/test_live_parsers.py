@@ -76,6 +76,7 @@ def damaged(raw: bytes, rng: random.Random) -> bytes:
 
 def one_sentence(error: LivebodeError) -> None:
     assert error.message
+    json.dumps(error.as_dict())  # its facts are plain data
     assert "\n" not in str(error)
     assert len(str(error)) < 1000
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import random
 import struct
@@ -44,6 +45,8 @@ def refusal(path: Path, **options: object) -> LivebodeError:
     with pytest.raises(RecordingError) as caught:
         drain(path, **options)
     assert "\n" not in str(caught.value)
+    assert caught.value.path == str(path)
+    assert str(path) in str(caught.value)
     return caught.value
 
 
@@ -54,6 +57,7 @@ def survives(path: Path, **options: object) -> bool:
         drain(path, **options)
     except RecordingError as error:
         message = str(error)
+        json.dumps(error.as_dict())  # its facts are plain data
     assert "\n" not in message
     return not message
 

@@ -132,7 +132,7 @@ def test_the_given_rate_is_exact(tmp_path):
     ],
 )
 def test_times_that_are_refused(tmp_path, spoil, code, facts):
-    with refused(RecordingError, code, channel="t", **facts):
+    with refused(RecordingError, code, channel="t", path=str(tmp_path / "log.parquet"), **facts):
         opened(tmp_path, spoil(np.arange(1000) / 4000))
 
 

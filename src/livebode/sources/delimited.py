@@ -63,7 +63,7 @@ class DelimitedRecording(Recording):
         try:
             chunks = list(self._parsed(Tidied(io.BytesIO(lines), dialect.encoding, dialect.spaced), columns))
         except pa.ArrowInvalid as error:
-            raise RecordingError("damaged", first_line(error)) from None
+            raise RecordingError("damaged", first_line(error), "repair the line") from None
         return [np.concatenate(parts) for parts in zip(*chunks)] if chunks else [np.empty(0) for _ in columns]
 
     @property

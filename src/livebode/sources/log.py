@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, RecordingError, UsageError
 from livebode.sources.naming import resolve
-from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, stacked
+from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
 BLOCK_SAMPLES_MAX = 1 << 24
@@ -131,7 +131,8 @@ class Log:
                 argument="channels",
                 value=repeated[0],
             )
-        columns = [resolve(name, self._columns, self._recording.columns) for name in names]
+        with located(self.path):
+            columns = [resolve(name, self._columns, self._recording.columns) for name in names]
         labels = tuple(Channel(name, column.unit) for name, column in zip(names, columns))
         return self._cut(self._read(columns, limit), labels, limit)
 

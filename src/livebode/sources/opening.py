@@ -13,7 +13,7 @@ from livebode.core import RecordingError, UsageError
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
-from livebode.sources.recording import Column, Recording, guarded
+from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_in_file
 
 
@@ -60,6 +60,14 @@ def open_log(
         )
     checked_block_samples(block_samples)
     recording = open_recording(Path(path))
+    with located(recording.path):
+        return log_of(recording, rate_hz, time, channels, block_samples)
+
+
+def log_of(
+    recording: Recording, rate_hz: float | None, time: str | None, channels: Sequence[str] | None, block_samples: int
+) -> Log:
+    """The log of an open recording; parameters as in `open_log`."""
     columns = together(recording, channels)
     time_column, unit = find_time(columns, time)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]

@@ -97,10 +97,7 @@ def contained(path: Path, kind: str) -> Iterator[None]:
             warnings.simplefilter("ignore")  # the libraries warn before they fail; the failure is what counts
             yield
     except LivebodeError as error:
-        if "path" in error.facts:
-            raise
-        error.facts["path"] = str(path)
-        raise error.at(str(path)) from error.__cause__
+        raise named(error, path) from error.__cause__
     except PermissionError:
         raise RecordingError(
             "not-readable", f"no permission to read {path}", "ask for read access to it", path=str(path)
@@ -122,6 +119,23 @@ def contained(path: Path, kind: str) -> Iterator[None]:
             path=str(path),
             format=kind,
         ) from error
+
+
+@contextmanager
+def located(path: Path) -> Iterator[None]:
+    """Errors inside it name the file, as a fact and in front of their sentence."""
+    try:
+        yield
+    except LivebodeError as error:
+        raise named(error, path) from error.__cause__
+
+
+def named(error: LivebodeError, path: Path) -> LivebodeError:
+    """The error with the file that it belongs to; the same one where it names a file."""
+    if "path" in error.facts:
+        return error
+    error.facts["path"] = str(path)
+    return error.at(str(path))
 
 
 def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:
