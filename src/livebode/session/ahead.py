@@ -26,7 +26,8 @@ class LossesAhead:
 
     def released(self, events: list[Event], tracked: int) -> list[Event]:
         """Those that may be recorded when all samples before number `tracked` were tracked."""
-        due, held = [], []
+        due: list[Event] = []
+        held: list[Event] = []
         for event in self._held + events:
             (held if CAUSES.get(event.kind) == "loss" and event.sample >= tracked else due).append(event)
         self._held = held
