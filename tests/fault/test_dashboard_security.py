@@ -207,13 +207,13 @@ SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spa
         ({"address": "192.168.1.5"}, "open-without-token", "serve.address"),
         ({"address": "0.0.0.0", "token_env": "token"}, "open-without-tls", "serve.address"),
         ({"address": "::", "viewer_token_env": "viewer"}, "open-without-tls", "serve.address"),
-        ({"address": "plant"}, "address-invalid", "serve.address"),
+        ({"address": "plant"}, "value-invalid", "serve.address"),
         ({"token_env": "short"}, "token-weak", "serve.token"),
         ({"token_env": "spaces"}, "token-weak", "serve.token"),
         ({"token_env": "token", "viewer_token_env": "token"}, "tokens-equal", "serve.viewer_token"),
         ({"certificate_file": "/no/such"}, "key-missing", "serve.certificate_file"),
-        ({"certificate_file": "/no/such", "key_file": "/no/such"}, "file-missing", "serve.certificate_file"),
-        ({"certificate_file": __file__, "key_file": __file__}, "certificate-unusable", "serve.certificate_file"),
+        ({"certificate_file": "/no/such", "key_file": "/no/such"}, "file-unreadable", "serve.certificate_file"),
+        ({"certificate_file": __file__, "key_file": __file__}, "file-unusable", "serve.certificate_file"),
     ],
 )
 def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], code: str, key: str) -> None:

@@ -16,10 +16,11 @@ GOOD = np.tile(multisine(Lines.parse("20:140:20", 4000, 200)), 5)
     ("excitation", "kind", "code"),
     [
         ([], SignalError, "empty"),
-        (np.full(100, 3.5), SignalError, "no-excitation"),
-        (np.full(100, np.nan), SignalError, "not-finite"),
-        (np.full(100, np.inf), SignalError, "not-finite"),
-        ([np.nan, 2.0, np.nan], SignalError, "no-excitation"),
+        (np.full(100, 3.5), SignalError, "channel-constant"),
+        (np.full(100, np.nan), SignalError, "channel-empty"),
+        (np.full(100, np.inf), SignalError, "channel-empty"),
+        ([np.nan, 2.0, np.nan], SignalError, "channel-constant"),
+        (np.arange(100.0), SignalError, "no-excitation"),
         (np.ones((3, 5)), UsageError, "wrong-shape"),
         (["a", "b"], UsageError, "unreadable"),
         ([1.0, 2.0, 1.0], SignalError, "too-short"),
@@ -41,7 +42,7 @@ def test_rate(rate_hz):
 def test_output():
     with refused(UsageError, "wrong-shape", samples=999, excitation_samples=1000):
         recognise(GOOD, 4000, GOOD[:-1])
-    with refused(SignalError, "no-excitation", role="output", value=0.0):
+    with refused(SignalError, "channel-constant", role="output", value=0.0):
         recognise(GOOD, 4000, np.zeros_like(GOOD))
 
 

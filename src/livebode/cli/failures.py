@@ -92,7 +92,7 @@ def _known(error: Exception) -> LivebodeError | None:
         return error
     if isinstance(error, MemoryError):
         return UsageError(
-            "out-of-memory", "there is not enough memory", "take a shorter window, fewer lines or a longer hop"
+            "too-large", "there is not enough memory", "take a shorter window, fewer lines or a longer hop"
         )
     if isinstance(error, OSError) and disk_full(error):
         why = error.strerror

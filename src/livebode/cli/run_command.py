@@ -131,7 +131,7 @@ def _serving(axes: Axes) -> ServeSection:
     for other, axis in axes.items():
         if axis.serve != first.serve:
             raise ConfigError(
-                "serve-differs",
+                "key-conflict",
                 f"axes {name} and {other} have different [serve] sections, but there is one dashboard",
                 "write [serve] once, outside [axes]",
                 key="serve",

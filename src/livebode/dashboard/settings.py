@@ -92,7 +92,7 @@ def _loopback(address: str) -> bool:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
         raise ConfigError(
-            "address-invalid",
+            "value-invalid",
             f"serve.address = {address!r} is not an IP address",
             "write for example 127.0.0.1, which is this computer alone",
             key="serve.address",
@@ -145,7 +145,7 @@ def _tls(section: ServeSection) -> tuple[Path, Path] | None:
     for path, name in ((certificate, "certificate_file"), (key, "key_file")):
         if not path.is_file():
             raise ConfigError(
-                "file-missing",
+                "file-unreadable",
                 f"there is no file {path} for serve.{name}",
                 "check the name",
                 key=f"serve.{name}",
@@ -155,7 +155,7 @@ def _tls(section: ServeSection) -> tuple[Path, Path] | None:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
     except (ssl.SSLError, OSError, ValueError) as error:
         raise ConfigError(
-            "certificate-unusable",
+            "file-unusable",
             f"{certificate} and {key} are not a certificate and its key in PEM: {error}",
             "convert them, and remove the password of the key",
             key="serve.certificate_file",

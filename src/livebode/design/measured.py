@@ -64,7 +64,7 @@ class MeasuredResponse(Algebra):
         outside = ~within(f, self.band_hz)
         if np.any(outside):
             raise GridError(
-                "not-measured",
+                "line-off",
                 f"{float(f[outside].flat[0]):g} Hz is outside {self.band_hz[0]:g} … {self.band_hz[1]:g} "
                 "Hz, where the response was measured",
                 "choose lines within, or measure further",

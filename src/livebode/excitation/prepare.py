@@ -53,7 +53,7 @@ def checked(samples: ArrayLike, name: str) -> Floats:
     known = x[np.isfinite(x)]
     if not known.size:
         raise SignalError(
-            "not-finite",
+            "channel-empty",
             f"the {name} has no finite sample among {x.size}",
             "choose another channel",
             role=name,
@@ -61,7 +61,7 @@ def checked(samples: ArrayLike, name: str) -> Floats:
         )
     if np.ptp(known) == 0:
         raise SignalError(
-            "no-excitation",
+            "channel-constant",
             f"the {name} is constant at {known[0]:g}",
             "choose the channel that carries the excitation; for hum in a recording "
             "without excitation, inspect it with lines",

@@ -13,14 +13,17 @@ class ConfigError(LivebodeError):
 
     area: ClassVar[str] = "config"
     codes: ClassVar[Mapping[str, str]] = {
-        "address-invalid": "The address to listen on is not an IP address.",
-        "certificate-unusable": "The certificate and the key do not belong together, or cannot be read.",
-        "file-missing": "A file that the configuration names does not exist.",
         "file-open-to-others": "A file with a secret can be read or changed by other users of the computer.",
-        "key-missing": "A key is needed and not given.",
+        "file-unreadable": "A file that the configuration names does not exist or cannot be read.",
+        "file-unusable": "A file that the configuration names has other content than it needs.",
+        "key-conflict": "Two keys contradict each other, or exclude each other.",
+        "key-missing": "A required key is not set.",
+        "key-unused": "A key has no meaning for this kind of source.",
         "open-without-tls": "The dashboard is to be open to other computers, but has no TLS.",
         "open-without-token": "The dashboard is to be open to other computers, but has no token.",
-        "serve-differs": "The axes of one configuration describe the dashboard differently.",
+        "secret-in-url": "A URL contains a user or password, which would be recorded.",
+        "secret-missing": "The environment variable that holds a secret is not set.",
         "token-weak": "A token is too short, or has letters that a token may not have.",
         "tokens-equal": "Operators and viewers have the same token.",
+        "value-invalid": "The value of a key is not of the form that the key needs.",
     }

@@ -13,6 +13,8 @@ class OutputError(LivebodeError):
 
     area: ClassVar[str] = "output"
     codes: ClassVar[Mapping[str, str]] = {
-        "exists": "The file exists already, and may be replaced only on request.",
-        "not-written": "The disk or its permissions prevented the output from being written.",
+        "exists": "The file or directory exists already, and is replaced only on request.",
+        "is-directory": "The path of the file is a directory.",
+        "not-written": "The system refuses to write the output.",
+        "too-large": "There are more values than can be written in this format.",
     }

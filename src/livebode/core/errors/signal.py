@@ -13,16 +13,20 @@ class SignalError(LivebodeError):
 
     area: ClassVar[str] = "signal"
     codes: ClassVar[Mapping[str, str]] = {
-        "channel-unknown": "A channel with this name does not exist.",
+        "channel-constant": "A channel never changes.",
+        "channel-empty": "A channel has no finite sample.",
+        "channel-unknown": "There is no channel of this name.",
         "empty": "There are no samples.",
         "layout-differs": "The spectra that the drive sends do not fit the settings of the tracker.",
-        "no-excitation": "The channel is constant or a straight line, so it carries no excitation.",
+        "no-excitation": "The channel is a straight line, so it carries no excitation.",
         "no-line-above-noise": "The excitation repeats, but none of its lines exceeds the noise.",
-        "not-finite": "Samples that are needed are not finite.",
+        "no-response-there": "No valid response is near this time.",
+        "no-valid-response": "No response is valid at any line.",
+        "not-finite": "A channel has samples that are not finite.",
         "not-periodic": "The excitation does not repeat.",
-        "rate-differs": "The samples have another rate than the lines.",
+        "rate-differs": "The samples have another rate than is needed.",
         "repeated": "Samples or spectra came twice.",
-        "too-few-lines": "The response is valid at too few lines.",
+        "too-few-lines": "The responses have too few valid lines.",
         "too-short": "There are too few samples.",
-        "wrong-quantity": "These are responses of another quantity than the one needed.",
+        "wrong-quantity": "The responses are of another quantity than the one that is needed.",
     }

@@ -13,14 +13,17 @@ class UsageError(LivebodeError):
 
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {
-        "conflict": "Two arguments exclude each other, or one does not fit the others.",
-        "missing": "An argument is needed and not given.",
-        "not-finite": "An argument with several numbers has one that is not finite, or only zeros.",
-        "not-one-of": "An argument is not one of the values that it may have.",
+        "conflict": "Two arguments, or an argument and what it is used with, do not go together.",
+        "duplicate": "A name is used twice where it may be used once.",
+        "invalid-name": "A name has a form that is not allowed.",
+        "missing": "A required argument is missing or empty.",
+        "not-finite": "An argument has a value that is not a finite number.",
+        "not-one-of": "An argument is not one of the allowed values.",
         "options": "The options of a command cannot be used as given.",
-        "out-of-memory": "There is not enough memory for these settings.",
-        "out-of-range": "A number is outside the range that the argument allows.",
-        "unknown-name": "A name in an argument is not among the names that exist.",
-        "unreadable": "A text or value cannot be read as what the argument takes.",
-        "wrong-shape": "An array has the wrong number of dimensions or values.",
+        "out-of-range": "The value is outside the range of the argument.",
+        "query-rejected": "The database rejects the SQL of a query.",
+        "too-large": "What the arguments ask for needs more memory than there is.",
+        "unknown-name": "There is nothing of this name; the allowed names are given.",
+        "unreadable": "The text or data of an argument cannot be read.",
+        "wrong-shape": "An array does not have the shape that is needed.",
     }
