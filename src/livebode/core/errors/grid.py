@@ -12,4 +12,6 @@ class GridError(LivebodeError):
     """A frequency is not a line of the grid, or data on different grids were to be combined."""
 
     area: ClassVar[str] = "grid"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "lines-differ": "The data are on different lines.",
+    }

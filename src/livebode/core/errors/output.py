@@ -12,4 +12,9 @@ class OutputError(LivebodeError):
     """A file that was asked for cannot be written."""
 
     area: ClassVar[str] = "output"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "exists": "The file exists already.",
+        "is-directory": "The path of the file is a directory.",
+        "not-written": "The system refuses to write the file.",
+        "too-large": "There are more values than can be written in this format.",
+    }
