@@ -54,7 +54,7 @@ def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) 
     with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is, and nothing of it can be read"):
         assert len(Run.open(run).responses()) == 0
     (run / "run.json").write_text("{")
-    with pytest.warns(DamageWarning, match=r"run\.json' is damaged \(it has no checksum\); its copy"):
+    with pytest.warns(DamageWarning, match=r"run\.json' is damaged: it has no checksum; its copy"):
         assert Run.open(run).events()
     (run / "run-copy.json").write_text("[]")
     assert "run.json' cannot be read" in refused(run)

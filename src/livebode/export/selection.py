@@ -42,7 +42,7 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
         if nearest is None or abs(found.time_s - time_s) < abs(nearest.time_s - time_s):
             nearest = found
     if nearest is None:
-        raise SignalError("no-valid-line", "no response has a valid line", "see the run's events for the reason")
+        raise SignalError("no-valid-response", "no response has a valid line", "see the run's events for the reason")
     reach_s = nearest.lines.window / nearest.lines.rate_hz / 2
     if abs(nearest.time_s - time_s) > reach_s:
         raise SignalError(

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, FitError, GridError, Lines, Parameters, RecordError, Responses
+from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
@@ -103,14 +103,14 @@ class Fitter:
 
         Raises
         ------
-        FitError
+        SignalError
             If the Responses are not of a plant.
         GridError
             If they are on other lines than those before.
         """
         if responses.quantity != "plant":
-            raise FitError(
-                "quantity",
+            raise SignalError(
+                "wrong-quantity",
                 f"a model is fitted to the plant, and these responses are of {responses.quantity!r}",
                 "track the plant",
                 quantity=responses.quantity,
@@ -183,7 +183,7 @@ class Fitter:
 
         Raises
         ------
-        RecordError
+        UsageError
             If the snapshot is damaged or belongs to other settings; the Fitter is then as it was.
         """
         try:
@@ -194,18 +194,19 @@ class Fitter:
             word, epsilon, delay = str(state["word"]), state["epsilon"], state["delay"]
             delay = {"taken": delay["taken"], "gains": [float(x) for x in delay["gains"]]}
         except (ValueError, KeyError, TypeError) as error:
-            raise RecordError(
-                "snapshot-damaged",
+            raise UsageError(
+                "unreadable",
                 f"the snapshot of {len(snapshot)} bytes is damaged ({error})",
                 "start without it",
-                size_bytes=len(snapshot),
+                argument="snapshot",
                 reason=str(error),
             ) from None
         if owner != self._identity():
-            raise RecordError(
-                "snapshot-differs",
+            raise UsageError(
+                "conflict",
                 "the snapshot belongs to a fitter with other settings",
                 "restore it into one with the same settings",
+                argument="snapshot",
             )
         self._seen, self._rows, self._start, self._next = seen, rows, start, after
         self._word, self._epsilon = word, epsilon
@@ -237,7 +238,7 @@ class Fitter:
             self._delay.begin(problem, may_free=DELAY not in self._fixed)
         elif lines != self._lines:
             raise GridError(
-                "lines-differ", "these responses are on other lines than those before", "take a new Fitter for them"
+                "not-alike", "these responses are on other lines than those before", "take a new Fitter for them"
             )
         return self._use
 

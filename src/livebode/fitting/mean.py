@@ -130,12 +130,12 @@ class RunningMean:
         """The mean so far; SignalError where no line was ever valid, or there is a reason against each."""
         newest, verdict = self._newest, self._verdict
         if newest is None or verdict is None:
-            raise SignalError("no-valid-line", "none of the responses is valid at any line", "track more periods")
+            raise SignalError("no-valid-response", "none of the responses is valid at any line", "track more periods")
         known = newest.valid[0] if self.averages else self._pair.count > 0
         valid = known & ~verdict.against
         if not valid.any():
             raise SignalError(
-                "no-valid-line",
+                "no-valid-response",
                 "no line is valid: what repeats with the excitation (distortion, hum of the mains, steps of a sensor) "
                 "is too large at each",
                 "see the run's events for the reason at each line",

@@ -174,7 +174,7 @@ class Fit:
     def _values(self) -> NDArray[np.float64]:
         if self.status != "ok":
             raise FitError(
-                "failed",
+                "not-fitted",
                 f"there is no fit to evaluate: {self.sentence}",
                 "give a fit that is valid",
                 status=self.status,

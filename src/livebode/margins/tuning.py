@@ -198,7 +198,7 @@ def _spread(fits: Parameters) -> Parameters:
     good = np.flatnonzero(fits.ok)
     if not good.size:
         raise FitError(
-            "failed",
+            "not-fitted",
             "no response could be fitted, so that there is no model to tune for",
             "see the status of the fits",
             rows=len(fits.ok),

@@ -63,7 +63,11 @@ def load(path: Path) -> Baseline:
         raise BaselineError("absent", f"there is no baseline {str(path)!r}", _LEARN, path=str(path)) from None
     except OSError as error:
         raise BaselineError(
-            "unreadable", f"{str(path)!r} cannot be read: {error.strerror}", path=str(path), reason=error.strerror
+            "unreadable",
+            f"{str(path)!r} cannot be read: {error.strerror}",
+            "check its permissions",
+            path=str(path),
+            reason=error.strerror,
         ) from None
     except ValueError as error:
         raise BaselineError(

@@ -48,7 +48,7 @@ def seconds_between(text: str) -> float:
     seconds = _plain(words)
     if seconds is None:
         raise UsageError(
-            "syntax",
+            "unreadable",
             f"false alarms {text!r} cannot be read",
             "write for example 'one in 30 days of motion', 'once a year', '2 per month' or a number of seconds",
             argument="false_alarms",

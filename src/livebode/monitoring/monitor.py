@@ -126,7 +126,7 @@ class Monitor:
         return snapshots.pack(parts, self._owner())
 
     def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a Monitor of the same baseline and settings; LivebodeError where it is another's."""
+        """Continue from a snapshot of a Monitor of the same baseline and settings; LivebodeError if it is not."""
         parts = snapshots.unpack(snapshot, self._owner())
         self._counts = {name: int(count) for name, count in parts["counts"].items()}
         if self._machine is not None:

@@ -64,7 +64,7 @@ def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
     """
     if fit.status != "ok":
         raise FitError(
-            "failed", f"there is no fit to simulate: {fit.sentence}", "give a fit that is valid", status=fit.status
+            "not-fitted", f"there is no fit to simulate: {fit.sentence}", "give a fit that is valid", status=fit.status
         )
     values, sigma = fit.parameters.value[0], fit.parameters.sigma[0]
     ticks = _parts(fit, values)[1] * fit.rate_hz

@@ -272,7 +272,7 @@ def _check(signals: dict[str, Floats], names: dict[str, str], count: int, lags: 
     for role, x in signals.items():
         if np.ptp(x) == 0:
             raise SignalError(
-                "constant",
+                "channel-constant",
                 f"channel {names[role]!r} is constant, which validates no model",
                 "record it while the excitation is on",
                 channel=names[role],

@@ -13,5 +13,5 @@ class GridError(LivebodeError):
 
     area: ClassVar[str] = "grid"
     codes: ClassVar[Mapping[str, str]] = {
-        "lines-differ": "The data are on different lines.",
+        "not-alike": "Responses on different lines were to be combined.",
     }

@@ -24,8 +24,6 @@ class RecordError(LivebodeError):
         "not-continuable": "The run has no whole journal to continue from.",
         "not-own-file": "A link, a pipe or a device is where a run has a regular file or a directory.",
         "not-written": "The system refuses to write the run.",
-        "snapshot-damaged": "The state that a run saved to continue from is damaged.",
-        "snapshot-differs": "The state that a run saved to continue from belongs to other settings.",
         "too-large": "A file of the run is larger than a run writes it.",
         "unexpected-content": "A file of the run is whole, but holds what a run does not write.",
         "unreadable": "The system or a library cannot read a file of the run.",

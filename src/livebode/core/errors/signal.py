@@ -13,11 +13,12 @@ class SignalError(LivebodeError):
 
     area: ClassVar[str] = "signal"
     codes: ClassVar[Mapping[str, str]] = {
-        "constant": "A signal is constant.",
+        "channel-constant": "A channel is constant.",
         "no-response-there": "No valid response is near this time.",
-        "no-valid-line": "No line of the responses is valid.",
-        "not-finite": "A signal has samples that are not finite.",
+        "no-valid-response": "No response is valid at any line.",
+        "not-finite": "A channel has samples that are not finite.",
         "rate-differs": "The samples have another rate than is needed.",
         "too-few-lines": "The responses have too few valid lines.",
         "too-short": "There are too few samples.",
+        "wrong-quantity": "The responses are of another quantity than the one that is needed.",
     }

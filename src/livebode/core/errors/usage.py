@@ -14,15 +14,15 @@ class UsageError(LivebodeError):
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {
         "conflict": "Two arguments, or an argument and what it is used with, do not go together.",
-        "duplicate-name": "A name is used already.",
+        "duplicated": "A name is used already.",
         "invalid-name": "A name has a form that is not allowed.",
         "missing": "An argument that is needed is missing or empty.",
         "not-finite": "An argument has a value that is not a finite number.",
         "not-one-of": "An argument is not one of the allowed values.",
         "out-of-range": "The value of an argument is outside its range.",
         "query-rejected": "The database rejects the SQL of a query.",
-        "syntax": "The text of an argument cannot be parsed.",
         "too-large": "What the arguments ask for needs more memory than there is.",
         "unknown-name": "There is nothing of this name; the allowed names are given.",
+        "unreadable": "The text or data of an argument cannot be read.",
         "wrong-shape": "An array does not have the shape that is needed.",
     }
