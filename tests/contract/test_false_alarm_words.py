@@ -30,13 +30,13 @@ def test_words_that_are_read(words: str, seconds: float) -> None:
     assert seconds_between(words) == pytest.approx(seconds)
 
 
-@pytest.mark.parametrize("words", ["", "never", "once in a while", "one in 3 parsecs"])
+@pytest.mark.parametrize("words", ["", "never", "once in a while", "0 per day", "one in 3 parsecs"])
 def test_words_that_cannot_be_read_are_refused(words: str) -> None:
     with refused(UsageError, "unreadable", argument="false_alarms", value=words):
         seconds_between(words)
 
 
-@pytest.mark.parametrize("words", ["0 per day", "-3", "nan", "0"])
+@pytest.mark.parametrize("words", ["-3", "nan", "0"])
 def test_a_time_that_is_not_positive_is_refused(words: str) -> None:
     with refused(UsageError, "out-of-range", argument="false_alarms", value=words):
         seconds_between(words)

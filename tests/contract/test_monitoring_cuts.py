@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from livebode.core import BaselineError, Block, InputError, UsageError
+from livebode.core import BaselineError, Block, LivebodeError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.simulation import TensionLoss
@@ -68,7 +68,7 @@ def test_a_gap_costs_its_windows_alone() -> None:
 
 def test_a_snapshot_of_another_monitor_is_refused() -> None:
     snapshot = Monitor(baseline(True), SETTINGS).snapshot()
-    with pytest.raises(InputError, match="other settings"):
+    with pytest.raises(LivebodeError, match="other settings"):
         Monitor(baseline(False), SETTINGS).restore(snapshot)
 
 

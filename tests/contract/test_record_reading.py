@@ -281,7 +281,7 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     [
         ("FROM responsess", "Did you mean"),
         ("SELEC 1", "syntax error"),
-        ("FROM parameters", "this run has events, single_events, responses, samples"),
+        ("FROM parameters", "query the tables of this run: events, single_events, responses, samples"),
         ("FROM read_csv('/etc/passwd')", "disabled by configuration"),
         ("COPY responses TO '{run}/x.csv'", "disabled by configuration"),
         ("ATTACH '{run}/x.db'", "disabled by configuration"),

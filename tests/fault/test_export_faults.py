@@ -43,8 +43,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "xarray"), "xarray is no file; in Python it is to_xarray"),
         (("--to", "control"), "control is no file; in Python it is mean_response(Run"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
-        (("--to", "csv", "--at", "nan"), "nan is not a moment"),
-        (("--to", "csv", "--at", "99"), "no valid response stands within half a window (0.05 s) of 99 s; the nearest"),
+        (("--to", "csv", "--at", "nan"), "nan is not finite; give seconds in the recording's clock"),
+        (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; take the nearest"),
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )

@@ -52,7 +52,7 @@ window = 20
 def test_a_channel_name_that_structured_text_forbids_is_refused_with_the_nearest_allowed_one(
     name: str, code: str, nearest: str
 ) -> None:
-    with refused(UsageError, code, value=name, kind="channel", nearest=nearest):
+    with refused(UsageError, code, value=name, element="channel", nearest=nearest):
         sliding_dft(LINES, ["u", name])
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from livebode.core import PID, FitError, InputError, Lines, Loop, Responses, UsageError
+from livebode.core import PID, FitError, Lines, LivebodeError, Loop, Responses, UsageError
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import Margins, OpenLoop, against_lines, margins
 from tests.loops import BELT, MODEL, Case, parameters, values
@@ -141,7 +141,7 @@ def test_what_cannot_be_is_refused() -> None:
         margins(parameters(BELT[np.newaxis]), Case(BELT).open, (140.0, 20.0))
     with refused(UsageError, "unknown-name", value="phase"):
         read(Case(BELT)).of("phase")
-    with pytest.raises(InputError, match="probability=1"):
+    with pytest.raises(LivebodeError, match="probability=1"):
         read(Case(BELT)).bound(1)
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from livebode.core import PID, Block, InputError, Loop, Responses, SignalError, SimulationError, UsageError
+from livebode.core import PID, Block, LivebodeError, Loop, Responses, SignalError, SimulationError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
@@ -141,5 +141,5 @@ def test_what_cannot_be_is_refused() -> None:
     filtered = PID(gain=0.2, derivative_time_s=0.1, rate_hz=4000)
     with refused(SimulationError, "loop-unsupported", key="loop.feedback"):
         MotionCorrection(settings(loop=Loop(filtered)), radius_m=0.019, driven_by="excitation")
-    with pytest.raises(InputError, match="no channel"):
+    with pytest.raises(LivebodeError, match="no channel"):
         MotionCorrection(settings(), radius_m=0.019).process(Block(np.zeros((1, 10)), ("w",), 4000.0))

@@ -67,7 +67,7 @@ def check_name(name: str, what: str) -> None:
             f"{what} {name!r} {problem} in Structured Text",
             f"take {nearest}",
             value=name,
-            kind=what,
+            element=what,
             nearest=nearest,
         )
 
@@ -87,7 +87,7 @@ def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> N
                 f"{what} {name!r} is {other} in Structured Text, which ignores case",
                 f"take {nearest}",
                 value=name,
-                kind=what,
+                element=what,
                 nearest=nearest,
             )
         before[low] = name
