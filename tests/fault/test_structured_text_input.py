@@ -45,8 +45,8 @@ window = 20
         ("x" * 33, "invalid-name", "x" * 32),
         ("φ", "invalid-name", "x"),
         ("", "invalid-name", "x"),
-        ("Count", "duplicated", "Count_1"),
-        ("U", "duplicated", "U_1"),
+        ("Count", "duplicate", "Count_1"),
+        ("U", "duplicate", "U_1"),
     ],
 )
 def test_a_channel_name_that_structured_text_forbids_is_refused_with_the_nearest_allowed_one(
@@ -67,9 +67,9 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
     ):
         with refused(UsageError, "invalid-name"):
             make()
-    with refused(UsageError, "duplicated", value="stamp"):
+    with refused(UsageError, "duplicate", value="stamp"):
         ring_block(["stamp"])
-    with refused(UsageError, "duplicated", value="fbring"):
+    with refused(UsageError, "duplicate", value="fbring"):
         Project(PERIOD, 2.0, LINES, ["w", "fbring"], "w", ["w"]).files()
 
 

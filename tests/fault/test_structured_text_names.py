@@ -57,12 +57,12 @@ def test_the_names_are_those_that_the_texts_declare() -> None:
 def test_a_name_of_mains_own_is_refused_in_every_role_and_case(name: str, role: str) -> None:
     for spelt in (name, name.lower(), name.upper(), name.swapcase()):
         for named in (False, True):
-            with refused(UsageError, "duplicated", value=spelt, element="signal"):
+            with refused(UsageError, "duplicate", value=spelt, element="signal"):
                 generated(SIGNALS | {role: spelt}, named=named)
         if role in ("excitation", "output"):
             channels = ["zw", "zu", spelt] if spelt != "sample" else ["zw", "zu", "sample"]
             excitation, tracked = (spelt, ["zu"]) if role == "excitation" else ("zw", [spelt])
-            with refused(UsageError, "duplicated", value=spelt):
+            with refused(UsageError, "duplicate", value=spelt):
                 Project(PERIOD, 2.0, LINES, channels, excitation, tracked).files()
 
 

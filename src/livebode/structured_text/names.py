@@ -83,7 +83,7 @@ def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> N
             other = f"the same as {before[low]!r}" if low in before else "a name that the generated text needs itself"
             nearest = as_name(name, [*own, *names])
             raise UsageError(
-                "duplicated",
+                "duplicate",
                 f"{what} {name!r} is {other} in Structured Text, which ignores case",
                 f"take {nearest}",
                 value=name,

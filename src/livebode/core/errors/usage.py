@@ -14,12 +14,12 @@ class UsageError(LivebodeError):
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {
         "conflict": "Two arguments, or an argument and what it is used with, do not go together.",
-        "duplicated": "A name is used already.",
+        "duplicate": "A name is used twice where it may be used once.",
         "invalid-name": "A name has a form that is not allowed.",
-        "missing": "An argument that is needed is missing or empty.",
+        "missing": "A required argument is missing or empty.",
         "not-finite": "An argument has a value that is not a finite number.",
         "not-one-of": "An argument is not one of the allowed values.",
-        "out-of-range": "The value of an argument is outside its range.",
+        "out-of-range": "The value is outside the range of the argument.",
         "query-rejected": "The database rejects the SQL of a query.",
         "too-large": "What the arguments ask for needs more memory than there is.",
         "unknown-name": "There is nothing of this name; the allowed names are given.",
