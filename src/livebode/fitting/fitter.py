@@ -238,7 +238,11 @@ class Fitter:
             self._delay.begin(problem, may_free=DELAY not in self._fixed)
         elif lines != self._lines:
             raise GridError(
-                "not-alike", "these responses are on other lines than those before", "take a new Fitter for them"
+                "not-alike",
+                "these responses are on other lines than those before",
+                "take a new Fitter for them",
+                bins=list(lines.bins),
+                window=lines.window,
             )
         return self._use
 

@@ -59,7 +59,12 @@ class Fit:
         found, cost = scan(rows.value[order], rows.weight[order], self.z, self.rate_hz)
         good = np.isfinite(cost) & (cost <= 10 * np.median(cost))
         if np.count_nonzero(good) < 1:
-            raise FitError("no-model", "no two masses fit these responses", "check the lines, the signals and the loop")
+            raise FitError(
+                "no-model",
+                "no two masses fit these responses",
+                "check the lines, the signals and the loop",
+                rows=len(chosen),
+            )
         found, at = found[good], rows.position_m[order][good]
         low, high = float(rows.position_m.min()), float(rows.position_m.max())
         found[:, :2] = np.median(found[:, :2], axis=0)

@@ -112,7 +112,9 @@ def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
         if segment not in Manifest.read(run).segments:
             return None  # it was removed since we looked
         why = "it is gone"
-    except (RecordError, OSError) as error:
+    except RecordError as error:
+        why = error.message
+    except OSError as error:
         why = str(error)
     lost = f"{segment.rows} rows of {segment.table} of samples {segment.first_sample} to {segment.last_sample}"
     details = {

@@ -34,6 +34,7 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
             raise RecordError(
                 "damaged",
                 f"it has {status.st_size} bytes, where the manifest says {segment.size_bytes}",
+                "restore it from a backup",
                 path=str(run / segment.name),
                 size_bytes=status.st_size,
             )
@@ -41,14 +42,21 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
     key = (segment.sha256, status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     if key not in _verified:
         if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
-            raise RecordError("damaged", "its checksum is not that of the manifest", path=str(run / segment.name))
+            raise RecordError(
+                "damaged",
+                "its checksum is not that of the manifest",
+                "restore it from a backup",
+                path=str(run / segment.name),
+            )
         if len(_verified) >= _VERIFIED_MAX:
             _verified.clear()
         _verified.add(key)
     try:
         file = pq.ParquetFile(pa.BufferReader(data))
     except pa.ArrowException as error:
-        raise RecordError("damaged", f"it is not Parquet ({error})", path=str(run / segment.name)) from None
+        raise RecordError(
+            "damaged", f"it is not Parquet ({error})", "restore it from a backup", path=str(run / segment.name)
+        ) from None
     _check_size(file.metadata, segment)
     return file
 
@@ -58,6 +66,7 @@ def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
         raise RecordError(
             "damaged",
             f"it has {about.num_rows} rows, where the manifest says {segment.rows}",
+            "restore it from a backup",
             path=segment.name,
             rows=about.num_rows,
         )
@@ -66,6 +75,7 @@ def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
         raise RecordError(
             "too-large",
             f"its {about.num_rows} rows are more than a segment holds",
+            "move it away",
             path=segment.name,
             rows=about.num_rows,
         )
