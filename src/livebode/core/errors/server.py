@@ -9,7 +9,7 @@ from livebode.core.errors.base import LivebodeError
 
 
 class ServerError(LivebodeError):
-    """The dashboard cannot be served or reached, or cannot answer a request."""
+    """The dashboard cannot be served or reached."""
 
     area: ClassVar[str] = "server"
     codes: ClassVar[Mapping[str, str]] = {

@@ -15,6 +15,7 @@ class SimulationError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "diverged": "The state of the simulated machine is not finite, or its cart left the machine.",
         "fmu-unusable": "The FMU cannot be read, started, or simulated on this computer.",
+        "loop-unsupported": "A loop of this form cannot be simulated.",
         "parameters-impossible": "No machine has these parameters together.",
         "stroke-beyond-machine": "The stroke with its overrun reaches beyond the pulleys.",
         "unstable": "The closed loop is unstable.",
