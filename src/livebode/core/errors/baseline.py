@@ -12,4 +12,11 @@ class BaselineError(LivebodeError):
     """A baseline cannot be learned, read, or compared with this run."""
 
     area: ClassVar[str] = "baseline"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "covariates-without-machine": "Covariates need a model of the moving machine, and the runs give none.",
+        "no-runs": "There is no run to learn from.",
+        "run-averaged": "A run's responses contain those before them, so that they are not independent.",
+        "run-not-of-machine": "A run does not come from `livebode run` and so has no description of its machine.",
+        "run-repeated": "Two of the runs contain the same samples.",
+        "runs-differ": "The runs have different lines, signals or options.",
+    }

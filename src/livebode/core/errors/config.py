@@ -12,4 +12,24 @@ class ConfigError(LivebodeError):
     """A configuration (axis.toml, experiment.toml) cannot be read, or has a key or value that cannot be used."""
 
     area: ClassVar[str] = "config"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "auto-needs-recording": 'Lines or window are "auto", but there is no excitation or recording to find them in.',
+        "axes-invalid": "The table [axes] is not a table of axes, or has too many of them.",
+        "axis-name-invalid": "An axis has a name that cannot be the name of its directory.",
+        "change-needs-restart": "A changed key cannot be applied while the axis runs.",
+        "change-too-early": "A changed configuration cannot be checked before the live source has sent samples.",
+        "conflict": "Two keys contradict each other, or exclude each other.",
+        "file-missing": "There is no such file.",
+        "file-too-long": "The file is longer than a configuration may be.",
+        "file-unreadable": "The file cannot be read.",
+        "incomplete": "A key needs another one that is missing.",
+        "key-missing": "A required key is missing.",
+        "key-unknown": "There is no such key.",
+        "needs-samples": "A key needs samples, and the drive sends spectra.",
+        "nested-too-deeply": "Values are nested deeper than any configuration has them.",
+        "not-text": "The file is not text.",
+        "not-toml": "The text is not TOML.",
+        "rate-mismatch": "A rate contradicts the rate of the samples or another key.",
+        "value-invalid": "The value of a key has the wrong type, is out of range or cannot be used.",
+        "value-mismatch": "The value of a key differs from what the source, the design or the run has.",
+    }

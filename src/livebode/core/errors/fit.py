@@ -12,4 +12,6 @@ class FitError(LivebodeError):
     """A model cannot be fitted, or what follows from a fit (margins, validation) cannot be computed."""
 
     area: ClassVar[str] = "fit"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "not-fitted": "No model could be fitted, so that what follows from a fit is missing.",
+    }

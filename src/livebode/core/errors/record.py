@@ -12,4 +12,12 @@ class RecordError(LivebodeError):
     """A run's directory cannot be read, written or continued."""
 
     area: ClassVar[str] = "record"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "baseline-differs": "The unfinished run was started with another baseline, or with none.",
+        "changed-meanwhile": "The run's record changed while its source was opened.",
+        "configuration-differs": "The unfinished run was started with another configuration.",
+        "configuration-invalid": "The configuration in run.json is not what a run writes.",
+        "not-removable": "The run cannot be removed.",
+        "not-tracked": "The run does not name the channels that are needed.",
+        "write-failed": "A file of the run cannot be written.",
+    }

@@ -12,4 +12,7 @@ class RecordingError(LivebodeError):
     """A file with recorded samples cannot be read, or is not what was asked for."""
 
     area: ClassVar[str] = "recording"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "file-unreadable": "The file cannot be read.",
+        "not-an-excitation": "The file is not an excitation that `livebode design` wrote.",
+    }

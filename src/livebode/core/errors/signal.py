@@ -12,4 +12,18 @@ class SignalError(LivebodeError):
     """The samples do not fit what was asked: no excitation, no period, too short, channels with the wrong role."""
 
     area: ClassVar[str] = "signal"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "channel-constant": "A channel never changes.",
+        "channel-empty": "A channel has no finite sample.",
+        "channel-unknown": "There is no channel of this name.",
+        "line-not-excited": "The excitation has no power at a line.",
+        "no-clean-samples": "There is no stretch without gaps and non-finite samples that is long enough.",
+        "no-samples": "The recording has no samples.",
+        "no-valid-response": "No response of the whole run is valid.",
+        "not-periodic": "The excitation does not repeat from window to window.",
+        "pause-too-short": "There is no stretch without excitation that is long enough to look for hum.",
+        "role-shared": "Two roles that the estimator needs apart have the same channel.",
+        "role-wrong": "The samples of a channel contradict the role that it was given.",
+        "too-short": "The recording has fewer samples than the window.",
+        "wrong-period": "The excitation repeats after another number of samples than the window.",
+    }
