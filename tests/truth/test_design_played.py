@@ -136,7 +136,7 @@ def test_a_design_from_a_run_goes_on_as_the_run_was_described(runs):
         ('run = "run-theta"', "output is a position, and its loop as described acts on a velocity"),
         ('run = "run-theta"\noutput = "velocity"', "plant is in rad/(N m); leave it out"),
         ('run = "run-speed"\noutput = "position"', "plant is in rad/s/(N m); leave it out"),
-        ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "is no torque"),
+        ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "is not a torque"),
     ],
 )
 def test_a_run_that_the_loop_does_not_fit_is_refused(runs, measured, words):

@@ -139,11 +139,11 @@ def test_recordings_beside_each_other(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("axes", "says"),
     [
-        ("axes = 3", "no table of axes"),
-        ("[axes]", "no table of axes"),
-        ('[axes."../x"]\nsource.url = "udp://h:1"', "names a directory"),
-        ('[axes.x-2]\nsource.url = "udp://h:1"', "take 'x_2'"),
-        ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "nothing but capitals"),
+        ("axes = 3", "not a table of axes"),
+        ("[axes]", "not a table of axes"),
+        ('[axes."../x"]\nsource.url = "udp://h:1"', "the name of a directory"),
+        ('[axes.x-2]\nsource.url = "udp://h:1"', "rename it 'x_2'"),
+        ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "differ only in capitals"),
         ('[axes.x]\nsource.url = "udp://h:1"\nlines.windw = 3', "axis x: there is no setting 'lines.windw'"),
         ("[axes.x]\nlines.window = 3", "axis x: 'source' is missing"),
         (

@@ -225,11 +225,7 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
     resolution = Fraction(rate_hz) / window
     position = line / resolution
     near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
-    nearest = (
-        f"take the nearest line{'s' * (len(near) > 1)}, {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
-        if near
-        else "take other lines"
-    )
+    nearest = f"take the nearest line{'s' * (len(near) > 1)}, {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
     # A rate of many digits must not hide the window; a line near 0 must not become 0, which every window fits.
     shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in wanted]
     unit = lcm(*(share.denominator for share in shares))

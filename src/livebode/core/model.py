@@ -98,7 +98,9 @@ def as_model(thing: object) -> Model:
         raise TypeError(f"{thing!r} has no frequency response; give a Model, a number or a python-control system")
     if getattr(thing, "issiso", lambda: True)() is False:
         raise UsageError(
-            "wrong-shape", f"{thing!r} has several inputs or outputs", "give one of its transfer functions"
+            "wrong-shape",
+            f"the {type(thing).__name__} has several inputs or outputs",
+            "give one of its transfer functions",
         )
     if thing.dt is True:
         raise UsageError(
