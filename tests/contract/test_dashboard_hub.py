@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from examples.closed_loop import RATE_HZ
-from livebode.core import Block, Event, InputError, Lines, Responses, UsageError
+from livebode.core import Block, Event, InputError, Lines, Responses
 from livebode.dashboard import Hub
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, VALUES_MAX
@@ -27,7 +27,6 @@ from livebode.session.axis import LoopSection
 from livebode.sources.live import LiveBlock
 from tests.dashboards import LINES, LOOP, Watched
 from tests.responses import any_responses, made
-from tests.support.errors import refused
 
 
 def decoded(data: bytes) -> list[dict[str, object]]:
@@ -101,7 +100,7 @@ def test_what_cannot_be_shown_says_why() -> None:
     quantities = Quantities("plant", "rad/s", LINES, None)
     assert quantities.why_not("plant") == ""
     assert "describe its controllers" in quantities.why_not("open loop")
-    with refused(UsageError, "missing", argument="feedback"):
+    with pytest.raises(InputError, match="describe its controllers"):
         quantities.of_responses(made(1, LINES), "sensitivity")
 
 

@@ -28,7 +28,7 @@ def test_the_windows_that_would_fit_do_fit(window: int, tenths: int) -> None:
     try:
         assert Lines.parse(str(frequency), rate_hz, window).frequency_hz[0] == pytest.approx(frequency, rel=1e-5)
     except GridError as error:
-        if error.code == "grid.beyond-nyquist":
+        if error.code == "grid.above-nyquist":
             assert frequency >= rate_hz / 2 or frequency < rate_hz / window
         else:
             check_proposals(error, frequency)
@@ -68,9 +68,9 @@ def test_ranges_are_inclusive_and_commas_join(text: str, bins: tuple[int, ...]) 
         ("40:20:5", UsageError, "out-of-range", {"value": "40:20:5"}),
         ("1/0", UsageError, "unreadable", {"value": "1/0"}),
         ("nan", UsageError, "unreadable", {"value": "nan"}),
-        ("0", GridError, "beyond-nyquist", {"frequency_hz": 0.0, "nyquist_hz": 2000.0}),
-        ("-20", GridError, "beyond-nyquist", {"frequency_hz": -20.0}),
-        ("2000", GridError, "beyond-nyquist", {"frequency_hz": 2000.0}),
+        ("0", GridError, "above-nyquist", {"frequency_hz": 0.0, "nyquist_hz": 2000.0}),
+        ("-20", GridError, "above-nyquist", {"frequency_hz": -20.0}),
+        ("2000", GridError, "above-nyquist", {"frequency_hz": 2000.0}),
         ("10:1990:0.00001", UsageError, "too-many", {"argument": "lines", "limit": 100_000}),
         ("20,20", GridError, "line-duplicated", {"bin": 2, "frequency_hz": 20.0}),
         ("25", GridError, "line-off", {"nearest_hz": [20.0, 30.0], "windows": [320, 480]}),

@@ -44,7 +44,7 @@ def log(tmp_path: Path) -> Path:
         ((*JOINT, "--rate", 2000, *GRID), ("2000 Hz", "1000")),
         ((*JOINT, "--rate", -1, *GRID), ("source.rate_hz = -1", "greater than 0")),
         ((*JOINT, "--lines", "600", "--window", 100), ("600 Hz", "Nyquist frequency 500 Hz")),
-        ((*JOINT, "--lines", "55", "--window", 100), ("55 Hz", "lines, 50 and 60 Hz", "a window of 200 samples")),
+        ((*JOINT, "--lines", "55", "--window", 100), ("55 Hz", "lines are 50 and 60 Hz", "a window of 200 samples")),
         ((*JOINT, "--lines", "fifty", "--window", 100), ("'fifty'", "20:140:20")),
         ((*JOINT, "--lines", "50,50", "--window", 100), ("bin 5 (50 Hz)", "duplicated")),
         ((*JOINT, "--lines", "50", "--window", 5000), ("2000 samples", "window of 5000")),

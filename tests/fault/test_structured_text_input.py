@@ -142,7 +142,7 @@ def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:
         (('excitation = "w"', ""), ("--rate", 1000), "signals.excitation is missing"),
         (("window = 20", ""), ("--rate", 1000), "lines or window are 'auto'"),
         (('"100, 200"', '"100, 600"'), ("--rate", 1000), "600 Hz is not between 0 and the Nyquist frequency 500 Hz"),
-        (('"100, 200"', '"110"'), ("--rate", 1000), "nearest lines, 100 and 150 Hz"),
+        (('"100, 200"', '"110"'), ("--rate", 1000), "nearest lines are 100 and 150 Hz"),
         (('output = "y"', 'output = "z"'), ("--rate", 1000), "there is no channel 'z'; known here: w, y"),
         (('"w [N m]"', '"two words"'), ("--rate", 1000), "there is no channel 'w'"),
         (("", ""), ("--rate", 1000, "--limit", 0.1), "exceeds limit=0.1; scale it by at most"),

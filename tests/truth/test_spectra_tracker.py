@@ -12,25 +12,10 @@ from hypothesis import strategies as st
 
 from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive
 from examples.kernel_drive import KernelDrive
-from livebode.core import (
-    PID,
-    Block,
-    Cascade,
-    Channel,
-    GridError,
-    InputError,
-    Lines,
-    LivebodeError,
-    Loop,
-    Responses,
-    Spectra,
-    SpectraLayout,
-    UsageError,
-)
+from livebode.core import PID, Block, Cascade, Channel, InputError, Lines, Loop, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
-from tests.support.errors import refused
 
 WINDOW, PERIODS = 400, 12
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=WINDOW)
@@ -255,26 +240,3 @@ def test_samples_and_other_layouts_are_refused(record: Block) -> None:
     other = SpectraTracker(described(20), layout(quiet=()))
     with pytest.raises(InputError, match="other settings"):
         other.restore(tracker.snapshot())
-
-
-@pytest.mark.parametrize(
-    ("options", "kind", "code", "facts"),
-    [
-        ({"signals": ()}, UsageError, "missing", {"argument": "signals"}),
-        ({"signals": (Channel("y"), Channel("y", "m"))}, UsageError, "duplicated", {"argument": "signals"}),
-        ({"values": (Channel("y", "deg"),)}, UsageError, "duplicated", {"argument": "signals"}),
-        ({"window": 2}, GridError, "window-out-of-range", {"window": 2}),
-        ({"hop": 30}, GridError, "hop-off", {"hop": 30, "window": 400}),
-        ({"hop": 0}, GridError, "hop-off", {"hop": 0}),
-        ({"lines": ()}, GridError, "no-line", {}),
-        ({"lines": (4, 2)}, GridError, "bins-unordered", {"bins": [4, 2]}),
-        ({"lines": (2, 200)}, GridError, "beyond-nyquist", {"bin": 200, "window": 400}),
-        ({"quiet": (2,)}, GridError, "line-duplicated", {"bin": 2}),
-        ({"subtracted": (1.0,)}, UsageError, "wrong-shape", {"argument": "subtracted"}),
-        ({"subtracted": (1.0, float("nan"), 0.0)}, UsageError, "not-finite", {"argument": "subtracted"}),
-    ],
-)
-def test_layouts_that_cannot_be_are_refused(options: dict, kind: type[LivebodeError], code: str, facts: dict) -> None:
-    given = {"signals": SIGNALS, "values": (), "window": 400, "hop": 20, "lines": (2, 4)} | options
-    with refused(kind, code, **facts):
-        SpectraLayout(**given)

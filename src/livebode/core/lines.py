@@ -75,7 +75,7 @@ class Lines:
         for k in every:
             if not 0 < 2 * k < self.window:
                 raise GridError(
-                    "beyond-nyquist",
+                    "above-nyquist",
                     f"bin {k} ({k * self.resolution_hz:g} Hz) is not between 0 and the Nyquist frequency "
                     f"{self.rate_hz / 2:g} Hz",
                     "choose lines between them",
@@ -106,8 +106,8 @@ class Lines:
         >>> Lines.parse("25", rate_hz=4000, window=400)
         Traceback (most recent call last):
         ...
-        livebode.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; \
-take the nearest lines, 20 and 30 Hz, or windows of 320 or 480 samples, which fit
+        livebode.GridError: the line 25 Hz is not on the 10 Hz grid of window=400 at 4000 Hz; the \
+nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         """
         check_window(window, rate_hz)
         wanted = [f for item in text.split(",") for f in _frequencies(item.strip(), text, rate_hz, window)]
@@ -116,7 +116,7 @@ take the nearest lines, 20 and 30 Hz, or windows of 320 or 480 samples, which fi
         for f, k in zip(wanted, bins):
             if not 0 < f < Fraction(rate_hz) / 2:
                 raise GridError(
-                    "beyond-nyquist",
+                    "above-nyquist",
                     f"the line {float(f):g} Hz is not between 0 and the Nyquist frequency {rate_hz / 2:g} Hz",
                     "choose lines between them",
                     frequency_hz=float(f),
@@ -225,7 +225,9 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
     resolution = Fraction(rate_hz) / window
     position = line / resolution
     near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
-    nearest = f"take the nearest line{'s' * (len(near) > 1)}, {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
+    nearest = (
+        f"the nearest {'lines are' if len(near) > 1 else 'line is'} {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
+    )
     # A rate of many digits must not hide the window; a line near 0 must not become 0, which every window fits.
     shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in wanted]
     unit = lcm(*(share.denominator for share in shares))
@@ -233,11 +235,11 @@ def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: in
     if unit <= 100 * window:  # a longer one is of no use
         fitting = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
     which = "windows" if len(fitting) > 1 else "a window"
-    windows = f", or {which} of {' or '.join(map(str, fitting))} samples, which fit{'s' * (len(fitting) == 1)}"
+    windows = f", and {which} of {' or '.join(map(str, fitting))} samples would fit"
     return GridError(
         "line-off",
         f"the line {float(line):g} Hz is not on the {float(resolution):g} Hz grid of window={window} at {rate_hz:g} Hz",
-        nearest + (windows if fitting else "; no window of a useful length fits them all"),
+        nearest + (windows if fitting else ", and no window of a useful length would fit them all"),
         frequency_hz=float(line),
         resolution_hz=float(resolution),
         window=window,

@@ -132,7 +132,7 @@ class SpectraLayout:
         for k in self.bins:
             if not 0 < 2 * k < self.window:
                 raise GridError(
-                    "beyond-nyquist",
+                    "above-nyquist",
                     f"bin {k} is not between 0 and half the window of {self.window}",
                     "choose bins between them",
                     bin=k,

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from livebode.core import PID, Cascade, ConfigError, Gain, LivebodeError, Loop, Model, PositionPD, Quantity, counted
+from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted
 from livebode.session.toml_file import one_line, read_table, shortened
 from livebode.sources.live import SourceSettings, checked_address
 
@@ -294,14 +294,8 @@ def _first_of(error: ValidationError) -> ConfigError:
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
     secret = _MAY_BE_SECRET & {str(part) for part in first["loc"]}
     value = "what it holds" if secret else shortened(first["input"])
-    facts = {"key": place} | ({} if secret else {"value": value}) | cause_of(first)
+    facts = {"key": place} | ({} if secret else {"value": value})
     return ConfigError("value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", **facts)
-
-
-def cause_of(first: Any) -> dict[str, str]:
-    """The code of the LivebodeError that a validator raised, as a fact; nothing where pydantic itself refused."""
-    inner = first.get("ctx", {}).get("error")
-    return {"cause": inner.code} if isinstance(inner, LivebodeError) else {}
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:

@@ -104,7 +104,7 @@ def design_experiment(
             _put(partial, there, aside=Path(folder) / "before")
     except OSError as error:
         raise OutputError(
-            "write-failed",
+            "not-written",
             f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there",
             path=str(directory),
         ) from None

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.core import ConfigError
 from livebode.design import Bearable, Machine, Wish, belt_machine
-from livebode.session.axis import LoopSection, cause_of, nearest
+from livebode.session.axis import LoopSection, nearest
 from livebode.session.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.session.toml_file import shortened
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
@@ -231,13 +231,13 @@ def _first_of(error: ValidationError) -> ConfigError:
         return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
     if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
-    return _unusable(place, first["input"], first)
+    return _unusable(place, first["input"], first["msg"])
 
 
-def _unusable(key: str, value: Any, first: Any) -> ConfigError:
+def _unusable(key: str, value: Any, why: str) -> ConfigError:
     shown = shortened(value)
-    message = f"{key} = {shown} is not usable: {_plain(first['msg'])}"
-    return ConfigError("value-invalid", message, key=key, value=shown, **cause_of(first))
+    message = f"{key} = {shown} is not usable: {_plain(why)}"
+    return ConfigError("value-invalid", message, key=key, value=shown)
 
 
 def _plain(why: str) -> str:
@@ -256,7 +256,7 @@ def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
         try:
             TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
         except ValidationError as error:
-            raise _unusable(f"{section}.{name}", value, error.errors()[0]) from None
+            raise _unusable(f"{section}.{name}", value, error.errors()[0]["msg"]) from None
     return kind(**given)
 
 

@@ -224,7 +224,7 @@ class Tracking:
             self._step(partial(self._follower.process, block))
             self.to.progress(self._follower.counts["samples"], self.source.samples)
         if not self._tally.stop:
-            raise SignalError("no-samples", "the recording has no samples", "choose another one")
+            raise SignalError("empty", "the recording has no samples", "choose another one")
 
     def _watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """The same Blocks, which are checked and monitored on the way."""

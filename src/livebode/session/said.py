@@ -31,7 +31,7 @@ def said(summary: dict[str, Any]) -> dict[str, Any]:
             wrong = error.errors()[0]
             place = ".".join(map(str, (name, *wrong["loc"])))
             raise RecordError(
-                "configuration-invalid",
+                "unexpected-content",
                 f"the configuration in run.json is not what a run writes ({place}: {wrong['msg']})",
                 "check who changed the file",
                 key=place,

@@ -219,7 +219,7 @@ class SegmentedRun:
                 os.replace(picture, self.path / picture.name)
         except OSError as error:
             raise RecordError(
-                "write-failed",
+                "not-written",
                 f"the pictures could not be written to {str(self.path)!r}: {why(error)}",
                 path=str(self.path),
             ) from None

@@ -13,7 +13,7 @@ class GridError(LivebodeError):
 
     area: ClassVar[str] = "grid"
     codes: ClassVar[Mapping[str, str]] = {
-        "beyond-nyquist": "A line is not between 0 and half the rate.",
+        "above-nyquist": "A frequency is not between 0 and half the rate.",
         "bin-not-sent": "A bin is needed that the drive does not send.",
         "bins-unordered": "The bins of spectra are not ascending.",
         "hop-off": "The hop of spectra neither divides the window nor is a multiple of it.",

@@ -13,7 +13,7 @@ class OutputError(LivebodeError):
 
     area: ClassVar[str] = "output"
     codes: ClassVar[Mapping[str, str]] = {
-        "exists": "The directory exists already.",
+        "exists": "The file or directory exists already, and is replaced only on request.",
         "not-replaceable": "The directory contains something else than an earlier output, and is not replaced.",
-        "write-failed": "A file or directory cannot be written.",
+        "not-written": "The system refuses to write the output.",
     }

@@ -16,8 +16,8 @@ class RecordError(LivebodeError):
         "baseline-differs": "The unfinished run was started with another baseline, or with none.",
         "changed-meanwhile": "The run's record changed while its source was opened.",
         "configuration-differs": "The unfinished run was started with another configuration.",
-        "configuration-invalid": "The configuration in run.json is not what a run writes.",
         "not-removable": "The run cannot be removed.",
         "not-tracked": "The run does not name the channels that are needed.",
-        "write-failed": "A file of the run cannot be written.",
+        "not-written": "The system refuses to write the run.",
+        "unexpected-content": "A file of the run is whole, but contains what a run does not write.",
     }
