@@ -196,6 +196,7 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
             f"whole and {counts['spike']} contain a spike",
             "check the drive's samples, or let it use a shorter window",
+            reason="windows-not-whole",
             responses=responses,
             window=window,
         )
@@ -208,6 +209,7 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"none of {responses} responses is valid, and lines are invalid by what repeats with the excitation: "
             f"{lines}",
             "see events.jsonl for what to do at each",
+            reason="lines-invalid",
             responses=responses,
             window=window,
         )
@@ -218,6 +220,7 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             f"none of {responses} responses is valid: no stretch of {window} samples has excitation and is free of the "
             f"{', '.join(spoiled)}",
             "choose a shorter window, or look at the recording with `livebode inspect`",
+            reason="samples-spoiled",
             responses=responses,
             window=window,
         )
@@ -226,6 +229,7 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
         f"none of {responses} responses is valid, although no sample is missing or left out: no window of {window} "
         "samples has excitation at its lines",
         "choose other lines, or look at the recording with `livebode inspect`",
+        reason="no-excitation",
         responses=responses,
         window=window,
     )
