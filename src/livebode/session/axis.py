@@ -295,7 +295,9 @@ def _first_of(error: ValidationError) -> ConfigError:
     secret = _MAY_BE_SECRET & {str(part) for part in first["loc"]}
     value = "what it holds" if secret else shortened(first["input"])
     facts = {"key": place} | ({} if secret else {"value": value})
-    return ConfigError("value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", **facts)
+    return ConfigError(
+        "value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", "correct it", **facts
+    )
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:

@@ -36,7 +36,12 @@ def read_designed(path: Path) -> Waveform:
         return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else str(error)
-        raise RecordingError("file-unreadable", f"{str(path)!r} cannot be read: {why}", path=str(path)) from None
+        raise RecordingError(
+            "file-unreadable",
+            f"{str(path)!r} cannot be read: {why}",
+            "check the path and its permissions",
+            path=str(path),
+        ) from None
     except (ValueError, KeyError, TypeError, AttributeError, EOFError, ArithmeticError, zipfile.BadZipFile, zlib.error):
         raise RecordingError(
             "not-an-excitation",

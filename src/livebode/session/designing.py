@@ -106,6 +106,7 @@ def design_experiment(
         raise OutputError(
             "not-written",
             f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there",
+            "check the disk and its permissions",
             path=str(directory),
         ) from None
     return Designed(design, directory, files, left_out)

@@ -61,7 +61,10 @@ class Experiment(BaseModel):
             raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
         except OSError as error:
             raise ConfigError(
-                "file-unreadable", f"{str(path)!r} cannot be read: {error.strerror}", path=str(path)
+                "file-unreadable",
+                f"{str(path)!r} cannot be read: {error.strerror}",
+                "check the path and its permissions",
+                path=str(path),
             ) from None
         except UnicodeDecodeError:
             raise ConfigError(
@@ -237,7 +240,7 @@ def _first_of(error: ValidationError) -> ConfigError:
 def _unusable(key: str, value: Any, why: str) -> ConfigError:
     shown = shortened(value)
     message = f"{key} = {shown} is not usable: {_plain(why)}"
-    return ConfigError("value-invalid", message, key=key, value=shown)
+    return ConfigError("value-invalid", message, "correct it", key=key, value=shown)
 
 
 def _plain(why: str) -> str:

@@ -126,7 +126,12 @@ def loop_of_run(
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
     """The report of a fit, and of the responses that it is of."""
     if fit.status != "ok":
-        raise FitError("not-fitted", f"margins need a fit, and there is none: {fit.sentence}", models=[fit.model.name])
+        raise FitError(
+            "not-fitted",
+            f"margins need a fit, and there is none: {fit.sentence}",
+            "fit another model",
+            models=[fit.model.name],
+        )
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
     fits, mean = fit.parameters, mean_response(responses)
     fitted_to = fit.measured if fit.measured is not None else mean

@@ -221,6 +221,7 @@ class SegmentedRun:
             raise RecordError(
                 "not-written",
                 f"the pictures could not be written to {str(self.path)!r}: {why(error)}",
+                "check the disk and its permissions",
                 path=str(self.path),
             ) from None
         finally:
@@ -293,7 +294,10 @@ def make_way(path: Path) -> None:
         remove(path)
     except OSError as error:
         raise RecordError(
-            "not-removable", f"the run in {str(path)!r} cannot be removed: {why(error)}", path=str(path)
+            "not-removable",
+            f"the run in {str(path)!r} cannot be removed: {why(error)}",
+            "check its permissions",
+            path=str(path),
         ) from None
     finally:
         lock.release()

@@ -27,7 +27,10 @@ def read_bytes(path: Path) -> bytes:
         raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         raise ConfigError(
-            "file-unreadable", f"{str(path)!r} cannot be read: {error.strerror}", path=str(path)
+            "file-unreadable",
+            f"{str(path)!r} cannot be read: {error.strerror}",
+            "check the path and its permissions",
+            path=str(path),
         ) from None
 
 

@@ -86,7 +86,7 @@ def validate_run(
     judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
     refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
     if not judged:
-        raise FitError("not-fitted", "; ".join(refused), models=[fit.model.name for fit in fits])
+        raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[fit.model.name for fit in fits])
     return judged, notes + refused
 
 
