@@ -144,7 +144,7 @@ class LoopSection(_Section):
         if self.position_pd is not None:
             if self.velocity or self.position:
                 raise ConfigError(
-                    "conflict",
+                    "key-conflict",
                     "loop.position_pd is the whole controller",
                     "leave out loop.velocity and loop.position",
                     key="loop.position_pd",
@@ -264,7 +264,7 @@ class Axis(_Section):
             raise _first_of(error).at(origin) from None
         if (axis.source.log is None) == (axis.source.url is None):
             raise ConfigError(
-                "conflict",
+                "key-conflict",
                 "[source] needs either a log or a url",
                 "set source.log for a recording, or source.url for a live source",
                 key="source",

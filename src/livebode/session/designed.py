@@ -34,10 +34,12 @@ def read_designed(path: Path) -> Waveform:
         if max(bins) > samples.size or not 0 <= float(about.get("ramp_s", 0.0)) <= _RAMP_S_MAX:
             raise ValueError(bins, about)
         return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
+    except FileNotFoundError:
+        raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else str(error)
         raise RecordingError(
-            "file-unreadable",
+            "not-readable",
             f"{str(path)!r} cannot be read: {why}",
             "check the path and its permissions",
             path=str(path),

@@ -144,7 +144,7 @@ def _check_names(name: str, log: str) -> None:
         )
     if log in (_MARK, _AXIS, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
         raise ConfigError(
-            "conflict",
+            "key-conflict",
             f"log = {log!r} is a file of the design",
             "give the recording another name",
             key="log",

@@ -98,11 +98,11 @@ class Experiment(BaseModel):
             raise _first_of(error).at(origin) from None
         if found.belt is not None and found.loop is not None:
             raise ConfigError(
-                "conflict", "a [belt] axis has its loop in [belt.drive]", "leave out [loop]", key="loop"
+                "key-conflict", "a [belt] axis has its loop in [belt.drive]", "leave out [loop]", key="loop"
             ).at(origin)
         if (found.belt is None) == (found.measured is None):
             raise ConfigError(
-                "conflict",
+                "key-conflict",
                 "the machine is described by both or neither of [belt] and [measured]",
                 "describe either a [belt] axis by its constants, or one that was [measured]",
                 key="belt",
@@ -141,7 +141,7 @@ class Experiment(BaseModel):
         parts = {name: _made(_BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
         if "strokes" in parts and "standstill" in parts:
             raise ConfigError(
-                "conflict",
+                "key-conflict",
                 "[belt.strokes] and [belt.standstill] exclude each other",
                 "leave one out",
                 key="belt.standstill",
@@ -208,7 +208,7 @@ class Experiment(BaseModel):
                 )
             if twins := [other for other in names if other != role and names[other] == name]:
                 raise ConfigError(
-                    "conflict",
+                    "key-conflict",
                     f"signals.{role} and signals.{twins[0]} are both {name!r}",
                     "name two channels",
                     key=f"signals.{role}",

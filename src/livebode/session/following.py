@@ -17,6 +17,7 @@ from livebode.estimation import response_unit
 from livebode.fitting import Fit
 from livebode.records import RunDirectory
 from livebode.session import summary
+from livebode.session.ahead import LossesAhead
 from livebode.session.announcing import Announcing
 from livebode.session.audience import Audience, Outlet
 from livebode.session.axis import RecordSection
@@ -128,7 +129,7 @@ class Tracking:
         self._tally = Tally(check, time.perf_counter() if started is None else started, before)
         self._goes_on = before is not None
         self._noticed = tuple(noticed)
-        self._announcing = Announcing()
+        self._announcing, self._ahead = Announcing(), LossesAhead()
         self._label = _schedule_label(source, settings.schedule)
         about = about | {"found": about.get("found", {}) | {"schedule": self._label}}
         self._about = about
@@ -332,7 +333,7 @@ class Tracking:
         events = self.source.drain_events()
         for event in self._announcing.of(events):
             self.to.tell(event)
-        return events
+        return self._ahead.released([*events], self._tally.stop)
 
     def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
         """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.
@@ -350,7 +351,8 @@ class Tracking:
             # What was recorded stays, and says what is wrong with it.
             self._out.write_event(Event("doubtful", *self.position, str(error)))
         left = [] if self._shedding is None else self._shedding.finish(*self.position)
-        for event in self._drained() + self._orders.drain_events(*self.position) + left:
+        ended = self._drained() + self._ahead.finish() + self._orders.drain_events(*self.position) + left
+        for event in ended:
             self._out.write_event(event)
         fits, watching = self.pipeline.fits, self.pipeline.watching
         self._done = summary.begun(self._about, self._follower, self._begun["found"]["unit"])

@@ -13,5 +13,5 @@ class ExtraError(LivebodeError):
 
     area: ClassVar[str] = "extra"
     codes: ClassVar[Mapping[str, str]] = {
-        "not-installed": "An optional package is not installed.",
+        "not-installed": "The package that this needs is not installed.",
     }
