@@ -146,6 +146,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
             channel=name,
             frequency_hz=float(f[worst]),
             window=settings.lines.window,
+            key="lines.window",
             repeating=float(repeats[worst]),
         )
 
@@ -173,6 +174,7 @@ def check_period(samples: np.ndarray, settings: Settings) -> None:
             f"{settings.excitation!r} repeats every {best} samples, not every {window}",
             f"set lines.window to {best} or 'auto'",
             channel=settings.excitation,
+            key="lines.window",
             period=best,
             window=window,
         )

@@ -149,6 +149,7 @@ def _lines(axis: Axis, log: Log) -> Lines:
             f"the excitation repeats every {found.period} samples, which does not divide the {window=}",
             f"set lines.window to a multiple of {found.period}, or to 'auto'",
             channel=reference,
+            key="lines.window",
             period=found.period,
             window=window,
         )

@@ -56,7 +56,7 @@ def plc_project(
             "conflict",
             "the excitation is specified by both or neither of amplitude and designed",
             "specify either the amplitude of each line, or a file of `livebode design`",
-            arguments=["amplitude", "designed"],
+            argument="amplitude",
         )
     whole = None if designed is None else designed.lines
     rate = _rate_hz(

@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROLES: tuple[Role, ...] = ("excitation", "input", "output")
+_OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name that input alone"
 _ACCEPT = "to keep these roles, set tracking.accept_roles"
 # What repeats of an excitation's variance: all of a command, next to nothing of an axis that moves.
 _REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
@@ -55,13 +56,14 @@ def check_distinct(settings: Settings) -> None:
             continue
         open_loop = (one, other) == ("excitation", "input")
         if not (open_loop and settings.method.reference == "input"):
-            direct = "for an open loop set tracking.estimator to 'direct' and name that input alone"
+            remedy = _OPEN_LOOP if open_loop else "name another"
             raise SignalError(
                 "role-shared",
                 f"{name!r} is both the {one} and the {other}",
-                f"{direct if open_loop else 'name another'}; {_ACCEPT}",
+                f"{remedy}; {_ACCEPT}",
                 channel=name,
                 roles=[one, other],
+                key="tracking.accept_roles",
             )
 
 
@@ -233,5 +235,11 @@ def check_roles(signals: Mapping[Role, Floats], settings: Settings, *, accepted:
     certain = [one for one in found if one.certain]
     if certain and not accepted:
         worst = certain[0]
-        raise SignalError("role-wrong", worst.message, worst.remedy, channels=[name for name in worst.channels if name])
+        raise SignalError(
+            "role-wrong",
+            worst.message,
+            worst.remedy,
+            channels=[name for name in worst.channels if name],
+            key="tracking.accept_roles",
+        )
     return [one.sentence for one in found]
