@@ -51,7 +51,7 @@ def test_a_block_is_immutable_and_cuts_without_a_copy() -> None:
     [
         ((np.zeros(3), ("u",), 1000), "wrong-shape", {"argument": "data", "shape": [3]}),
         ((np.zeros((2, 3)), ("u",), 1000), "wrong-shape", {"argument": "channels", "shape": [2, 3]}),
-        ((np.zeros((2, 3)), ("u", "u"), 1000), "duplicated", {"argument": "channels", "value": "u"}),
+        ((np.zeros((2, 3)), ("u", "u"), 1000), "duplicate", {"argument": "channels", "value": "u"}),
         ((np.zeros((1, 3)), ("u",), 0), "out-of-range", {"argument": "rate_hz", "value": 0}),
     ],
 )

@@ -14,8 +14,8 @@ SIGNALS = (Channel("y", "rad/s"), Channel("u", "N m"), Channel("w", "N m"))
     ("options", "kind", "code", "facts"),
     [
         ({"signals": ()}, UsageError, "missing", {"argument": "signals"}),
-        ({"signals": (Channel("y"), Channel("y", "m"))}, UsageError, "duplicated", {"argument": "signals"}),
-        ({"values": (Channel("y", "deg"),)}, UsageError, "duplicated", {"argument": "signals"}),
+        ({"signals": (Channel("y"), Channel("y", "m"))}, UsageError, "duplicate", {"argument": "signals"}),
+        ({"values": (Channel("y", "deg"),)}, UsageError, "duplicate", {"argument": "signals"}),
         ({"window": 2}, GridError, "window-out-of-range", {"window": 2}),
         ({"hop": 30}, GridError, "hop-off", {"hop": 30, "window": 400}),
         ({"hop": 0}, GridError, "hop-off", {"hop": 0}),

@@ -292,7 +292,7 @@ def test_options_that_are_refused(tmp_path, options, kind, code, facts):
 
 def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
     log = open_log(write("npz", tmp_path, signals()), rate_hz=1)
-    with refused(UsageError, "duplicated", argument="channels", value="input"):
+    with refused(UsageError, "duplicate", argument="channels", value="input"):
         log.blocks(["input", "input"])
     with refused(UsageError, "missing", argument="channels"):
         log.blocks([])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import Block, InputError, Lines, Parameters, Response, Responses, UsageError
+from livebode.core import Block, Lines, Parameters, Response, Responses, SignalError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import Fitter, Grid, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
 from livebode.fitting.problem import Measured, Problem
@@ -274,7 +274,7 @@ def test_the_mean_of_responses_has_the_scatter_of_independent_windows() -> None:
     assert one.dof[0] == pytest.approx(39, abs=2)
     apart = np.abs(one.value[0] - truth) / one.sigma[0]
     assert np.sqrt(np.mean(apart**2)) < 1.8
-    with pytest.raises(InputError, match="none of the responses is valid"):
+    with refused(SignalError, "no-valid-response"):
         mean_response(Tracker(Settings(**signals, hop=20)).process(block.cut(0, 100)))
 
 

@@ -83,7 +83,7 @@ class Block:
             )
         if repeated := sorted({name for name in names if names.count(name) > 1}):
             raise UsageError(
-                "duplicated",
+                "duplicate",
                 f"channel name {repeated[0]!r} is duplicated",
                 "rename one of the channels",
                 argument="channels",

@@ -72,7 +72,7 @@ class SpectraLayout:
         for named in (self.signals, self.values, self.channels):
             if len({channel.name for channel in named}) != len(named):
                 raise UsageError(
-                    "duplicated",
+                    "duplicate",
                     "two channels of the spectra have the same name",
                     "give each its own name, and one unit",
                     argument="signals",

@@ -125,7 +125,7 @@ class Log:
             raise UsageError("missing", "channels is empty", "name at least one channel", argument="channels")
         if repeated := [name for name, count in Counter(names).items() if count > 1]:
             raise UsageError(
-                "duplicated",
+                "duplicate",
                 f"channel {repeated[0]!r} is asked for more than once",
                 "name it once",
                 argument="channels",

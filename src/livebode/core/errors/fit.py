@@ -13,5 +13,11 @@ class FitError(LivebodeError):
 
     area: ClassVar[str] = "fit"
     codes: ClassVar[Mapping[str, str]] = {
-        "not-fitted": "No model could be fitted, so that what follows from a fit is missing.",
+        "loop-unknown": "Margins need the controllers of the loop, which are not described.",
+        "no-continuous-model": "The discrete model has no counterpart in continuous time.",
+        "no-model": "No model of the machine fits the responses.",
+        "not-causal": "A model with a negative delay has no discrete counterpart.",
+        "not-fitted": "The fit failed, so that there is no model to use.",
+        "not-proper": "The numerator's degree is too high, or there are too many integrators.",
+        "too-few-lines": "There are too few lines for the parameters of the model.",
     }
