@@ -13,8 +13,9 @@ class OutputError(LivebodeError):
 
     area: ClassVar[str] = "output"
     codes: ClassVar[Mapping[str, str]] = {
-        "exists": "The file exists already.",
+        "exists": "The file or directory exists already, and is replaced only on request.",
         "is-directory": "The path of the file is a directory.",
-        "not-written": "The system refuses to write the file.",
+        "not-replaceable": "The directory contains something else than an earlier output, and is not replaced.",
+        "not-written": "The system refuses to write the output.",
         "too-large": "There are more values than can be written in this format.",
     }
