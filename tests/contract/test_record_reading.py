@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.core import Block, Event, InputError, RecordError
+from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
 from livebode.records import Run, RunDirectory
 from livebode.records.grouped_events import each_event
@@ -154,7 +154,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
 
 def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
     record_until(700, tmp_path / "run")
-    with pytest.raises(InputError, match="another configuration"):
+    with refused(RecordError, "configuration-differs", path=str(tmp_path / "run")):
         record_machine(machine(SAMPLES), tmp_path / "run", kept=RecordSection(samples=False))
     held = check_beginning(tmp_path / "run", SAMPLES, 0)
 

@@ -143,7 +143,7 @@ def _not_fitted(toml: Path, base: Path, tmp_path: Path) -> None:
     alone = livebode("run", toml, "--false-alarms", "once a year", "--average", "--out", tmp_path / "four")
     assert "'once a year' has no effect without one" in alone.out
     averaged = livebode("learn", tmp_path / "four", "--out", tmp_path / "x.json")
-    assert (averaged.code, "was made with --average" in averaged.err) == (2, True)
+    assert (averaged.code, "was created with tracking.average" in averaged.err) == (2, True)
 
 
 def _refusals(tmp_path: Path, log: Path) -> None:

@@ -15,6 +15,7 @@ class OutputError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "exists": "The file or directory exists already, and is replaced only on request.",
         "is-directory": "The path of the file is a directory.",
+        "not-replaceable": "The directory contains something else than an earlier output, and is not replaced.",
         "not-written": "The system refuses to write the output.",
         "too-large": "There are more values than can be written in this format.",
     }

@@ -13,20 +13,26 @@ class SignalError(LivebodeError):
 
     area: ClassVar[str] = "signal"
     codes: ClassVar[Mapping[str, str]] = {
-        "channel-constant": "A channel never changes.",
+        "channel-constant": "A channel is constant.",
         "channel-empty": "A channel has no finite sample.",
         "channel-unknown": "There is no channel of this name.",
         "empty": "There are no samples.",
         "layout-differs": "The spectra that the drive sends do not fit the settings of the tracker.",
+        "line-not-excited": "The excitation has no power at a line.",
+        "no-clean-samples": "There is no stretch without gaps and non-finite samples that is long enough.",
         "no-excitation": "The channel is a straight line, so it carries no excitation.",
         "no-line-above-noise": "The excitation repeats, but none of its lines exceeds the noise.",
         "no-response-there": "No valid response is near this time.",
         "no-valid-response": "No response is valid at any line.",
         "not-finite": "A channel has samples that are not finite.",
-        "not-periodic": "The excitation does not repeat.",
+        "not-periodic": "The excitation does not repeat from window to window.",
+        "pause-too-short": "There is no stretch without excitation that is long enough to look for hum.",
         "rate-differs": "The samples have another rate than is needed.",
         "repeated": "Samples or spectra came twice.",
+        "role-shared": "Two roles that the estimator needs apart have the same channel.",
+        "role-wrong": "The samples of a channel contradict the role that it was given.",
         "too-few-lines": "The responses have too few valid lines.",
         "too-short": "There are too few samples.",
+        "wrong-period": "The excitation repeats after another number of samples than the window.",
         "wrong-quantity": "The responses are of another quantity than the one that is needed.",
     }

@@ -13,7 +13,7 @@ class SimulationError(LivebodeError):
 
     area: ClassVar[str] = "simulation"
     codes: ClassVar[Mapping[str, str]] = {
-        "diverged": "The state of the simulated machine is not finite, or its cart left the machine.",
+        "diverged": "The simulated machine does not stay finite.",
         "fmu-unusable": "The FMU cannot be read, started, or simulated on this computer.",
         "loop-unsupported": "A loop of this form cannot be simulated.",
         "parameters-impossible": "No machine has these parameters together.",

@@ -14,7 +14,7 @@ class UsageError(LivebodeError):
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {
         "conflict": "Two arguments, or an argument and what it is used with, do not go together.",
-        "duplicate": "A name is used twice where it may be used once.",
+        "duplicate": "A name or value is given twice where it may be given once.",
         "invalid-name": "A name has a form that is not allowed.",
         "missing": "A required argument is missing or empty.",
         "not-finite": "An argument has a value that is not a finite number.",
@@ -23,7 +23,8 @@ class UsageError(LivebodeError):
         "out-of-range": "The value is outside the range of the argument.",
         "query-rejected": "The database rejects the SQL of a query.",
         "too-large": "What the arguments ask for needs more memory than there is.",
+        "too-many": "There are more values than the argument allows.",
         "unknown-name": "There is nothing of this name; the allowed names are given.",
         "unreadable": "The text or data of an argument cannot be read.",
-        "wrong-shape": "An array does not have the shape that is needed.",
+        "wrong-shape": "An array or list does not have the shape that is needed.",
     }
