@@ -1,4 +1,4 @@
-"""What every floor above works with: samples, lines, responses, loops, events, errors."""
+"""The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
 from livebode.core.block import Block, Channel, missing_channel, nearest_channel
 from livebode.core.controllers import PID, Cascade, PositionPD

@@ -14,7 +14,7 @@ from livebode.core.errors import SignalError, UsageError
 
 @dataclass(frozen=True)
 class Channel:
-    """Name and unit of one recorded signal; the unit is empty where the source does not say it."""
+    """Name and unit of one recorded signal; the unit is empty where the source does not report it."""
 
     name: str
     unit: str = ""
@@ -33,11 +33,11 @@ class Block:
     rate_hz
         Samples per second, exact.
     start
-        Number of the first sample. Numbers count from the start of the source and go on over gaps.
+        Number of the first sample. Numbers count from the start of the source and include the samples of gaps.
     origin_s
         Time of sample number 0 in seconds, in the clock of the source.
     gap
-        True where samples are missing between this block and the one before, however many.
+        True where samples are missing between this block and the previous one.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class Block:
 
 
 def missing_channel(name: str, names: Iterable[str]) -> str:
-    """The sentence for a channel that does not exist, with the nearest name.
+    """The message for a channel that does not exist, with the nearest name.
 
     >>> missing_channel("iq_adX", ["iq_adx", "theta_mx"])
     "there is no channel 'iq_adX'; did you mean 'iq_adx'? Channels: iq_adx, theta_mx"

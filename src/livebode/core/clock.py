@@ -1,4 +1,4 @@
-"""Moments of a run in words: seconds of its clock, or date and time of day with the zone."""
+"""Times of a run as text: seconds of its clock, or date and time of day with the zone."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from datetime import datetime
 from math import isfinite
 from typing import Any
 
-_EPOCH_FROM_S, _EPOCH_TO_S = 1e8, 1e11  # 1973 … 5138; a run's own clock does not reach three years
+_EPOCH_FROM_S, _EPOCH_TO_S = 1e8, 1e11  # years 1973 … 5138; a run's own clock stays below three years
 
 
 @dataclass
 class RunClock:
-    """Which time of day the seconds of a run are, as far as it is known.
+    """The relation between the seconds of a run and the time of day, as far as it is known.
 
     Attributes
     ----------
     pieces
-        From which second of the run on, ascending, and seconds since 1970 at the run's second 0 as it is from there.
+        First second of the run for which each piece is valid, ascending, and its seconds since 1970 at second 0.
         One piece, unless the sender paused for an unknown time or its rate is not exact. Empty where nothing is known.
 
     Examples
@@ -34,7 +34,7 @@ class RunClock:
 
     @classmethod
     def of(cls, summary: dict[str, Any]) -> RunClock:
-        """As run.json says."""
+        """The clock that run.json records."""
         return cls([(float(from_s), float(unix_s)) for from_s, unix_s in summary.get("clock") or ()])
 
     def unix_s(self, time_s: float) -> float | None:
@@ -45,7 +45,7 @@ class RunClock:
         return time_s + self.pieces[max(0, at - 1)][1]
 
 
-_CLOCK: ContextVar[RunClock | None] = ContextVar("clock of the run that sentences are about", default=None)
+_CLOCK: ContextVar[RunClock | None] = ContextVar("clock of the run that messages refer to", default=None)
 
 
 @contextmanager
@@ -59,14 +59,14 @@ def moments_by(clock: RunClock) -> Iterator[None]:
 
 
 def moment(time_s: float, digits: int = 1) -> str:
-    """A moment of a run for a sentence.
+    """A time of a run as text for a message.
 
     Parameters
     ----------
     time_s
         Seconds of the run's clock: since 1970, or since its start.
     digits
-        Of a run's own seconds. The time of day has whole seconds.
+        Of the seconds of the run's own clock. The time of day has whole seconds.
 
     Returns
     -------
@@ -89,6 +89,6 @@ def moment(time_s: float, digits: int = 1) -> str:
 
 
 def moment_of_start() -> str:
-    """When second 0 of the run was, where it has a clock that holds for all of it; else nothing."""
+    """When second 0 of the run was, where one clock is valid for all of it; else nothing."""
     clock = _CLOCK.get()
     return moment(0.0) if clock is not None and len(clock.pieces) == 1 else ""

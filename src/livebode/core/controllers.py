@@ -1,6 +1,6 @@
 """Controllers as they run in a drive: each with its own rate, hold, delay and integrator rule.
 
-What a wrong description costs is in docs/loop.md; one forgotten tick of delay is 10 % of the plant's response.
+docs/loop.md lists the effect of a wrong description; one forgotten tick of delay is 10 % of the plant's response.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ def integral(frequency_hz: ArrayLike, rate_hz: float, rule: Rule) -> NDArray[np.
 
 @dataclass(frozen=True, kw_only=True)
 class Timing(Algebra):
-    """What every controller in a drive has: a rate, a hold towards the faster loop below it, and a delay.
+    """The parameters that all controllers in a drive have: a rate, a hold towards the faster inner loop, and a delay.
 
     Parameters
     ----------
     rate_hz
-        How often it is computed.
+        Computations per second.
     held_ticks
-        Ticks of the recorded loop during which one output stands: the recorded rate over `rate_hz`. A
+        Ticks of the recorded loop during which one output is held: the recorded rate over `rate_hz`. A
         controller at half the rate of the recording has 2.
     hold
-        "zero-order" (the output stands) or "none" (for a Model of a filter that interpolates by itself).
+        "zero-order" (the output is held) or "none" (for a Model of a filter that interpolates by itself).
     delay_ticks
         Whole ticks of the recorded loop between reading its input and acting, beyond the hold.
     """

@@ -1,4 +1,4 @@
-"""Document: what a report says, as plain data, before anybody lays it out on a page."""
+"""Document: the content of a report as plain data, independent of the page layout."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts below headings; `numbers` are the columns that stand to the right, `note` a line below."""
+    """Rows of texts below headings; `numbers` are the right-aligned columns, `note` a line below."""
 
     headings: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -46,7 +46,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture that is still to be drawn: which one, of what data, and the line below it."""
+    """A picture that is not drawn yet: its kind, its data, and its caption."""
 
     what: str
     data: Mapping[str, Any]
@@ -55,7 +55,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Listing:
-    """Text that keeps its lines, such as a configuration."""
+    """Preformatted text, such as a configuration."""
 
     text: str
 
@@ -65,7 +65,7 @@ Part = Paragraph | Table | Picture | Listing
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it."""
+    """A heading and the content below it."""
 
     title: str
     parts: tuple[Part, ...]
@@ -78,9 +78,9 @@ class Document:
     Attributes
     ----------
     kind
-        What it is, above the title.
+        Kind of the report, above the title.
     title
-        What it is about.
+        Subject of the report.
     facts
         Names and values of the title block.
     verdict
@@ -88,11 +88,11 @@ class Document:
     sections
         In the order of reading.
     foot
-        Stands at the end, and at the foot of each page of a PDF.
+        Printed at the end, and at the foot of each page of a PDF.
     asked
         Heading of the verdict.
     tones
-        The verdict that is printed for each tone, so that it is known without colours.
+        The verdict that is printed for each tone, so that it is legible without colours.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""Event: what a person should know."""
+"""Event: something that a person should know."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core.errors import GridError, UsageError
 
-# A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then holds a
+# A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then contains a
 # whole number of periods to a millionth, and the leakage is below every other error.
 _ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
@@ -35,12 +35,12 @@ class Lines:
     rate_hz
         Samples per second.
     quiet
-        Bins that the excitation leaves without power, to estimate the noise from.
+        Detection lines: bins without excitation, from which the noise is estimated.
 
     Raises
     ------
     GridError
-        If a bin is not between 0 and N/2, repeats, or is both excited and quiet.
+        If a bin is not between 0 and N/2, is duplicated, or is both excited and a detection line.
 
     Examples
     --------
@@ -89,7 +89,7 @@ class Lines:
         """Lines from text: frequencies in Hz, ``start:stop:step`` inclusive, joined by commas.
 
         ``k=`` before an item counts in bins instead of Hz, for windows whose lines have no short decimal
-        (``k=1:300`` with a PRBS of 2047). Bins between the first and the last line that are not named are quiet.
+        (``k=1:300`` with a PRBS of 2047). The other bins between the first and the last line are detection lines.
 
         Raises
         ------
@@ -128,7 +128,7 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
 
     @classmethod
     def of_bins(cls, bins: list[int], window: int, rate_hz: float) -> Lines:
-        """Lines at these bins, with every bin between the first and the last that is not named left quiet."""
+        """Lines at these bins; all other bins between the first and the last are detection lines."""
         named = set(bins)
         quiet = tuple(k for k in range(min(bins, default=0), max(bins, default=0)) if k not in named)
         return cls(tuple(bins), window, rate_hz, quiet)
@@ -153,7 +153,7 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
 
 
 def check_window(window: int, rate_hz: float) -> None:
-    """GridError or UsageError where these give no grid."""
+    """Raise GridError or UsageError for values that give no grid."""
     if isinstance(window, bool) or not isinstance(window, (int, np.integer)) or not 3 <= window <= WINDOW_MAX:
         raise GridError(
             "window-out-of-range",
@@ -173,7 +173,7 @@ def check_window(window: int, rate_hz: float) -> None:
 
 
 def _number(text: str) -> Fraction:
-    """Exact; ValueError for what is no number, or one so large or small that it would take for ever."""
+    """The exact value; ValueError for text that is not a number, or one too large or small to be computed."""
     exponent = text.lower().partition("e")[2]
     if len(text) > _DIGITS_MAX or abs(int(exponent or 0)) > _DIGITS_MAX:
         raise ValueError(text)

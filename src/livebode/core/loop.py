@@ -1,4 +1,4 @@
-"""Loop: what feeds back, where the excitation enters, and when the signals were logged."""
+"""Loop: the feedback, the injection point of the excitation, and when the signals were logged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Loop:
-    """The closed loop u = E·w − F·y around the plant y = G·u, as the recording shows it.
+    """The closed loop u = E·w − F·y around the plant y = G·u, as recorded.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ class Loop:
     input_logged, excitation_logged, output_logged
         Whether each signal was logged before or after the tick's controller update. A drive reads y, computes u
         from it and applies it: the normal record has y before and u and w after the update. A u logged before the
-        update is the one of the tick before; that alone costs 10 % near a resonance if it is not said.
+        update is that of the previous tick; if this is not specified, the error is 10 % near a resonance.
 
     Raises
     ------
     TypeError
         If the feedback or the entry has no frequency response.
     UsageError
-        If one of them has several inputs or outputs, or a `logged` word is not known.
+        If one of them has several inputs or outputs, or a `logged` word is not supported.
     """
 
     feedback: Model | None = None
@@ -63,14 +63,14 @@ class Loop:
                 )
 
     def advance_ticks(self, role: Literal["input", "excitation", "output"]) -> int:
-        """Ticks by which the signal's spectrum is to be advanced so that all speak of one tick."""
+        """Ticks by which the signal's spectrum is advanced, so that all spectra refer to the same tick."""
         late = {"input": "before", "excitation": "before", "output": "after"}[role]
         if getattr(self, f"{role}_logged") != late:
             return 0
         return -1 if role == "output" else 1
 
     def feedback_at(self, frequency_hz: ArrayLike) -> Complex:
-        """F at these frequencies; UsageError where the Loop does not know its feedback."""
+        """F at these frequencies; UsageError where the Loop has no description of its feedback."""
         if self.feedback is None:
             raise UsageError(
                 "missing",

@@ -45,7 +45,7 @@ class Algebra:
 
 @dataclass(frozen=True)
 class Combined(Algebra):
-    """Two Models joined frequency by frequency."""
+    """Two Models combined at each frequency."""
 
     operation: Callable[..., Any]
     first: Model
@@ -86,7 +86,7 @@ def as_model(thing: object) -> Model:
     Raises
     ------
     TypeError
-        If it is none of these.
+        If it is not one of these.
     UsageError
         If it has several inputs or outputs, or is discrete without a rate.
     """

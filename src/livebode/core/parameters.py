@@ -1,4 +1,4 @@
-"""Parameters: what a model fitted to Responses says of the machine, with its covariance."""
+"""Parameters: the values of a model that was fitted to Responses, with their covariance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from livebode.core.rows import joined
 Floats = NDArray[np.float64]
 
 OK = "ok"
-"""The status of a row that holds numbers; any other is the reason why it holds NaN."""
+"""The status of a valid row; any other status is the reason why the row contains NaN."""
 
 _PER_ROW = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
 _STEP = 1e-6
 
 
 def half_width(sigma: Floats, probability: float) -> Floats:
-    """Half-width of the interval that holds a normal value with this probability: 1.96 sigma for 0.95."""
+    """Half-width of the interval that covers a normal value with this probability: 1.96 sigma for 0.95."""
     if not 0 < probability < 1:
         raise UsageError(
             "out-of-range",
@@ -49,16 +49,16 @@ class Parameters:
     value
         Shape (rows, parameters); NaN where `status` is not "ok".
     covariance
-        Shape (rows, parameters, parameters), of noise and, by `epsilon`, of what the model lacks; a parameter that was
-        held fixed has zeros.
+        Shape (rows, parameters, parameters), of noise and, by `epsilon`, of the model error; a fixed parameter has
+        zeros.
     status
-        Shape (rows,): "ok", or in a few stable words why there are no numbers.
+        Shape (rows,): "ok", or the reason why there are no numbers, in a few stable words.
     epsilon
-        Shape (rows,): the model's share of the error that was taken in, |error of the model| = ε·|G| at a line.
+        Shape (rows,): model error that the covariance includes, |error of the model| = ε·|G| at a line.
     chi2, dof
-        Shape (rows,): weighted sum of squared residuals by sigma alone, and what it would be for a true model.
+        Shape (rows,): weighted sum of squared residuals by sigma alone, and its expected value for a true model.
     sample, time_s, schedule
-        Those of the Response: its newest sample, the moment it speaks for, the scheduling signal there.
+        Those of the Response: its newest sample, its effective time, the scheduling signal at that time.
     """
 
     model: str
@@ -109,7 +109,7 @@ class Parameters:
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """Rows that hold numbers, shape (rows,)."""
+        """Which rows are valid, shape (rows,)."""
         return np.asarray(self.status == OK)
 
     @property
@@ -119,10 +119,10 @@ class Parameters:
             return np.asarray(np.sqrt(np.einsum("rii->ri", self.covariance)))
 
     def bound(self, probability: float = 0.95) -> Floats:
-        """Half-width of the interval that holds the truth with this probability, shape (rows, parameters).
+        """Half-width of the interval that covers the true value with this probability, shape (rows, parameters).
 
-        Of a normal error: 1.96 sigma for 95 %. It holds for noise and for what `epsilon` allows; a model that is
-        wrong in the same way in every response stays wrong by the same amount (docs/fits.md).
+        For a normal error: 1.96 sigma for 95 %. It covers noise and the model error of `epsilon`; a model error that
+        is the same in every response remains as a bias (docs/fits.md).
 
         Raises
         ------
@@ -132,7 +132,7 @@ class Parameters:
         return half_width(self.sigma, probability)
 
     def derived(self, names: Sequence[str], units: Sequence[str], of: Callable[[Floats], Floats]) -> Parameters:
-        """Quantities that follow from these, with their covariance by linear propagation.
+        """Quantities derived from these, with their covariance by linear propagation.
 
         `of` takes values (…, parameters) to derived ones (…, names). Slopes are central differences.
         """
@@ -140,8 +140,8 @@ class Parameters:
         value, covariance = np.full(shape, np.nan), np.full((*shape, len(names)), np.nan)
         if (ok := self.ok).any():
             at, sigma = self.value[ok], self.sigma[ok]
-            moving = np.flatnonzero((sigma > 0).any(axis=0))  # those that are held move nothing
-            # Of a parameter near zero, sigma says what a small step is.
+            moving = np.flatnonzero((sigma > 0).any(axis=0))  # a fixed parameter contributes nothing
+            # For a parameter near zero, sigma gives the scale of a small step.
             size = _STEP * np.maximum(np.abs(at), sigma)[:, moving]
             steps = size[..., np.newaxis] * np.eye(n)[moving]
             both = of(at[:, np.newaxis] + steps), of(at[:, np.newaxis] - steps)
@@ -152,7 +152,7 @@ class Parameters:
 
     @classmethod
     def join(cls, parts: Sequence[Parameters]) -> Parameters:
-        """Parts of one run, in order, as one; UsageError where they are of different models."""
+        """Join parts of one run, in order; UsageError where their models differ."""
         if any((p.model, p.names, p.units) != (parts[0].model, parts[0].names, parts[0].units) for p in parts):
             raise UsageError(
                 "conflict",

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
-    """Radius around an estimate that holds the truth with probability 1 − exp(−c²): 63.2 % for 1, 98.2 % for 2.
+    """Radius around an estimate that covers the truth with probability 1 − exp(−c²): 63.2 % for 1, 98.2 % for 2.
 
     A `sigma` that was itself estimated with `dof` complex degrees of freedom makes |Ĝ − G|²/sigma² follow
     F(2, 2·dof); the factor √(d(exp(c²/d) − 1)) instead of c keeps the probability. Unknown (NaN) dof gives NaN, and
@@ -37,14 +37,14 @@ def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
 class Response:
     """The frequency response of a machine at one moment, at Lines. Immutable.
 
-    Shapes are (lines,). Everything that belongs together is frozen together; `value` alone means little.
+    Shapes are (lines,). `value` is only meaningful together with its bounds and `valid`.
 
     Attributes
     ----------
     lines
         Where it was measured.
     value
-        Complex response, `unit`; NaN where it could not be formed.
+        Complex response, `unit`; NaN where it could not be computed.
     sigma
         Standard deviation, E|value − truth|² = sigma², unit of `value`; NaN where not yet known.
     dof
@@ -52,25 +52,25 @@ class Response:
     coherence
         γ² of eq. (18) between 0 and 1; NaN where not yet known.
     valid
-        False where the window holds a start, a gap, a sample that is not finite or was left out, or no excitation.
+        False where the window contains a start, a gap, a non-finite or excluded sample, or no excitation.
     first, sample
-        Numbers of the oldest and the newest sample that went in.
+        Numbers of the oldest and the newest sample of the window.
     time_s
-        The moment the response speaks for: the centre of its window (of the windows, weighted, where periods are
-        averaged), in the source's clock. It is half a window older than `sample`.
+        Effective time: the centre of its window (weighted mean of the centres where periods are averaged), in the
+        source's clock. It is half a window older than `sample`.
     schedule
-        The scheduling signal (position, say) at that moment; NaN without one.
+        The scheduling signal (such as position) at that time; NaN without one.
     quantity, unit
-        What it is the response of: plant G, open loop L, closed loop T or sensitivity S.
+        Quantity of the response: plant G, open loop L, closed loop T or sensitivity S.
     input_coherence
         γ² between excitation and input, where `coherence` is that between excitation and output; NaN where not known.
     weight
-        Of this response in a mean that is to be a ratio of averages: plant input over excitation in the window, U/W,
-        or |U|² for the direct estimator; NaN where not known.
+        Weight of this response in a mean, so that the mean is a ratio of averages: plant input over excitation in the
+        window, U/W, or |U|² for the direct estimator; NaN where not known.
     distortion
-        What repeats with the excitation without being a linear response (friction, backlash, steps of an encoder) may
-        have done to the value, unit of `value`. It is contained in `sigma`; NaN where it cannot be measured,
-        infinite at a line that is not valid because of what repeats (distortion, hum of the mains, steps of a sensor).
+        Error of the value from effects that repeat with the excitation but are not linear (friction, backlash, encoder
+        steps), unit of `value`. `sigma` includes it; NaN where it cannot be measured, infinite at a line that is
+        invalid because of such an effect (distortion, mains hum, sensor steps).
     """
 
     lines: Lines
@@ -93,7 +93,7 @@ class Response:
         _fill_unknown(self)
 
     def bound(self, c: float = 2.0) -> Floats:
-        """Radius that holds the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
+        """Radius that covers the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
         return widened(self.sigma, self.dof, c)
 
     @property
@@ -108,7 +108,7 @@ class Response:
         return np.asarray(np.degrees(np.angle(self.value)))
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """The measured values at lines of this Response, which makes it a Model; GridError elsewhere."""
+        """The measured values at lines of this Response, so that it is a Model; GridError elsewhere."""
         wanted = np.asarray(frequency_hz, dtype=np.float64)
         bins = wanted / self.lines.resolution_hz
         at = np.searchsorted(self.lines.bins, np.rint(bins)).clip(0, len(self.lines) - 1)
@@ -142,16 +142,16 @@ class Response:
 
 
 PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
-"""What a response has for each of its lines."""
+"""Attributes with one value for each line."""
 
 PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule")
-"""What it has once."""
+"""Attributes with one value for the response."""
 
 _PER_ROW = PER_LINE + PER_RESPONSE
 
 
 def _fill_unknown(of: Response | Responses) -> None:
-    """NaN, in the shape of the value, for what a source of responses does not know."""
+    """NaN in the shape of the value, for an attribute that the source of the responses does not supply."""
     for name in ("input_coherence", "weight", "distortion"):
         if getattr(of, name) is None:
             kind = np.complex128 if name == "weight" else np.float64
@@ -160,7 +160,7 @@ def _fill_unknown(of: Response | Responses) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Responses(Sequence[Response]):
-    """Responses in a row, one for each hop, kept as arrays: (rows, lines) for what a line has, (rows,) for the rest.
+    """Consecutive responses, one for each hop, as arrays: (rows, lines) for attributes of a line, (rows,) for the rest.
 
     Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
     those of Response.
@@ -201,14 +201,14 @@ class Responses(Sequence[Response]):
         return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
 
     def between(self, from_s: float, to_s: float) -> Responses:
-        """Those that speak for a span of time, ends included."""
+        """Those whose effective time is in a range, ends included."""
         return self[np.flatnonzero((self.time_s >= from_s) & (self.time_s <= to_s))]
 
     def __iter__(self) -> Iterator[Response]:
         return (self[i] for i in range(len(self)))
 
     def bound(self, c: float = 2.0) -> Floats:
-        """Radius that holds the truth with probability 1 − exp(−c²), shape (rows, lines)."""
+        """Radius that covers the truth with probability 1 − exp(−c²), shape (rows, lines)."""
         return widened(self.sigma, self.dof[:, np.newaxis], c)
 
     @property
@@ -225,7 +225,7 @@ class Responses(Sequence[Response]):
 
     @classmethod
     def join(cls, parts: Sequence[Responses]) -> Responses:
-        """Parts of one run, in order, as one; GridError where their lines differ."""
+        """Join parts of one run, in order; GridError where their lines differ."""
         if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
             raise GridError(
                 "not-alike",

@@ -1,4 +1,4 @@
-"""Spectra: what a drive sends that runs the kernel itself, the sums of its signals at the lines."""
+"""Spectra: the sums of its signals at the lines, sent by a drive that runs the kernel itself."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import WINDOW_MAX, Lines
 
 NOT_WHOLE, SPIKE = 1, 2
-"""Bits of a window's state: it holds a start, a gap or a sample that is not finite; it holds a spike."""
+"""Bits of a window's state: it contains a start, a gap or a non-finite sample; it contains a spike."""
 
 
 @dataclass(frozen=True)
 class SpectraLayout:
-    """What the spectra of a drive are of.
+    """The signals, window and bins of the spectra that a drive sends.
 
     Parameters
     ----------
     signals
         Channels whose spectra are sent.
     values
-        Channels of which the value at the window's centre is sent (position), for responses to be plotted over.
+        Channels whose value at the window's centre is sent (position), as the scheduling signal of the responses.
     window
         N, samples.
     hop
@@ -35,10 +35,10 @@ class SpectraLayout:
     lines
         The excited lines as bins, ascending.
     quiet
-        Bins without excitation that are sent too, ascending: for the noise, and the neighbours of a Hann window.
+        Bins without excitation that are also sent, ascending: for the noise, and the neighbours of a Hann window.
     subtracted
-        A constant for each signal that the drive takes off before the DFT, in the signal's unit. It is nothing at the
-        lines, but saves digits of float32.
+        A constant for each signal that the drive subtracts before the DFT, in the signal's unit. It has no effect at
+        the lines, but saves digits of float32.
     differenced
         Whether each signal is differenced before the DFT, x(n) − x(n − 1); the spectra are divided by 1 − z⁻¹ here.
 
@@ -84,7 +84,7 @@ class SpectraLayout:
                 "wrong-shape",
                 f"{len(self.signals)} signals, but {len(self.subtracted)} subtracted constants and "
                 f"{len(self.differenced)} differencing flags",
-                "give one of each for each signal",
+                "specify one of each for each signal",
                 argument="subtracted",
             )
         if not np.all(np.isfinite(self.subtracted)):
@@ -127,7 +127,10 @@ class SpectraLayout:
                 )
         if twice := set(self.lines) & set(self.quiet):
             raise GridError(
-                "line-duplicated", f"bin {min(twice)} is both a line and quiet", "name it once", bin=min(twice)
+                "line-duplicated",
+                f"bin {min(twice)} is both a line and a detection line",
+                "name it once",
+                bin=min(twice),
             )
         for k in self.bins:
             if not 0 < 2 * k < self.window:
@@ -141,21 +144,21 @@ class SpectraLayout:
 
     @property
     def bins(self) -> tuple[int, ...]:
-        """All bins in the order of the sums: the lines, then the quiet ones."""
+        """All bins in the order of the sums: the lines, then the detection lines."""
         return self.lines + self.quiet
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Signals and values; a channel may be both, and is then named once."""
+        """Signals and values; a channel that is both appears once."""
         return tuple(dict.fromkeys(self.signals + self.values))
 
     def at(self, rate_hz: float) -> Lines:
-        """The lines of a drive with this many samples per second, with the quiet bins between them."""
+        """The lines of a drive with this many samples per second, with the detection lines between them."""
         quiet = tuple(k for k in self.quiet if self.lines[0] < k < self.lines[-1])
         return Lines(self.lines, self.window, rate_hz, quiet)
 
     def columns(self, bins: Sequence[int], why: str) -> NDArray[np.intp]:
-        """Where these bins are among the sums; GridError for one that is not sent, `why` it is needed."""
+        """Positions of these bins in the sums; GridError for one that is not sent, with `why` it is needed."""
         place = {k: i for i, k in enumerate(self.bins)}
         for k in bins:
             if k not in place:
@@ -167,22 +170,22 @@ class SpectraLayout:
 
 @dataclass(frozen=True, eq=False)
 class Spectra(Block):
-    """Consecutive spectra from a drive, each standing for the `hop` samples that end with its window's newest one.
+    """Consecutive spectra from a drive, each for the `hop` samples that end with its window's newest one.
 
-    As a Block it has a column for each spectrum: of a value the value, of a signal that is none the RMS at its lines.
+    As a Block it has a column for each spectrum: the value of a value channel, the RMS at the lines of other signals.
     Numbers and times are those of samples, so that `stop` is the newest sample's number plus one.
 
     Parameters
     ----------
     layout
-        What they are of.
+        Signals, window and bins.
     sums
         Σ x(n)·e^(−j2πkn/N) over the window with n the drive's own sample number (the kernel's fixed phase), complex128,
         shape (signals, spectra, bins).
     state
         Bits NOT_WHOLE and SPIKE of each window, shape (spectra,).
     place
-        Where the first spectrum stands in its period: (the drive's number of its newest sample + 1) mod N.
+        Position of the first spectrum in its period: (the drive's number of its newest sample + 1) mod N.
     """
 
     layout: SpectraLayout = field(kw_only=True)
@@ -232,7 +235,7 @@ class Spectra(Block):
 
 
 def rms(sums: NDArray[np.complex128], layout: SpectraLayout) -> NDArray[np.float64]:
-    """Root mean square of what the signals are at the lines, shape (signals, spectra), from sums of that layout."""
+    """Root mean square of the signals at the lines, shape (signals, spectra), from sums of that layout."""
     at = sums[..., : len(layout.lines)]
-    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are none
+    with np.errstate(over="ignore", invalid="ignore"):  # of non-finite numbers
         return np.asarray(np.sqrt(2 * (at.real**2 + at.imag**2).sum(axis=-1)) / layout.window)

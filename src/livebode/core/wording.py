@@ -10,7 +10,7 @@ def counted(count: int, what: str = "response") -> str:
 
 
 def rounded_down(value: float) -> float:
-    """Four digits that are not above the value, which is above 0: a remedy that is followed literally must pass.
+    """The value, above 0, rounded down to four digits: a remedy that is followed literally must pass.
 
     >>> rounded_down(1.23456), rounded_down(0.0019996)
     (1.234, 0.001999)

@@ -26,7 +26,7 @@ class Part(Protocol):
 
 
 class AroundLines(Generic[W]):
-    """Whatever feeds a LineStage. A subclass sets these parts, and gives out `_nothing` when it has no responses."""
+    """Base of the classes that feed a LineStage. A subclass sets these parts and returns `_nothing` if it has none."""
 
     _lines: LineStage
     _watch: W
@@ -35,16 +35,16 @@ class AroundLines(Generic[W]):
 
     @property
     def _identity(self) -> str:
-        """What a snapshot must have been taken of to be gone on with."""
+        """Identity that a snapshot must have to be restored."""
         raise NotImplementedError
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many samples came, were missing, and how many samples or spectra were left out for each reason."""
+        """Numbers of received and missing samples, and of samples or spectra that were excluded for each reason."""
         return self._watch.counts
 
     def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record: rate, window, lines, hop."""
+        """The basis of the responses as plain data for a record: rate, window, lines, hop."""
         return self._lines.found()
 
     def excitation_power(self) -> Floats:
@@ -56,11 +56,11 @@ class AroundLines(Generic[W]):
         return self._lines.repeatability()
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call: what is missing, what was left out, and how lines were judged."""
+        """Events since the last call: missing and excluded samples, and verdicts on lines."""
         return sorted(self._watch.drain() + self._lines.drain(), key=lambda event: event.sample)
 
     def finish(self) -> Responses | None:
-        """What is held back at the end: nothing, every response has come; None where nothing came."""
+        """Remaining responses at the end: always an empty batch; None where no samples came."""
         return self._nothing
 
     def snapshot(self) -> bytes:
@@ -68,12 +68,12 @@ class AroundLines(Generic[W]):
         return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self._identity)
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of one with the same settings.
+        """Continue from a snapshot of a tracker with the same settings.
 
         Raises
         ------
         SignalError
-            If the snapshot is damaged or belongs to other settings; all is then as it was.
+            If the snapshot is damaged or belongs to other settings; the state is then unchanged.
         """
         for name, state in snapshots.unpack(snapshot, self._identity).items():
             self._parts[name].load(state)

@@ -1,4 +1,4 @@
-"""From moments to sigma: how far an estimate is likely to be from the truth."""
+"""From moments to sigma: the standard deviation of the error of an estimate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def power(spectrum: Complex) -> Floats:
 def between_periods(moments: Moments) -> Floats:
     """Variance of numerator − Ĝ·denominator over the periods, for one window, shape (rows, lines).
 
-    Feedback carries noise into both; the difference holds only what the plant does not explain, to first order the
+    Feedback carries noise into both; the difference contains only what the plant does not explain, to first order the
     output noise that joint and indirect estimates have in common.
     """
     numerator, denominator = moments.pair
@@ -27,14 +27,14 @@ def between_periods(moments: Moments) -> Floats:
 
 
 def unbiased(coherence: Floats, moments: Moments) -> Floats:
-    """γ² without what chance adds: (1 − γ²)/m over m periods, shape (rows, lines)."""
+    """γ² without its bias of (1 − γ²)/m over m periods, shape (rows, lines)."""
     return np.asarray(np.maximum(1 - (1 - coherence) / (1 - moments.of_mean[:, np.newaxis]), 0.0))
 
 
 def contained(sigma: Floats, dof: Floats, distortion: Floats, dof_distortion: float) -> tuple[Floats, Floats]:
     """Sigma (rows, lines) and degrees of freedom (rows,) of noise and distortion together.
 
-    The degrees of freedom are matched in two moments (Satterthwaite 1946); of the lines the least counts. A distortion
+    The degrees of freedom are matched in two moments (Satterthwaite 1946); the least of all lines is used. A distortion
     that is not known (NaN) adds nothing.
     """
     noise, added = sigma**2, np.where(np.isfinite(distortion), distortion**2, 0.0)

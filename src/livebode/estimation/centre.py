@@ -1,4 +1,4 @@
-"""The moment that a window speaks for: its centre, with the scheduling signal there."""
+"""The effective time of a window: its centre, with the scheduling signal at that time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 class Centre:
     """Scheduling signal at the centre of each window, (N − 1)/2 samples before its newest sample.
 
-    For an even N the centre lies between two samples, and their mean is taken.
+    For an even N the centre is between two samples, and the result is their mean.
     """
 
     def __init__(self, window: int) -> None:

@@ -1,4 +1,4 @@
-"""What a Watch and a SpectraWatch keep: counts and Events of a stream that may miss some of itself."""
+"""Common part of Watch and SpectraWatch: counts and Events of a stream with gaps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from livebode.core import Block, Event
 class Counted:
     """Counts and Events of a stream of Blocks.
 
-    `kinds` are reasons to leave something out, `also` what is counted besides, and `last` the sample at which each kind
+    `kinds` are reasons for exclusion, `also` further counts, and `last` the sample at which each kind
     was before the first one.
     """
 

@@ -1,4 +1,4 @@
-"""Detection lines: bins that the excitation leaves without power, and what they show of the noise at the lines."""
+"""Detection lines: bins without excitation, and the noise at the lines that is estimated from them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _BESIDE = 4  # detection lines on each side of a line, and at most as many beyond the outermost lines
-_POWERLESS = 1e-4  # of the excitation's power at its lines: a bin with more is excited, whatever the lines say
+_POWERLESS = 1e-4  # of the excitation's power at its lines: a bin with more counts as excited
 
 
 def beyond(lines: Lines) -> tuple[int, ...]:
@@ -63,7 +63,7 @@ def _scaled(one: Complex, factor: Floats) -> Complex:
 class Groups:
     """Powers at lines from those at bins: the mean of up to four bins on each side, linear between the two means.
 
-    Where one side has none the other counts alone. Bins with power NaN do not count.
+    Where one side has no bins, the other is used alone. Bins with power NaN are ignored.
     """
 
     def __init__(self, lines: NDArray[np.int64], bins: NDArray[np.int64]) -> None:
@@ -93,14 +93,14 @@ class Groups:
 class DetectionNoise:
     """|A_q − Ĝ_q·B_q|² at the detection lines (non-excited bins), interpolated over frequency to the lines.
 
-    What is left there is noise, distortion, and what the axis's own motion leaks there.
+    The residual at these bins is noise, distortion, and leakage from the axis's own motion.
 
     Parameters
     ----------
     lines
         The lines, and the bins between them that are not excited.
     outside
-        More bins that may be without excitation, below the first and above the last line.
+        Further bins that may be without excitation, below the first and above the last line.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class DetectionNoise:
         numerator, denominator
             Spectra at the detection lines, (rows, bins).
         excited
-            Power of the excitation at the detection lines over that at the lines; bins that have some do not count.
+            Power of the excitation at the detection lines over that at the lines; excited bins are ignored.
         """
         rest = power(numerator - times(self._interpolation.at(ratio), denominator))
         if excited is not None:

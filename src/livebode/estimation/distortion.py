@@ -1,4 +1,4 @@
-"""Distortion at the lines from detection lines: what repeats with the excitation where the excitation has no power."""
+"""Distortion at the lines, estimated from the repeating part of the signals at detection lines."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from livebode.estimation.moments import Moments
 
 Floats = NDArray[np.float64]
 
-_INSIDE_MIN = 2  # detection lines between the outermost lines, without which nothing is known of the band
+_INSIDE_MIN = 2  # smallest number of detection lines between the outermost lines for an estimate in the band
 _OUTSIDE = 6  # more of them on each side
 _COHERENT = 3.0
-"""What a nonlinearity does to a line of usual strength over what it spreads to a detection line.
+"""Effect of a nonlinearity on a line of typical amplitude, relative to its effect on a detection line.
 
 A nonlinearity changes the gain at the lines (the describing function) and spreads the rest over the bins that it
 reaches. Of a sign of Gaussian velocity the gain has 2/π of the power, and the rest is spread over a band twice as wide:
 about 2 for a flat velocity (`python -m studies.repeating`). By Bussgang's theorem (1952) the change is proportional to
 the line's own amplitude in the signal that is distorted, and the rest is not: a line that is stronger in the output
-than the rms of the lines, as at a resonance, suffers by as much more.
+than the rms of the lines, as at a resonance, changes more in the same proportion.
 """
-_STEPS_MARGIN = 3.0  # how much more than uniform rounding the steps of a sensor may show at a few bins
+_STEPS_MARGIN = 3.0  # ratio to uniform rounding that the steps of a sensor may have at a few bins
 _POWERLESS = 1e-4
 _SMOOTH = np.ones(5)  # detection lines over which the noise is averaged before it is compared with
 _CHANCE = 1e-4  # of noise alone to be significant in one verdict
@@ -36,7 +36,7 @@ def reached(lines: Lines) -> NDArray[np.int64]:
     """Bins without excitation on which distortion of these lines falls as it does on the lines, ascending.
 
     Sums and differences of excited bins are multiples of their common divisor; of odd multiples an odd nonlinearity
-    reaches the odd ones, and an even one the even ones, where no line is. Empty where too few lie between the lines.
+    reaches the odd ones, and an even one the even ones, where no line is. Empty where too few are between the lines.
     """
     bins = np.asarray(lines.bins)
     unit = gcd(*lines.bins)
@@ -54,10 +54,10 @@ def reached(lines: Lines) -> NDArray[np.int64]:
 class Distortion:
     """Variance that distortion adds to numerator − Ĝ·denominator at the lines.
 
-    The residual of the mean over all periods, less what noise leaves there, at the detection lines on which distortion
-    falls; interpolated over frequency once as it is and once over |Ĝ|, of which the larger counts: steps of a sensor
-    are alike in the output, friction is alike in the torque. Three times that amplitude is what it may do to a line,
-    and more at a line that is stronger in the output than the others.
+    The residual of the mean over all periods, less the share of the noise, at the detection lines on which distortion
+    falls. It is interpolated over frequency twice, as it is and divided by |Ĝ|, and the larger result is used: sensor
+    steps are uniform in the output, friction is uniform in the torque. The effect on a line is taken as three times
+    that amplitude, and more at a line that is stronger in the output than the others.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ class Distortion:
     ) -> tuple[Floats, bool]:
         """Shape (lines,), and whether what repeats is significant, from Moments of one row at the lines and at `bins`.
 
-        `steps` (lines,) is the variance that steps of the sensor may have: these change no gain, for the other lines
-        carry each line over them, and so do not count three times.
+        `steps` (lines,) is the possible variance of the sensor steps. They do not change the gain, because the other
+        lines act as dither, so the factor of three does not apply to them.
         """
         numerator, denominator = moments.pair[:, 0]
         ratio = numerator[lines] / denominator[lines]
@@ -117,9 +117,9 @@ def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> float:
 
 
 def _share(over_noise: float) -> float:
-    """How surely what repeats is more than noise: the square of its share of all the power, 0 … 1.
+    """Significance of the repeating part: the square of its share of the total power, 0 … 1.
 
-    Squared, so that the chance by which noise repeats widens no bound by more than a few percent.
+    Squared, so that noise that repeats by chance widens a bound by at most a few percent.
     """
     return max(0.0, 1 - 1 / over_noise) ** 2 if over_noise > 0 else 0.0
 

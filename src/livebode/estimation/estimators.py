@@ -1,4 +1,4 @@
-"""The three ways from line spectra to the plant, each a quotient of two spectra correlated with a third."""
+"""The three estimators of the plant, each a quotient of two spectra that are correlated with a third."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Estimator:
 
     @property
     def roles(self) -> tuple[Role, ...]:
-        """The signals that it needs, without repeats; the output comes first."""
+        """The signals that it needs, each once; the output is first."""
         return tuple(dict.fromkeys(("output", self.denominator, self.reference)))
 
 
 DIRECT = Estimator("direct", reference="input", denominator="input")
-"""G = S_uy/S_uu, Nevaranta 2016, eq. (1). Biased in closed loop: feedback correlates u with the noise. Right where
-nothing feeds back, and for a closed-loop response whose input is the reference."""
+"""G = S_uy/S_uu, Nevaranta 2016, eq. (1). Biased in closed loop: feedback correlates u with the noise. Unbiased
+without feedback, and for a closed-loop response whose input is the reference."""
 
 JOINT = Estimator("joint", reference="excitation", denominator="input")
 """G = S_wy/S_wu, Nevaranta 2016, eq. (2). Unbiased in closed loop, whatever the controller does; w is the
@@ -36,6 +36,6 @@ instrument."""
 
 INDIRECT = Estimator("indirect", reference="excitation", denominator="excitation", through_loop=True)
 """G = Gcl/(E − Gcl·F) with Gcl = S_wy/S_ww, Nevaranta 2016, eqs. (15) and (16). Needs no u, but the controllers F;
-biased by every wrong word in their description (one forgotten tick of delay is 10 % near the resonance)."""
+biased by every error in their description (one forgotten tick of delay is 10 % near the resonance)."""
 
 ESTIMATORS = {estimator.name: estimator for estimator in (DIRECT, JOINT, INDIRECT)}

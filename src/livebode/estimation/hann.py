@@ -13,8 +13,8 @@ Complex = NDArray[np.complex128]
 class Hann:
     """X_k/2 − (X_{k−1} + X_{k+1})/4, the periodic Hann window in the frequency domain (Jacobsen & Lyons 2003).
 
-    It gives less weight to what a moving axis was at the ends of the window, for 1.5 times the noise. Lines need to be
-    two bins apart, else their neighbours' excitation comes in.
+    It reduces the weight of the window's ends, where a moving axis was at other positions, for 1.5 times the noise.
+    Lines must be two bins apart, otherwise the excitation of neighbouring lines leaks in.
     """
 
     def __init__(self, lines: Lines) -> None:

@@ -16,7 +16,7 @@ from livebode.estimation.silence import STEADY
 
 Floats = NDArray[np.float64]
 
-SECONDS_MIN = 2.0  # thirds of it tell 50 from 60 Hz, and have bins between these
+SECONDS_MIN = 2.0  # its thirds separate 50 from 60 Hz, with bins between them
 _PARTS = 3
 _REACH = 3e-3  # of its frequency by which the mains may be off
 _LOBE = 2  # bins on each side that a tone reaches in a Hann window
@@ -43,10 +43,11 @@ class Hum:
 def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
     """Tones within 0.3 % of multiples 1 … 10 of 50 and 60 Hz in signals without excitation, ascending.
 
-    A tone counts where its power, over thirds of the recording with a Hann window, is more than noise gives beside it
-    by chance (1e-8), and where each third has nine tenths of the power of each other one, less what noise explains:
-    what rings out is no hum, and neither is a mode that noise drives, for its amplitude wanders; it passes by chance
-    about once in 20 recordings. Bias of the amplitude: noise adds to its square what it has in five bins.
+    A tone is detected if its power, over thirds of the recording with a Hann window, exceeds the noise of its
+    neighbours (probability of chance 1e-8), and if each third has nine tenths of the power of each other third, less
+    the scatter of the noise. So a decaying oscillation is not hum, nor is a mode that noise excites, whose amplitude
+    varies; the latter passes by chance about once in 20 recordings. Bias: the squared amplitude contains the noise
+    power of five bins.
 
     Parameters
     ----------
@@ -98,13 +99,13 @@ def _powers(x: Floats, rate_hz: float) -> Floats:
 
 
 def _tone(power: Floats, expected: float, multiples: NDArray[np.int64]) -> tuple[float, float] | None:
-    """Place in bins and amplitude of a tone near a place; None where none stands out, or its power changes."""
+    """Place in bins and amplitude of a tone near a place; None where the noise hides it, or its power changes."""
     mean, reach = power.mean(axis=0), max(1, round(_REACH * expected))
     first = max(round(expected) - reach, 1)
     at = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
     lobe = np.arange(max(at - _LOBE, 1), min(at + _LOBE, mean.size - 1) + 1)
     if mean[at] < mean[lobe].max():
-        return None  # the flank of another one
+        return None  # the flank of another tone
     beside = at + _BESIDE
     beside = beside[(beside > 0) & (beside < mean.size)]
     others = multiples[np.abs(multiples - at) > _LOBE + reach]

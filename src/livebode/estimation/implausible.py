@@ -1,4 +1,4 @@
-"""Finite samples so large that a running sum would remember them: broken telegrams, not measurements."""
+"""Finite samples so large that they would corrupt a running sum: broken telegrams, not measurements."""
 
 from __future__ import annotations
 
@@ -50,6 +50,6 @@ class PlausibleRange:
         return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
 
     def _end_period(self) -> None:
-        # A signal that was silent says nothing about what is too large.
+        # A signal that was zero gives no scale for what is too large.
         self._limit = np.where(self._largest > 0, _FACTOR * self._largest, np.inf)
         self._largest = np.zeros_like(self._largest)

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 # A window counts as excited at a line down to this share of the largest power seen: above the rounding of the DFT,
-# below any excitation that somebody meant.
+# below any intended excitation.
 _EXCITED = 1e-12
 
 
@@ -41,7 +41,7 @@ class Estimate:
 
 
 class LineStage:
-    """Responses from spectra, wherever these were computed: here by the kernel, or in the drive.
+    """Responses from spectra that were computed by the kernel here or in the drive.
 
     Spectra are told apart by their place in the period, so that each hop has its own past of whole periods; spectra
     further apart than a window are one series.
@@ -51,7 +51,7 @@ class LineStage:
     settings
         Lines, signals, estimator and options.
     sent
-        The bins that there are; None where any can be had.
+        The available bins; None where all are available.
     """
 
     def __init__(self, settings: Settings, sent: Collection[int] | None = None) -> None:
@@ -60,7 +60,7 @@ class LineStage:
         self._hann = Hann(lines) if settings.hann else None
         self._detection = None
         if settings.uses_detection_lines:
-            # Only a reference that is the excitation itself shows that these bins are without it.
+            # Only if the reference is the excitation itself does it show that these bins are not excited.
             outside = beyond(lines) if settings.method.reference == "excitation" else ()
             self._detection = DetectionNoise(lines, tuple(k for k in outside if sent is None or k in sent))
         self._places = max(1, lines.window // settings.step)
@@ -92,7 +92,7 @@ class LineStage:
         return events
 
     def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record: rate, window, lines, hop, the noise's origin."""
+        """The basis of the responses as plain data for a record: rate, window, lines, hop, the noise's origin."""
         lines, ripple = self._settings.lines, [asdict(order) for order in self._settings.ripple]
         return {
             "rate_hz": lines.rate_hz,
@@ -146,11 +146,11 @@ class LineStage:
         channels
             Names and units of the signals.
         repeating
-            What the periods before show of errors that repeat with the excitation; None where there are no samples.
+            Errors that repeat with the excitation, from the previous periods; None where there are no samples.
         ripple
             Largest power of a ripple that is added to the input, at each line, (rows, lines); None where none is known.
         """
-        with np.errstate(all="ignore"):  # what is not whole may be anything, and comes out as NaN
+        with np.errstate(all="ignore"):  # an incomplete window has no defined value, so it becomes NaN
             return self._responses(rows, place, centre, response_unit(channels, self._settings), repeating, ripple)
 
     def _responses(
@@ -176,9 +176,9 @@ class LineStage:
         moments = self._moments.update(series, spectra, powers, moment, usable)
         estimate = self._estimate(pair, powers, moments, moving, repeating, ripple)
         if s.average:
-            begun = moments.weight > 0  # until then there is no mean, only the window's own moment
+            begun = moments.weight > 0  # until then there is no mean, only the window's own time
             first, moment = np.where(begun, moments.first, first), np.where(begun, moments.moment, moment)
-        # An average goes on through windows that it leaves out.
+        # An average continues through windows that it excludes.
         seen = rows.whole if s.average else rows.clean
         valid = seen[:, np.newaxis] & excited & np.isfinite(estimate.value)
         distortion = np.where(valid, estimate.distortion, np.nan)
@@ -226,7 +226,7 @@ class LineStage:
         return self._detection.power(pair[0] / pair[1], output, denominator, excited) * reference[:, at]
 
     def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which windows see a machine that moves; an Event for the first where its noise is judged otherwise."""
+        """Windows in which the machine moves; an Event for the first one whose noise is estimated in another way."""
         moving = self._movement.process(series, centre[1])
         if self._detection is None:
             return np.zeros(len(sample), dtype=np.bool_)
@@ -280,7 +280,7 @@ class LineStage:
         weight = powers[0] + 0j if s.method.reference == "input" else numerator / excitation / value
         if s.quantity != "plant":
             entered = s.loop.entry_at(f) * excitation
-            # Without a description of the controller the signals tell what it did: F·y = E·w − u.
+            # Without a description of the controller the signals contain its action: F·y = E·w − u.
             known = s.loop.feedback is not None
             feedback = s.loop.feedback_at(f) if known else (entered - denominator) / numerator
             value, by_plant = convert(s.quantity, value, feedback)
@@ -291,8 +291,8 @@ class LineStage:
     def _noise(self, now: Floats, moments: Moments, moving: NDArray[np.bool_], share: Floats) -> tuple[Floats, Floats]:
         """Variance of numerator − Ĝ·denominator for one window (rows, lines), and its degrees of freedom (rows,).
 
-        `now` is the power at the detection lines in this window. Where the machine moves it alone counts, because the
-        scatter between periods contains the motion; else that scatter counts, or with "quiet" the larger of the two.
+        `now` is the power at the detection lines in this window. Where the machine moves, it is used alone, because the
+        scatter between periods contains the motion; else the scatter is used, or with "quiet" the larger of the two.
         """
         periods, dof = between_periods(moments), moments.dof
         if self._detection is None:

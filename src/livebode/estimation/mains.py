@@ -1,4 +1,4 @@
-"""Hum of the mains: tones at multiples of 50 or 60 Hz that repeat with a window as the excitation does."""
+"""Mains hum: tones at multiples of 50 or 60 Hz that repeat with the window, as the excitation does."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ _MATTERS = 1e-8
 class Mains:
     """Which lines are at multiples of a mains frequency, and whether the mains is seen at other multiples of it.
 
-    A tone on a line cannot be told from the response there. Harmonics on bins without excitation tell it, and so does
-    a period without excitation. A tone at one line alone, always there, cannot be seen in a periodic recording.
+    A tone on a line cannot be separated from the response at that line. It is detected by harmonics on bins without
+    excitation, or in a period without excitation. A permanent tone at one line only cannot be detected in a periodic
+    recording.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class Mains:
         return bool(self._any.any())
 
     def seen(self, output: Floats) -> NDArray[np.bool_]:
-        """Which lines may hold hum, (lines,), by the power of the mean output at `bins`."""
+        """Lines that may contain hum, (lines,), by the power of the mean output at `bins`."""
         if not self.any:
             return self._any
         least = _MATTERS * output[self._excited.tones].max()
@@ -97,17 +98,17 @@ class _Neighbours:
         return np.concatenate([self.tones, self._beside.ravel()])
 
     def place_in(self, bins: NDArray[np.int64]) -> None:
-        """From here on powers are given at these bins only."""
+        """Restrict the powers to these bins."""
         self.tones, self._beside = np.searchsorted(bins, self.tones), np.searchsorted(bins, self._beside)
 
     def stand_out(self, power: Floats) -> NDArray[np.bool_]:
-        """Which bins have more power than chance gives them beside their neighbours, (tones,)."""
+        """Bins whose power exceeds that of their neighbours by more than chance, (tones,)."""
         level = np.where(self._usable, power[self._beside], 0.0).sum(axis=1) / self._count
         return np.asarray(self._enough & (power[self.tones] > self._times * level))
 
 
 def stands_out_by(neighbours: int) -> float:
-    """How many times the mean power of its neighbours a bin has by chance once in 1e8 bins of noise."""
+    """Ratio to the mean power of its neighbours that a bin of noise exceeds with a probability of 1e-8."""
     return float(neighbours * (_CHANCE ** (-1 / max(neighbours, 1)) - 1))
 
 

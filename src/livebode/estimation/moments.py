@@ -22,13 +22,13 @@ class Moments:
     """Weighted moments of line spectra, one row for each place in the period or each moment in time.
 
     Numerator and denominator are those of the estimate, each times conj(reference). The weights are λ^i over the
-    windows i that were taken in, the newest first.
+    windows i, the newest first.
 
     Attributes
     ----------
     means
         Means of the real and imaginary parts of numerator, denominator and reference (6) and of four powers (4),
-        shape (10, rows, lines). Real and in one array, so that a period is taken in by few calls.
+        shape (10, rows, lines). Real and in one array, so that a period is added in few calls.
     scatter
         Σλ^i|δnum|², Σλ^i|δden|² and the real and imaginary part of Σλ^i·δnum·conj(δden) with δ the deviation from the
         mean, shape (4, rows, lines).
@@ -67,7 +67,7 @@ class Moments:
 
     @property
     def repeatability(self) -> Floats:
-        """|S_r|²/S_rr: the share of the reference's power that its mean keeps, shape (rows, lines)."""
+        """|S_r|²/S_rr: the share of the reference's power that its mean has, shape (rows, lines)."""
         return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
 
     @property
@@ -82,12 +82,12 @@ class Moments:
 
     @property
     def first(self) -> NDArray[np.int64]:
-        """Number of the oldest sample that went in, shape (rows,)."""
+        """Number of the oldest sample included, shape (rows,)."""
         return np.asarray(self.moment[2], dtype=np.int64)
 
     @property
     def unbiased(self) -> Floats:
-        """What a scatter is to be divided by for the variance of one window, shape (rows,); NaN for less than two."""
+        """Scatter over this is the variance of one window, shape (rows,); NaN for fewer than two windows."""
         one, two, _ = self.weights
         with np.errstate(invalid="ignore"):
             rest = one - two / one
@@ -114,11 +114,11 @@ class Moments:
         numerator, denominator, re, im = self.scatter
         shared = ratio.real * re + ratio.imag * im
         total = numerator - 2 * shared + (ratio.real**2 + ratio.imag**2) * denominator
-        return np.asarray(np.maximum(total, 0.0))  # what rounding leaves below zero is zero
+        return np.asarray(np.maximum(total, 0.0))  # rounding can make it negative
 
 
 class PeriodMoments:
-    """Running Moments: windows one period apart are one series, so that every hop has its own past.
+    """Running Moments: windows one period apart are one series, so that every hop has its own history.
 
     Means and centred second moments are updated by deviations (West 1979), since sums of squares would lose the
     scatter to rounding at a high signal-to-noise ratio.
@@ -132,8 +132,8 @@ class PeriodMoments:
     forgetting
         λ per period, 0 < λ ≤ 1; 1 remembers every period equally.
     own
-        Whether the moments that go with a window include it. A window that is judged by the scatter of the others
-        must not: as an outlier it would widen its own bound.
+        Whether the moments of a window include the window itself. They must not where the scatter of the others is
+        its bound: an outlier would widen its own bound.
     """
 
     def __init__(self, places: int, lines: int, forgetting: float, *, own: bool) -> None:
@@ -159,7 +159,7 @@ class PeriodMoments:
         return Moments(self._means, self._scatter, self._moment, self._weights.after(self._count))
 
     def update(self, place: int, spectra: Complex, power: Floats, moment: Floats, usable: NDArray[np.bool_]) -> Moments:
-        """Take in windows at consecutive places from `place` on and return the Moments that go with each.
+        """Add windows at consecutive places from `place` on and return the Moments for each.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class PeriodMoments:
         moment
             Time, schedule and oldest sample, shape (3, rows).
         usable
-            Shape (rows,); windows that are not usable leave their place's moments as they are.
+            Shape (rows,); unusable windows do not change the moments of their place.
         """
         parts = _parts(place, self._count.size, usable)
         before, after = self._counts(parts, usable.size)
@@ -183,7 +183,7 @@ class PeriodMoments:
         return Moments(means, scatter, moment, self._weights.after(after if self._own else before))
 
     def _counts(self, parts: list[_Part], rows: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Windows taken in at the place of each row, before it and with it."""
+        """Number of windows added at the place of each row, without and with this row."""
         before, after = np.empty(rows, dtype=np.int64), np.empty(rows, dtype=np.int64)
         for places, at, usable in parts:
             before[at] = self._count[places]
@@ -200,7 +200,7 @@ class PeriodMoments:
                 kept[:, at] = means
             if usable:
                 known, now = means[_NOISE], new[_NOISE, at]
-                # A window with the start or the end of the excitation knows no noise: the mean is of those that do.
+                # A window with the start or the end of the excitation has no noise estimate: the mean is of the others.
                 means[_NOISE] = np.where(np.isnan(known), now, known)
                 new[_NOISE, at] = np.where(np.isnan(now) & (column[at] < 1), means[_NOISE], now)
                 np.subtract(new[:, at], means, out=deviation[:, at])
@@ -240,7 +240,7 @@ class Weights:
 
     def __init__(self, forgetting: float) -> None:
         self.forgetting = forgetting
-        # From where on another window's weight is below rounding.
+        # Number of windows above which the weight of another one is below rounding.
         self._enough = 0 if forgetting == 1 else min(ceil(log(1e-17) / log(forgetting)), 1 << 20)
         powers = np.cumprod(np.full((3, self._enough), forgetting ** np.array([[1.0], [2.0], [3.0]])), axis=1)
         self._table = np.concatenate([np.zeros((3, 1)), np.ones((3, 1)), 1 + np.cumsum(powers, axis=1)], axis=1)

@@ -1,4 +1,4 @@
-"""Whether the machine moves, as its schedule shows."""
+"""Detects from the schedule whether the machine moves."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _FEW = 8  # places: with fewer, second differences miss vibration, so that twice
 
 
 class Movement:
-    """Compares the schedule with the nine periods before, at the same place in the period.
+    """Compares the schedule with the nine previous periods, at the same place in the period.
 
-    So the motion that the excitation itself makes, which is the same in every period, does not count. The machine moves
+    So the motion due to the excitation itself, which is the same in every period, has no effect. The machine moves
     where the schedule is farther from one of these than three times its jitter: the largest second difference of values
     that follow each other, over the same time. That depends on no offset and no unit; noise, a count that flickers and
-    a drift that stays within them are no motion. A schedule that is not known does not move.
+    a drift that stays within them are no motion. An unknown schedule counts as not moving.
 
     With fewer than eight places in a period it is six times. With a single one it takes eight periods to know the
     jitter, and strokes of less than 14 periods have second differences as large as they are, and are not seen.

@@ -14,7 +14,7 @@ def convert(quantity: Quantity, plant: Complex, feedback: Complex) -> tuple[Comp
     """The quantity from plant G and feedback F, and its derivative by G.
 
     Open loop L = F·G, sensitivity S = 1/(1 + L), closed loop T = L/(1 + L), all at the plant input, where the
-    excitation enters: L is what a cut there would show.
+    excitation enters: L is the response of the loop cut there.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Errors that repeat with the excitation, and so are in no scatter: distortion, hum of the mains, steps of a sensor."""
+"""Errors that repeat with the excitation, so that no scatter shows them: distortion, mains hum, sensor steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _PERIODS_MIN = 2
-_JUDGED_PER_S = 10  # times at most; short periods come more often than anybody needs a verdict
+_JUDGED_PER_S = 10  # times at most; for short periods a verdict in each period is not needed
 _DISTORTED = 0.5  # of |G|: from where on the value is not that of a linear machine
 _STEPS = 0.5  # amplitude in steps of the sensor below which a line may not be seen at all
 _OTHER = 0.1  # of the excitation's power: from where on a period does not repeat the ones before
@@ -35,7 +35,7 @@ _HUM = _KINDS.index("hum")
 
 @dataclass(frozen=True, eq=False)
 class Repeating:
-    """What the periods before each window show: `distortion` of numerator/denominator and `invalid`, (rows, lines)."""
+    """Verdict of the periods before each window: `distortion` of numerator/denominator and `invalid`, (rows, lines)."""
 
     distortion: Floats
     invalid: NDArray[np.bool_]
@@ -43,12 +43,12 @@ class Repeating:
 
 
 class RepeatingErrors:
-    """Watches whole periods of the signals for what repeats with the excitation without being a linear response.
+    """Detects in whole periods of the signals what repeats with the excitation but is not a linear response.
 
     One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out, and periods in
     which the machine moves, do not count; a start, a gap, a pause or another phase of the excitation and a movement
-    begin the mean over periods again. What is found counts from the next window on, and is never averaged away; behind
-    a gap or a pause it counts until the next verdict.
+    restart the mean over periods. A verdict applies from the next window on and is never averaged; after a gap or a
+    pause the previous verdict applies until the next one.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class RepeatingErrors:
         }
 
     def restart(self, sample: int) -> None:
-        """The next sample has this number, and does not follow the one before."""
+        """The next sample has this number and does not follow the previous one."""
         self._at = sample % self._settings.lines.window
         self._whole, self._position[:] = False, np.nan
         self._forget()
@@ -135,7 +135,7 @@ class RepeatingErrors:
         schedule: Floats,
         block: Block,
     ) -> Repeating:
-        """What goes with the windows of these rows.
+        """The verdicts for the windows of these rows.
 
         Parameters
         ----------
@@ -206,12 +206,12 @@ class RepeatingErrors:
         return np.zeros(len(self._settings.lines), dtype=np.bool_)
 
     def _differs(self, excitation: Complex) -> bool:
-        """Whether this period's excitation, at the lines, is another one than that of the mean: it began, or leapt."""
+        """Whether this period's excitation, at the lines, differs from the mean: it began or changed its phase."""
         mean = self._moments.now.reference[0, self._lines]
         return bool(self._periods and power(excitation - mean).sum() > _OTHER * power(mean).sum())
 
     def _pause(self, output: Floats) -> NDArray[np.bool_]:
-        """A period without excitation, behind which it may begin at another phase."""
+        """A period without excitation, after which it may begin at another phase."""
         if self._periods:
             self._forget()
         gone = self._silence.take(*self._mains.alone(output))
@@ -231,7 +231,7 @@ class RepeatingErrors:
             variance, significant = self._distortion.variance(moments, self._lines, self._beside, instrument, of_steps)
             distortion = np.sqrt(variance) / np.abs(denominator)
         hum = self._silence.lines | self._mains.seen(power(self._output))
-        # A mean that has begun again has little significance; what was found before it counts.
+        # A mean that was restarted has little significance; the previous verdict applies.
         distorted = (distortion > _DISTORTED * np.abs(numerator / denominator)) & (significant | self._now[1][0])
         self._counts = 2 * np.abs(numerator) / window / step
         # Noise larger than the steps carries any amplitude over them.
@@ -252,7 +252,7 @@ class RepeatingErrors:
         for at in np.flatnonzero(gone & self._told[_HUM]):
             self._told[_HUM, at] = False
             f = self._settings.lines.frequency_hz[at]
-            message = f"hum of the mains at {f:g} Hz is no longer seen without excitation; the line is valid again"
+            message = f"mains hum at {f:g} Hz is no longer detected without excitation; the line is valid again"
             self._events.append(Event("hum-gone", sample, time_s, message, {"line_hz": float(f)}))
         invalid = self._now[1]
         for i, at in zip(*np.nonzero(invalid & ~self._told)):
@@ -270,8 +270,11 @@ class RepeatingErrors:
             )
         if kind == "steps":
             counts = float(self._counts[at])
-            return f"the output moves {counts:.2g} steps of its sensor at {f:g} Hz: excite more", {"steps": counts}
+            return (
+                f"the output moves only {counts:.2g} steps of its sensor at {f:g} Hz: increase the excitation",
+                {"steps": counts},
+            )
         numerator, denominator = self._moments.now.pair[:, 0, at]
         share = float(self._now[0][at] / np.abs(numerator / denominator))
-        why = "friction, backlash or steps of a sensor; excite more, or move the axis"
+        why = "friction, backlash or sensor steps; increase the excitation, or move the axis"
         return f"distortion may be {share:.0%} of the response at {f:g} Hz ({why})", {"share": share}

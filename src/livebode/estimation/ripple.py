@@ -1,4 +1,4 @@
-"""Ripple: torque that repeats with the motor's angle, and what of it a window takes for the machine's response."""
+"""Ripple: torque that repeats with the motor's angle, and its share in a window's response."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.core import Lines, UsageError
 
 Floats = NDArray[np.float64]
 
-_MORE = 1.3  # times the amplitude: its error has one size, not that of noise, and the 63 % bound is to hold it
+_MORE = 1.3  # times the amplitude: its error has a fixed size, unlike noise, and the 63 % bound must cover it
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ def ripple_power(orders: tuple[RippleOrder, ...], lines: Lines, rate_per_s: Floa
     """Largest |D|² of the ripple at each line, D its spectrum over a window, (rows, lines).
 
     A tone of amplitude T that is d bins beside a line has |D| = T·N/2·sinc(d) there. Where the speed changes within a
-    window, the smallest d counts. NaN rates have none.
+    window, the smallest d is used. NaN rates have none.
 
     Parameters
     ----------
     orders
-        What is known of the ripple.
+        Orders of the ripple.
     lines
         The lines, with window and rate.
     rate_per_s

@@ -1,4 +1,4 @@
-"""What a Tracker is told: plain data, checked whole."""
+"""Settings of a Tracker: plain data, validated together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
 from livebode.estimation.ripple import RippleOrder
 
 DETECTION_LINES_MIN = 4
-"""Detection lines that noise can be taken from."""
+"""Smallest number of detection lines for an estimate of the noise."""
 
 QUANTITIES: tuple[Quantity, ...] = ("plant", "open loop", "closed loop", "sensitivity")
 
@@ -23,23 +23,23 @@ class Settings:
     Parameters
     ----------
     lines
-        Where; also gives the window and the rate.
+        Excited lines, with the window and the rate.
     output, input, excitation, schedule
         Channel names of y, u, w and of the signal that responses are plotted over (position). Direct needs y and u,
         joint y, u and w, indirect y and w.
     estimator
         "direct", "joint" or "indirect"; see `livebode.estimation.estimators` for when each is biased.
     loop
-        What feeds back, where w enters, and when signals were logged.
+        The feedback, the injection point of w, and when signals were logged.
     quantity
         "plant", "open loop", "closed loop" or "sensitivity".
     hop
         Samples between responses, counted within the period; by default a twentieth of the window. Longer than the
         window only as a multiple of it; "a period before" is then a hop before, also for `forgetting`.
     average
-        Whether a response speaks for the weighted mean over the remembered periods instead of the newest window alone.
+        Whether a response is the weighted mean over the remembered periods instead of the newest window alone.
     forgetting
-        λ per period, 0 < λ ≤ 1: the memory behind `sigma` and coherence, and behind the value when averaging.
+        λ per period, 0 < λ ≤ 1: the memory of `sigma` and coherence, and of the value when averaging.
         0.8 remembers about nine periods, 1 all.
     noise
         Where the noise in sigma comes from: "periods", the scatter between them; "quiet", the larger of that and of
@@ -48,12 +48,12 @@ class Settings:
     differenced
         Channels that are differenced before the DFT (and divided by 1 − z⁻¹ after it): a position that drifts.
     hann
-        Whether lines come from three bins as by a Hann window.
+        Whether lines are computed from three bins, as with a Hann window.
     spikes
-        Channels that are watched for spikes; windows that hold one are left out. See `SpikeGate`.
+        Channels that are checked for spikes; windows with a spike are excluded. See `SpikeGate`.
     dtype
-        "float64", or "float32" for what the kernel gives on a drive without double precision: samples are rounded to it
-        as they come, and the DFT's tables and sums are in it. An error that grows with a constant offset on a channel.
+        "float64", or "float32" to match the kernel on a drive without double precision: samples are rounded to it on
+        arrival, and the DFT's tables and sums use it. The error grows with a constant offset on a channel.
     ripple
         Orders of a torque that repeats with the schedule, as cogging does. Where one meets a line, sigma contains it.
 
@@ -134,7 +134,7 @@ class Settings:
         if self.ripple and self.schedule is None:
             raise UsageError(
                 "missing",
-                "a ripple repeats with the schedule, and the schedule is not named",
+                "a ripple repeats with the schedule, but no schedule is specified",
                 "name the channel of the position",
                 argument="schedule",
             )
@@ -157,7 +157,7 @@ class Settings:
             if (word := getattr(self, name)) not in known:
                 raise UsageError(
                     "not-one-of",
-                    f"{name}={word!r} is not known",
+                    f"{name}={word!r} is not supported",
                     f"choose {' or '.join(map(repr, known))}",
                     argument=name,
                     value=word,
@@ -189,7 +189,7 @@ class Settings:
 
     @property
     def step(self) -> int:
-        """The hop in samples, chosen or given."""
+        """The hop in samples, specified or default."""
         assert self.hop is not None
         return self.hop
 
@@ -206,9 +206,9 @@ class Settings:
 
     @property
     def identity(self) -> str:
-        """All that a tracker's state depends on: two with the same one may take each other's snapshots.
+        """All settings that a tracker's state depends on; trackers with the same identity can exchange snapshots.
 
-        Not the controllers, which only turn what was measured into the plant.
+        Not the controllers, which only convert the measured response into that of the plant.
         """
         logged = tuple(self.loop.advance_ticks(role) for role in self.roles)
         names = ("lines", "output", "input", "excitation", "schedule", "estimator", "hop", "average", "forgetting")
@@ -239,5 +239,5 @@ def nearest_hop(window: int, wanted: float) -> int:
     small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
     divisors = small + [window // d for d in small]
     nearest = min(divisors, key=lambda d: max(d / wanted, wanted / d))
-    # A prime window has no divisor near; a longer last step in each period is then the lesser evil.
+    # A prime window has no divisor nearby; a longer last step in each period is then better.
     return nearest if max(nearest / wanted, wanted / nearest) <= 4 else round(wanted)

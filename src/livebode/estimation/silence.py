@@ -1,4 +1,4 @@
-"""Hum of the mains in periods without excitation: a tone that does not decay."""
+"""Mains hum in periods without excitation: a tone that does not decay."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _PERIODS = 9
-"""Of silence after an excitation, until a tone counts as hum.
+"""Periods of silence after an excitation before a tone counts as hum.
 
 A mode with a damping ratio of 0.1 % at 50 Hz loses 31 % of its power from the first to the last third of nine periods
-of 0.1 s; in two periods a damping ratio of 0.5 % cannot be told from noise.
+of 0.1 s; in two periods a damping ratio of 0.5 % cannot be separated from noise.
 """
 _PERIODS_FIRST = 3  # of silence before the first excitation: thirds that a tone can decay over
 STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
@@ -23,19 +23,19 @@ class SilentHum:
     """Which lines show a steady tone in periods without excitation.
 
     After the excitation a weakly damped mode rings near its own frequency, and looks like a tone. So a tone counts
-    where it is seen in nine periods of silence in a row and does not decay over these; where the data begins without
-    excitation, three to eight are enough. What was found is withdrawn when a later silence shows no tone there.
+    if it is detected in nine consecutive periods of silence and does not decay over them; where the data begins
+    without excitation, three to eight are enough. A verdict is withdrawn when a later silence shows no tone there.
 
     Parameters
     ----------
     lines
-        How many lines there are.
+        Number of lines.
     """
 
     def __init__(self, lines: int) -> None:
         self._power = np.full((_PERIODS, lines), np.nan)  # of the newest periods of this silence, newest last
         self._found = np.zeros(lines)  # the hum's power, 0 where there is none
-        self._low = np.zeros(lines)  # periods in a row in which it was not there
+        self._low = np.zeros(lines)  # consecutive periods without it
         self._counts = np.zeros(2)  # periods of this silence, and of excitation before it
 
     _STATE = ("_power", "_found", "_low", "_counts")

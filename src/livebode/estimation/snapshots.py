@@ -1,4 +1,4 @@
-"""State of a Tracker as bytes: named arrays, and a fingerprint of what they belong to."""
+"""State of a Tracker as bytes: named arrays, and a fingerprint of their owner."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Arrays = dict[str, NDArray[np.generic]]
 
 
 def pack(parts: dict[str, Arrays], owner: str) -> bytes:
-    """Arrays of named parts as bytes, exact; `owner` says all that their meaning depends on."""
+    """Arrays of named parts as bytes, exact; `owner` identifies all that their meaning depends on."""
     flat: dict[str, Any] = {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, owner=_fingerprint(owner), **flat)
@@ -24,7 +24,7 @@ def pack(parts: dict[str, Arrays], owner: str) -> bytes:
 
 
 def unpack(data: bytes, owner: str) -> dict[str, Arrays]:
-    """The parts again; UsageError where the bytes are damaged or belong to other settings."""
+    """The parts from the bytes; UsageError where these are damaged or belong to other settings."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             flat = {name: stored[name] for name in stored.files}

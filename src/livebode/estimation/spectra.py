@@ -1,4 +1,4 @@
-"""From samples to line spectra: which rows are whole, and what is done to a signal before and after the DFT."""
+"""From samples to line spectra: complete windows, and the processing of a signal before and after the DFT."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Rows:
 
     `spectrum` is (channels, rows, bins) with the phase of a fixed grid of period N, so that rows compare with each
     other and channels divide; `sample` (rows,) the newest sample of each; `whole` (rows,) False where the window holds
-    a start, a gap, or a sample that was not finite or implausibly large, `clean` (rows,) False also where it holds a
+    a start, a gap, or a non-finite or implausibly large sample, `clean` (rows,) False also where it contains a
     spike; `not_finite`, `implausible` and `spikes` are the positions of such samples in the stretch.
     """
 
@@ -40,9 +40,9 @@ class Rows:
 
 
 class LineSpectra:
-    """Sliding DFT of several signals, with bookkeeping of what each window holds.
+    """Sliding DFT of several signals that records gaps, non-finite samples and spikes of each window.
 
-    Hops count within the period: rows stand at the multiples of `hop` in each period, so that every row has one
+    Hops count within the period: rows are at the multiples of `hop` in each period, so that every row has one
     exactly a period before it. Where `hop` does not divide N, the last step of each period is longer. A hop of several
     windows counts within itself.
 
@@ -56,7 +56,7 @@ class LineSpectra:
     advanced
         For each signal, ticks by which its spectrum is advanced (z^ticks).
     spikes
-        Gate that names samples to leave out, or None.
+        Gate that finds samples to exclude, or None.
     dtype
         Of the samples and of the DFT; what is done to a signal before and after it is in float64.
     """
@@ -118,14 +118,14 @@ class LineSpectra:
 
     def process(self, data: Floats) -> Rows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what is too large for the dtype is not finite there
+        with np.errstate(over="ignore", invalid="ignore"):  # a value too large for the dtype becomes infinite
             finite, not_finite = self._prepare(data)
         implausible = self._range.process(finite)
         if implausible.size:
             finite = finite.copy()
             finite[:, implausible] = 0.0
         missing = np.concatenate([not_finite, implausible])
-        # What was put in for a missing sample may stand out, but is no spike of the signal.
+        # The substitute for a missing sample may differ, but is not a spike of the signal.
         spikes = _NONE
         if self._spikes is not None:
             known = self.known_spikes[
@@ -153,7 +153,7 @@ class LineSpectra:
             shifted = np.concatenate([self._before[:, np.newaxis], data[:, :-1]], axis=1)
             self._before = data[:, -1].copy()
             data = np.where(self._differenced[:, np.newaxis], data - shifted, data)
-        # A finite sum says that every sample is finite, in one pass.
+        # A finite sum proves in one pass that every sample is finite.
         if np.isfinite(data.sum()):
             return data, _NONE
         bad = ~np.isfinite(data).all(axis=0)
@@ -162,7 +162,7 @@ class LineSpectra:
     def _spectra(self, data: Floats, offset: int) -> tuple[Complex, NDArray[np.int64]]:
         first = (self._next + offset) % self._window
         spectrum = self._dft.process(data, hop=self._step, phase="fixed")
-        # Rows stand behind the samples whose count is a multiple of the step, which divides the window.
+        # Rows follow the samples whose count is a multiple of the step, which divides the window.
         position = np.arange(self._step - first % self._step - 1, data.shape[1], self._step)
         if self._step != self._hop:
             if self._hop > self._window:
@@ -188,7 +188,7 @@ class LineSpectra:
 
 
 def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], advanced: NDArray[np.int64]) -> Complex:
-    """What spectra of signals are multiplied by at each bin: z^advanced, over 1 − z⁻¹ where they are differenced."""
+    """Factor of the spectra at each bin: z^advanced, over 1 − z⁻¹ where signals are differenced."""
     z = np.exp(2j * np.pi * bins / window)
     factor = z ** advanced[:, np.newaxis]
     factor[differenced] /= 1 - 1 / z

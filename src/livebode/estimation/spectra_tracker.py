@@ -25,26 +25,26 @@ _NONE = np.zeros(0, dtype=np.intp)
 class SpectraTracker(AroundLines[SpectraWatch]):
     """Frequency responses of a machine whose drive runs the kernel and sends the spectra: a Tracker without its kernel.
 
-    From a kernel in the same precision it gives the Responses that a Tracker gives from the samples; a Response speaks
-    for its window's centre and is (N − 1)/2 samples late. What the drive marks as not whole or with a spike is left
-    out, and so are sums that are not finite or 1e8 times larger than all in the period before. Lost spectra leave no
-    window invalid, for the drive goes on.
+    With a kernel of the same precision the Responses equal those of a Tracker from the samples. The effective time of
+    a Response is its window's centre; it is (N − 1)/2 samples late. Spectra that the drive marks as not whole or with
+    a spike are excluded, and so are sums that are not finite or 1e8 times larger than all in the previous period. Lost
+    spectra do not invalidate later windows, because the drive continues.
 
     With a hop of m windows, the spectra behind `sigma`, the mean and the coherence are those m periods apart:
-    `forgetting` then counts spectra, and what the machine changes within that time is taken for noise. Where it moves,
-    take the noise from quiet bins, which each spectrum has of its own.
+    `forgetting` then counts spectra, and changes of the machine within that time count as noise. Where it moves,
+    take the noise from detection lines, which each spectrum contains.
 
     Parameters
     ----------
     settings
-        As for a Tracker, with the layout's lines and hop. `differenced` may be left out: the layout says it.
+        As for a Tracker, with the layout's lines and hop. `differenced` may be omitted: the layout contains it.
     layout
-        What the spectra are of.
+        Signals, window and bins of the spectra.
 
     Raises
     ------
     LivebodeError
-        If a signal, a bin or the schedule that the settings need is not sent, or they ask for what needs samples.
+        If a signal, a bin or the schedule that the settings need is not sent, or they need samples.
     """
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
@@ -72,13 +72,13 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         }
 
     def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record."""
+        """The basis of the responses as plain data for a record."""
         layout = self._layout
         constants = {signal.name: c for signal, c in zip(layout.signals, layout.subtracted)}
         return super().found() | {"from": "spectra", "subtracted": constants}
 
     def process(self, block: Block) -> Responses:
-        """Responses of these Spectra, which follow the ones before.
+        """Responses of these Spectra, which follow the previous ones.
 
         Raises
         ------
@@ -88,13 +88,13 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         if not isinstance(block, Spectra) or block.layout != self._layout:
             raise SignalError(
                 "layout-differs",
-                "these are not spectra of the layout that the tracker was made for",
+                "these spectra do not have the layout of the tracker",
                 "make another tracker",
             )
         hop, window = self._layout.hop, self._layout.window
         sums = block.sums[self._signals][:, :, self._columns]
         finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
-        with np.errstate(over="ignore", invalid="ignore"):  # what comes of implausible numbers is left out
+        with np.errstate(over="ignore", invalid="ignore"):  # responses from implausible numbers are excluded
             spectrum = np.where(finite[:, np.newaxis], sums, 0.0) * self._after
             size = np.nan_to_num(np.abs(spectrum).max(axis=2))
         implausible = np.zeros(len(block), dtype=np.bool_)
@@ -120,7 +120,7 @@ class SpectraTracker(AroundLines[SpectraWatch]):
 
 
 def _check(settings: Settings, layout: SpectraLayout) -> None:
-    """LivebodeError where these settings cannot be had from such spectra."""
+    """Raise LivebodeError where the spectra do not support these settings."""
     mine = settings.lines
     if (mine.window, mine.bins) != (layout.window, layout.lines) or settings.step != layout.hop:
         raise SignalError(

@@ -1,4 +1,4 @@
-"""What a SpectraTracker sees of its input: missing spectra, and windows that the drive marks."""
+"""Checks of a SpectraTracker's input: missing spectra, and windows that the drive marks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from livebode.core import SignalError, Spectra
 from livebode.estimation.counted import Counted
 
 _KINDS = {
-    "not-whole": "a window is not whole (the drive says so, or its sums are not finite)",
+    "not-whole": "a window is incomplete (marked by the drive, or its sums are not finite)",
     "implausible": "a spectrum is more than 1e8 times larger than all in the period before",
     "spike": "the drive marks a window with a spike",
 }
@@ -23,7 +23,7 @@ class SpectraWatch(Counted):
         self._window = window
 
     def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
-        """Count these, of each kind those that are `marked`; SignalError where they do not follow the ones before."""
+        """Count these, of each kind those that are `marked`; SignalError where they overlap the previous ones."""
         first = self._next < 0
         missing = 0 if first else block.start - self._next
         if missing < 0:
@@ -42,7 +42,7 @@ class SpectraWatch(Counted):
                 "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
             )
         if first:
-            # A stream that begins with the drive is not whole at first, which is nothing to tell.
+            # A stream that begins with the drive is incomplete at first, which needs no event.
             self._last["not-whole"] = int(block.sample[0]) - block.layout.hop
         self._count(block, marked["not-whole"], block.layout.hop + missing)
         self._next = block.stop
@@ -57,7 +57,7 @@ class SpectraWatch(Counted):
             self._tell(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
 
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
-        """Samples that these windows hold and those before did not; `new` since the window before."""
+        """Samples of these windows that previous ones did not contain; `new` since the previous window."""
         if self._next < 0 and not not_whole[0]:
             new = self._window
         self.counts["samples"] += min(new, self._window) + (len(block) - 1) * min(block.layout.hop, self._window)

@@ -1,4 +1,4 @@
-"""Samples that stand out from the same place in the periods before."""
+"""Samples that differ strongly from the same place in previous periods."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _COMPARED = 3  # the smallest number of periods whose median one spike cannot move
-_REMEMBERED = 9  # periods whose largest differences say what is usual
+_REMEMBERED = 9  # periods whose largest differences define the usual difference
 _FACTOR = 2.0  # a Gaussian sample of a window of 100 passes it once in 1e6 windows, and machines have heavier tails
 _ROUNDING = 1e-9  # of the signal's size: differences below come from arithmetic
 
 
 class SpikeGate:
-    """Finds spikes in periodic signals as they come, without looking ahead.
+    """Finds spikes in periodic signals sample by sample, without look-ahead.
 
     A sample is a spike when it differs from the median of the last three periods at its place by more than twice what
     the largest difference of a period usually is (median over the last nine periods). The largest and not a standard
@@ -24,7 +24,7 @@ class SpikeGate:
     Parameters
     ----------
     watched
-        For each signal, whether it is watched.
+        For each signal, whether it is checked.
     window
         Period, samples.
     """
@@ -54,7 +54,7 @@ class SpikeGate:
         self._whole = bool(whole)
 
     def restart(self, sample: int) -> None:
-        """The next sample has this number; the periods before still count as the past."""
+        """The next sample has this number; the previous periods remain the reference."""
         self._at = sample % self._past.shape[2]
         self._whole = self._at == 0
 
@@ -81,12 +81,12 @@ class SpikeGate:
         spike = difference > self._limit[:, np.newaxis]
         self._difference = np.maximum(self._difference, difference.max(axis=1))
         self._size = np.maximum(self._size, np.abs(expected).max(axis=1))
-        # A spike does not become the past that later periods are compared with.
+        # A spike does not become part of the reference for later periods.
         self._past[self._periods % _COMPARED][:, at] = np.where(spike, expected, data)
         return np.asarray(spike.any(axis=0))
 
     def _end_period(self) -> None:
-        # A period that began in the middle is no past to compare with; the next one overwrites it.
+        # A period that began in the middle is not a reference; the next one overwrites it.
         if self._whole:
             if self._periods > 0:
                 self._largest[self._periods % _REMEMBERED] = self._difference

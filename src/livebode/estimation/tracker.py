@@ -1,4 +1,4 @@
-"""Tracker: samples in, frequency responses with bounds out, at the pace of the samples."""
+"""Tracker: samples in, frequency responses with bounds out, at the rate of the samples."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from livebode.estimation.watch import Watch
 class Tracker(AroundLines[Watch]):
     """Frequency responses of a machine in closed loop, sample by sample, from a sliding DFT at excited lines.
 
-    Any cutting of the same samples into Blocks gives the same Responses, and a restored Tracker goes on as if it had
-    never stopped. A Response speaks for its window's centre: it is (N − 1)/2 samples late, and what changed within the
-    window is averaged over it. The first whole one comes N samples after a start, a gap or a sample that is not finite.
+    The Responses do not depend on how the samples are cut into Blocks, and a restored Tracker continues as if it had
+    never stopped. The effective time of a Response is its window's centre: it is (N − 1)/2 samples late, and changes
+    within the window are averaged. The first valid one is N samples after a start, a gap or a non-finite sample.
 
     Parameters
     ----------
     settings
         Lines, signals, estimator and options.
     repeating
-        Whether to watch for errors that repeat with the excitation (`RepeatingErrors`); not in what a model leaves.
+        Whether to detect errors that repeat with the excitation (`RepeatingErrors`); not for residuals of a model.
 
     Examples
     --------
@@ -76,12 +76,12 @@ class Tracker(AroundLines[Watch]):
         }
 
     def found(self) -> dict[str, Any]:
-        """What the responses stand on, as plain data for a record, and which lines have a reason against them."""
+        """The basis of the responses as plain data for a record, and the lines that are invalid, with the reason."""
         found = super().found()
         return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call: what is missing, what was left out, and how lines were judged."""
+        """Events since the last call: missing and excluded samples, and verdicts on lines."""
         repeating = self._repeating.drain() if self._repeating else []
         return sorted(super().drain_events() + repeating, key=lambda event: event.sample)
 
@@ -93,11 +93,11 @@ class Tracker(AroundLines[Watch]):
         return self.settings.identity
 
     def know_spikes(self, samples: NDArray[np.int64]) -> None:
-        """Numbers of samples to leave out as spikes besides those that are found; nothing where none are watched."""
+        """Numbers of further samples to exclude as spikes; no effect where no channel is checked."""
         self._spectra.known_spikes = samples
 
     def process(self, block: Block) -> Responses:
-        """Responses at the hops of this Block, which follows the one before.
+        """Responses at the hops of this Block, which follows the previous one.
 
         Raises
         ------

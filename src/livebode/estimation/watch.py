@@ -1,4 +1,4 @@
-"""What a Tracker sees of its input: starts, gaps, and samples that are left out."""
+"""Checks of a Tracker's input: starts, gaps, and excluded samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.estimation.spectra import Rows
 _KINDS = {
     "non-finite": "a sample is not finite",
     "implausible": "a sample is more than 1e8 times larger than all in the period before",
-    "spike": "a sample stands out from the periods before it and is left out",
+    "spike": "a sample differs strongly from the previous periods and is excluded",
 }
 
 
@@ -23,7 +23,7 @@ class Watch(Counted):
         self._window = window
 
     def starts(self, block: Block) -> bool:
-        """Whether this block does not follow the samples before it; says so where something is missing."""
+        """Whether this block does not follow the previous samples; adds an Event where samples are missing."""
         first = self._next < 0
         missing = 0 if first else block.start - self._next
         if missing < 0:
@@ -45,7 +45,7 @@ class Watch(Counted):
         return first or gap
 
     def take(self, block: Block, rows: Rows) -> None:
-        """Count the samples that were left out; one Event for all that lie within a window of each other."""
+        """Count the excluded samples; one Event for all that are within a window of each other."""
         found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
         new: list[tuple[int, str]] = []
         for kind, position in found.items():
@@ -60,5 +60,5 @@ class Watch(Counted):
             self._say(kind, block, sample, _KINDS[kind])
 
     def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
-        message = f"{what}; responses are invalid until a window of {self._window} samples is whole again"
+        message = f"{what}; responses are invalid until a window of {self._window} samples is complete again"
         self._tell(kind, block, sample, message, **details)

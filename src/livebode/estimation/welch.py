@@ -34,15 +34,15 @@ def welch(
     window
         Segment length, samples.
     overlap
-        Share of a segment that the next one repeats, 0 … 0.9.
+        Overlap of neighbouring segments as a share of their length, 0 … 0.9.
     taper
-        A window name that SciPy knows.
+        Name of a window in SciPy.
 
     Returns
     -------
     Response
-        Speaks for the middle of the recording. `sigma` from the power that the response does not explain, `dof` the
-        number of independent segments less one.
+        Its effective time is the middle of the recording. `sigma` is from the power that the response does not
+        explain, `dof` the number of independent segments less one.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def welch(
 
 
 def _independent_segments(segments: int, step: int, window: int, taper: str) -> float:
-    """How many segments without overlap would average as well (Welch 1967), for noise that is smooth over a bin."""
+    """Equivalent number of segments without overlap (Welch 1967), for noise that is smooth over a bin."""
     from scipy.signal import get_window
 
     shape = get_window(taper, window)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 
 class LivebodeError(ValueError):
-    """Something outside the program is wrong: a value, a file, a machine. Each subclass lists its codes.
+    """An error outside the program: in a value, a file or a machine. Each subclass lists its codes.
 
     It is a `ValueError`, so that validators of the configuration are reported with the key they belong to.
 
@@ -29,7 +29,7 @@ class LivebodeError(ValueError):
     message, remedy, facts
         As given; each fact is also an attribute.
     place
-        Where it was found, such as "axis.toml, axis x"; empty where the message says so itself.
+        Where it was found, such as "axis.toml, axis x"; empty where the message contains it.
 
     Examples
     --------
