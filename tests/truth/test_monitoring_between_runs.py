@@ -171,7 +171,7 @@ def test_an_offset_that_the_windows_never_tell_well_enough_is_reported_once(info
         events += detector.process(replace(seen, score=score, information=np.tile(known, (10, 1, 1))))
     assert [event.details["reason"] for event in events] == ["offset"] * reports
     if reports:
-        assert "tell its own offset only to ± 0.072 %" in events[0].message
+        assert "determine its own offset only to ± 0.072 %" in events[0].message
         assert "the belt's stiffness" in events[0].message
         assert "detected only beyond 3 % from the baseline" in events[0].message
 

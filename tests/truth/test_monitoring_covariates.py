@@ -96,7 +96,7 @@ def test_a_temperature_that_was_not_learned_is_reported_and_not_judged() -> None
     hot = at_temperature(8.0, 20_003, seconds=2.5)
     events = judged(warm(), hot())
     assert [event.kind for event in events] == ["baseline-unknown"]
-    assert "The baseline knows 'temperature' from 19.5 to 24.8, and it is 30" in events[0].message
+    assert "The baseline covers 'temperature' from 19.5 to 24.8, but it is 30" in events[0].message
     events = judged(warm(), edited(hot, np.nan))
     assert [event.kind for event in events] == ["baseline-unknown"]
     assert "'temperature' has no value" in events[0].message

@@ -1,4 +1,4 @@
-"""What the healthy machine is like, and the alarm when it changes."""
+"""Learns a baseline of the healthy machine and raises an alarm when the machine changes."""
 
 from livebode.monitoring.baseline import Baseline, signals_of
 from livebode.monitoring.evidence import Evidence

@@ -1,4 +1,4 @@
-"""How well a change is known from healthy windows, beyond what independent noise would say."""
+"""Accuracy of a change as healthy windows show it, beyond that of independent noise."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _BATCHES = (2, 4, 8)
-STRETCH = 24  # windows, over which what the baseline does not know is judged
+STRETCH = 24  # windows, over which the deviations from the baseline are estimated
 _APART = 4.0  # a change is at least this many scatters
 _OFF = 1.5  # scatters are at least this many standard deviations of the baseline's own error: three are then allowed
 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Of a change of each component, as healthy windows show it, each of shape (components,).
+    """Accuracy of a change of each component, as healthy windows show it, each of shape (components,).
 
     Attributes
     ----------
     inflation
-        Variance of the mean over neighbouring windows, against what independent windows would have; at least 1.
+        Variance of the mean over neighbouring windows, relative to that of independent windows; at least 1.
     scatter
-        Standard deviation of a change that was not there, over stretches of healthy motion: what speeds, directions
-        and friction leave that the baseline does not know, and the error of the baseline itself.
+        Standard deviation of an apparent change over stretches of healthy motion: effects of speed, direction and
+        friction that the baseline does not contain, and the error of the baseline itself.
     smallest
-        The smallest change that an alarm is for, of the logarithm.
+        Smallest change of the logarithm that raises an alarm.
     """
 
     inflation: Floats
@@ -36,7 +36,7 @@ class Accuracy:
 
     @property
     def allowed(self) -> Floats:
-        """How far a healthy machine may lie off the model."""
+        """Permitted distance of a healthy machine from the model."""
         return 2 * self.scatter
 
     def at_least(self, other: Accuracy) -> Accuracy:
@@ -51,9 +51,9 @@ class Accuracy:
 
 
 def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats | float = 0.0) -> Accuracy:
-    """From healthy windows in order, shape (windows, components) each; `smallest` as asked for, (components,).
+    """From healthy windows in order, shape (windows, components) each; `smallest` as specified, (components,).
 
-    `off` is the standard deviation of what the baseline itself is off by over a stretch, (components,).
+    `off` is the standard deviation of the baseline's own error over a stretch, (components,).
     """
     inflation = np.ones(smallest.shape)
     for size in _BATCHES:

@@ -1,4 +1,4 @@
-"""Alarms that stand, and the newest windows, over which a change is named."""
+"""Active alarms, and the newest windows, from which a change is identified."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class Alarm:
-    """A change that was named, and has not gone.
+    """An identified change that is still active.
 
     Attributes
     ----------
     change, rival
-        What it was named, and what would have explained it nearly as well (None where nothing would).
+        The identified change, and another that explains it nearly as well (None without such a change).
     since_sample, since_s
-        When it began.
+        Beginning of the change.
     way_m
-        From where to where the cart went while it was named.
+        Range of the cart's positions while it was identified.
     now, bound
-        Its amount over the newest windows, of the logarithm, and the half-width that holds the truth with 95 %.
+        Its amount over the newest windows, of the logarithm, and the half-width of its 95 % bound.
     height
-        The sum that it is held by, between 0 and the threshold: at 0 it has gone.
+        The sum that keeps it active, between 0 and the threshold: at 0 it is cleared.
     announced
-        Whether its Event is out.
+        Whether its Event was given.
     told, told_bound
         Amount and bound of its newest Event.
     """
@@ -52,11 +52,11 @@ class Alarm:
 
     @property
     def told_wrong(self) -> bool:
-        """Whether the amount is by now farther from what was told than both bounds allow."""
+        """Whether the amount now differs from the reported one by more than both bounds."""
         return self.announced and abs(self.now - self.told) > self.bound + self.told_bound
 
     def tell(self) -> Alarm:
-        """Itself, with its amount as it is now going out."""
+        """The alarm itself, with its present amount recorded as reported."""
         if not self.announced:
             self.change = replace(self.change, amount=self.now)
         self.announced, self.told, self.told_bound = True, self.now, self.bound

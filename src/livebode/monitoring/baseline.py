@@ -1,4 +1,4 @@
-"""Baseline: the healthy machine, as it was learned, and what a run must share with those that it was learned from."""
+"""Baseline: the learned healthy machine, and the settings that a run must share with the learned runs."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ _ON = {True: "on", False: "off"}
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """What the healthy machine is like over a scheduling signal.
+    """Description of the healthy machine over a scheduling signal.
 
     Attributes
     ----------
     lines
-        Of the runs that it was learned from.
+        Lines of the learned runs.
     hop
-        Theirs, in samples.
+        Hop of the learned runs, samples.
     signals
         Channel names of output, input, excitation and schedule, None where there is none.
     estimator, quantity
-        As in `Settings`; what the tables speak of.
+        As in `Settings`, for the tables.
     tables
         Mean and covariance of lines, and of parameters where there were any.
     machine
-        A model that moves; None where the runs held no motion along a schedule, or no two masses fit.
+        Model of the moving machine; None where the runs have no motion along a schedule, or no two-mass model fits.
     corrected
-        Whether its responses were freed from the axis's motion.
+        Whether its responses were corrected for the axis's motion.
     runs
-        Where it was learned from.
+        The runs that it was learned from.
     remark
-        Why there is no machine; empty where there is one.
+        Reason for the missing machine; empty where there is one.
     """
 
     lines: Lines
@@ -80,11 +80,11 @@ class Baseline:
 
     @property
     def covariates(self) -> tuple[str, ...]:
-        """Channels that its machine depends on beside torque, velocity and position."""
+        """Channels that its machine depends on in addition to torque, velocity and position."""
         return self.machine.covariates.names if self.machine is not None else ()
 
     def check_covariates(self, names: tuple[str, ...]) -> None:
-        """BaselineError where a run names other covariates than these; naming none takes them from here."""
+        """Raise BaselineError for other covariates than these; a run without covariates uses those of the baseline."""
         if names and set(names) != set(self.covariates):
             learned, here = (", ".join(some) or "no covariates" for some in (self.covariates, names))
             raise BaselineError(
@@ -103,7 +103,7 @@ class Baseline:
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Where in the period the rows of its tables stood; of five or more it is good for any other."""
+        """Places in the period of its tables' rows; with five or more places it is valid for any other."""
         return places(self.lines.window, self.hop)
 
     def _check_hop(self, hop: int) -> None:
@@ -122,13 +122,13 @@ class Baseline:
 
     @classmethod
     def load(cls, path: Path) -> Baseline:
-        """The baseline in a file; BaselineError where it cannot be read or is none."""
+        """The baseline in a file; BaselineError where it cannot be read or is not a baseline."""
         from livebode.monitoring.baseline_file import load
 
         return load(path)
 
     def save(self, path: Path) -> None:
-        """Write it to a file, whole or not at all; see docs/monitoring.md for what is in it."""
+        """Write it to a file, completely or not at all; docs/monitoring.md describes the content."""
         from livebode.monitoring.baseline_file import save
 
         save(self, path)

@@ -1,4 +1,4 @@
-"""A Baseline as one JSON file: numbers and nested lists, that any tool opens."""
+"""A Baseline as one JSON file: numbers and nested lists, readable by any tool."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3
 
 
 def save(baseline: Baseline, path: Path) -> None:
-    """Write beside its place, and move there when it is whole."""
+    """Write to a temporary file in the same directory, and move it into place when it is complete."""
     text = json.dumps(_plain(baseline), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -272,7 +272,7 @@ def _accuracy(data: Part) -> Accuracy:
 
 
 def _list(array: NDArray[Any]) -> Any:
-    """Nested lists, with None for what is not a number."""
+    """Nested lists, with None for NaN and infinity."""
     plain = array.astype(object)
     plain[~np.isfinite(array)] = None
     return plain.tolist()

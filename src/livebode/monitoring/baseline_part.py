@@ -1,4 +1,4 @@
-"""Part: one table of a baseline's file, whose values are checked as they are taken."""
+"""Part: one table of a baseline's file, whose values are checked when they are read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from livebode.core import BaselineError
 
 @dataclass(frozen=True)
 class Part:
-    """Values by name; `file` and `path` are for the sentence where one cannot be."""
+    """Values by name; `file` and `path` are for the message where one is invalid."""
 
     file: str
     path: str
@@ -56,7 +56,7 @@ class Part:
         return float(value)
 
     def array(self, name: str, dimensions: int, least: float = -np.inf, known: bool = True) -> NDArray[np.float64]:
-        """An array of numbers not below `least`; what is not `known` may be null, and is nan then."""
+        """An array of numbers not below `least`; without `known` a value may be null, which becomes NaN."""
         try:
             array = np.array(self.value(name), dtype=np.float64)
         except (TypeError, ValueError):

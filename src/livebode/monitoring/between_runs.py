@@ -1,4 +1,4 @@
-"""BetweenRuns: the one direction in which healthy runs differ from each other, each by an amount of its own."""
+"""BetweenRuns: the direction in which healthy runs differ from each other, each by its own amount."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from livebode.monitoring.evidence import Evidence
 Floats = NDArray[np.float64]
 
 KNOWN = 0.1  # of the smallest change: standard deviation from which on a run's own offset is known
-_FALSE = 1e-4  # chance of a direction that is not there
+_FALSE = 1e-4  # probability of a false direction
 _MATTERS = 0.25  # of the smallest change: runs that differ by less need no allowance
-_DOMINANT = 0.5  # of the largest component, in smallest changes: such a direction is not seen beside the offset
+_DOMINANT = 0.5  # of the largest component, in smallest changes: such a direction cannot be separated from the offset
 _CERTAIN = 0.95
 _RUNS_MIN, _WITHIN_MIN = 3, 10  # runs, and degrees of freedom of their stretches, from which on they are compared
 
 
 @dataclass(frozen=True, eq=False)
 class BetweenRuns:
-    """What differs from run to run without a covariate that explains it, such as a belt's stiffness by temperature.
+    """Difference from run to run without a covariate that explains it, such as a belt's stiffness by temperature.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class BetweenRuns:
     def projected(self, score: Floats, information: Floats, smallest: Floats) -> tuple[Floats, Floats]:
         """Score and information of windows with an offset of any size allowed for in each, (rows, 4), (rows, 4, 4).
 
-        The dominant directions are left without information.
+        The dominant directions have no information afterwards.
         """
         along = information @ self.direction
         own = (along @ self.direction)[:, np.newaxis]
@@ -57,13 +57,13 @@ class BetweenRuns:
 
 
 def between_runs(parts: Sequence[Evidence], smallest: Floats) -> BetweenRuns | None:
-    """The direction in which these runs differ, if it is beyond chance and matters.
+    """The direction in which these runs differ, if it is significant and large enough to matter.
 
-    A run's offset is estimated from all of its windows. What stretches of 24 windows scatter within runs, pooled, is
-    the noise; what the offsets scatter beyond it has a largest principal component, in units of the smallest changes.
-    It counts where chance makes it less than once in 10,000 times, and where its standard deviation exceeds a quarter
-    of the smallest change: then it would be taken for what healthy stretches have in common, and hide changes in every
-    direction. Fewer than three runs, or than ten degrees of freedom of the stretches, have none.
+    A run's offset is estimated from all of its windows. The pooled scatter of stretches of 24 windows within runs is
+    the noise; the scatter of the offsets beyond it has a largest principal component, in units of the smallest changes.
+    It is used if its probability by chance is below 1e-4, and if its standard deviation exceeds a quarter of the
+    smallest change: otherwise it would count as scatter of healthy stretches, and hide changes in every direction.
+    With fewer than three runs, or fewer than ten degrees of freedom of the stretches, there is no direction.
     """
     parts = [part for part in parts if len(part) >= STRETCH]
     if len(parts) < _RUNS_MIN:
@@ -102,7 +102,7 @@ def chance(ratio: float, between: int, within: int) -> float:
 
 
 def _offset(part: Evidence, smallest: Floats) -> tuple[Floats, Floats]:
-    """All four directions of a run together, (4,), and how its stretches scatter, (stretches, 4), in smallest changes.
+    """Offset of a run in all four directions, (4,), and scatter of its stretches, (stretches, 4), in smallest changes.
 
     The latter as of a single window: a mean over n windows has 1/n of that covariance.
     """

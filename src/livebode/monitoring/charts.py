@@ -1,4 +1,4 @@
-"""Many two-sided CUSUMs at once: the sequential test that every kind of evidence goes through."""
+"""Many two-sided CUSUMs at once: the sequential test for every kind of evidence."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ UP, DOWN = 0, 1
 class Charts:
     """Page's CUSUM of log-likelihood ratios, one up and one down for each component.
 
-    A step brings for a component the score s and the information I of its change δ: for small δ the log-likelihood of
-    the samples is δ·s − δ²·I/2, so that s/I estimates δ with the variance 1/I. A healthy machine may lie by `allowed`
-    off the baseline, which was learned from finite data; a change is at least `smallest`. The ratio of the two is
+    A step gives for a component the score s and the information I of its change δ: for small δ the log-likelihood of
+    the samples is δ·s − δ²·I/2, so that s/I estimates δ with the variance 1/I. A healthy machine may differ by
+    `allowed` from the baseline, which was learned from finite data; a change is at least `smallest`. The ratio of the
+    two is
 
         (smallest − allowed)·(±s − I·(smallest + allowed)/2),
 
-    its sum is held between 0 and `threshold`, so that a change that has gone is seen as fast as one that came.
+    its sum is limited to 0 … `threshold`, so that the end of a change is detected as fast as its beginning.
 
     Parameters
     ----------
@@ -43,16 +44,16 @@ class Charts:
         self.sums = np.zeros((2, smallest.size))
         """Of every component, up and down, shape (2, components)."""
         self.since = np.full((2, smallest.size), -1)
-        """Mark of the step at which each sum last left zero: when the change began, if there is one."""
+        """Mark of the step at which each sum last left zero: the beginning of the change, if there is one."""
         self._gain = smallest - allowed
         self._middle = (smallest + allowed) / 2
 
     def step(self, score: Floats, information: Floats, mark: int, judged: NDArray[np.bool_] | None = None) -> None:
-        """Take a step's evidence, shape (components,) each; components that are not `judged` stay as they are."""
+        """Process a step's evidence, shape (components,) each; components that are not `judged` do not change."""
         ratio = self._gain * np.stack([score, -score]) - self._gain * self._middle * information
         if judged is not None:
             ratio = np.where(judged, ratio, 0.0)
-        if np.isnan(ratio).any():  # would stay in the sums, which never reach the threshold again
+        if np.isnan(ratio).any():  # NaN would remain in the sums, which would never reach the threshold again
             raise ValueError("score or information of a judged component is not a number")
         leaves = (self.sums == 0) & (ratio > 0)
         self.since[leaves] = mark

@@ -13,11 +13,11 @@ from livebode.core import BaselineError
 Floats = NDArray[np.float64]
 
 COVARIATES_MAX = 4
-_MARGIN = 0.1  # of the learned range, beyond which a value is not known
+_MARGIN = 0.1  # of the learned range, beyond which the influence is unknown
 _CONSTANT = 1e-6  # of the mean: a smaller range is rounding
 _NOISE = 10.0  # standard deviations of a channel's noise: in 100,000 windows it alone ranges over nine
-_ALIKE = 0.99  # correlation from which two covariates cannot be told apart
-_PARTS = 5  # of each run, where there are fewer than three runs to compare
+_ALIKE = 0.99  # correlation from which two covariates cannot be separated
+_PARTS = 5  # parts of each run, where there are fewer than three runs to compare
 _RUNS_MIN = 3
 
 
@@ -57,7 +57,7 @@ class Covariates:
         return np.asarray((value - self.mean) @ self.slope.T)
 
     def known(self, value: Floats) -> NDArray[np.bool_]:
-        """Whether these values, (windows, covariates), are in the learned range or a tenth of it beyond."""
+        """Whether these values, (windows, covariates), are in the learned range, extended by a tenth."""
         margin = 2 * _MARGIN * self.half_range
         return np.asarray(np.all((value >= self.low - margin) & (value <= self.high + margin), axis=1))
 
@@ -84,12 +84,12 @@ def window_means(data: Floats, begin: NDArray[np.int64], window: int) -> Floats:
 def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
     """Covariates with the range of these values of learned windows, (windows, covariates), and no influence yet.
 
-    The windows are in the order of time, for what differs from one to the next is a channel's noise.
+    The windows are in the order of time, because differences between neighbours are a channel's noise.
 
     Raises
     ------
     BaselineError
-        If one has no value or, but for its noise, a constant one, or two are too strongly correlated.
+        If one has no value or is constant except for noise, or two are too strongly correlated.
     """
     if not len(value):
         raise BaselineError(
@@ -99,7 +99,7 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
             channels=list(names),
         )
     low, high = value.min(axis=0), value.max(axis=0)
-    # Of Gaussian differences, which the few steps from run to run hardly change.
+    # For Gaussian differences; the few steps from run to run hardly change it.
     noise = np.sqrt(np.pi) / 2 * np.abs(np.diff(value, axis=0, append=value[-1:])).mean(axis=0)
     for name, least, most, own in zip(names, low, high, noise):
         rounding = _CONSTANT * max(abs(least), abs(most))
@@ -130,8 +130,8 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
 def parts_of(sizes: list[int]) -> list[NDArray[np.intp]]:
     """Rows of each part of the learned windows that is left out in turn: a run, or a fifth of one.
 
-    What a run has of its own, such as its friction, is common to its windows; so the spread between runs tells how
-    well a slope is known. Fewer than three runs are cut into parts, which takes them as free of it.
+    Effects of a single run, such as its friction, are common to its windows; so the spread between runs shows how
+    well a slope is known. Fewer than three runs are cut into parts, which assumes that they have no such effect.
     """
     edges = np.concatenate([[0], np.cumsum(sizes)])
     runs = [np.arange(first, stop) for first, stop in pairwise(edges)]
@@ -141,7 +141,7 @@ def parts_of(sizes: list[int]) -> list[NDArray[np.intp]]:
 
 
 def jackknife(estimates: Floats) -> Floats:
-    """Covariance of an estimate from its values with one part left out each, (parts, unknowns) in.
+    """Covariance of an estimate from its values with one part omitted each (jackknife), (parts, unknowns) in.
 
     Efron and Stein, Ann. Stat. 9, 1981: (n − 1)/n·Σ(θᵢ − θ̄)(θᵢ − θ̄)ᵀ, biased upwards if at all.
     """

@@ -1,4 +1,4 @@
-"""Evidence: what a stretch of windows says about a change of the machine."""
+"""Evidence: score and information of a change of the machine, from a stretch of windows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COVARIATE, NO_COVARIATE, UNEXCITED = "covariate", "no covariate", "unexcited"
 """Why a window is not judged: accelerating or settling, slower, faster or elsewhere than learned, or disturbed; a
 covariate is outside of the learned range, or has no value; no torque at the lines."""
 OFFSET = "offset"
-"""Why changes along what differs between runs are not judged: the windows tell too little of this run's own offset."""
+"""Why changes along the direction between runs are not judged: this run's own offset is not known well enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +29,15 @@ class Evidence:
     score, information
         Shapes (rows, directions), (rows, directions, directions).
     power, quiet_power
-        |E|² of what the model leaves unexplained, at the lines and at the quiet bins, (rows, bins).
+        |E|² of the residual of the model, at the lines and at the detection lines, (rows, bins).
     position_m, speed_m_per_s, time_s
-        Of the window's centre; speed over the window, negative on the way back.
+        Of the window's centre; speed over the window, negative in the return direction.
     sample
         Newest sample of the window.
     status
         "judged", or why not.
     late_score, late_information
-        Of the velocity's delay, s, which is learned and then held: (rows,), and with each direction and itself,
+        Of the velocity's delay, s, which is learned and then fixed: (rows,), and with each direction and itself,
         (rows, directions + 1).
     ripple_score, ripple_information
         ⟨ψ, e⟩ and ⟨ψ, ψ⟩ of cosine and sine of each order of the ripple at 1 N m, (rows, 2·orders),

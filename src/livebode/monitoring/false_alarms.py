@@ -30,7 +30,7 @@ _MOST_S = 1e12
 def seconds_between(text: str) -> float:
     """Mean time between false alarms in seconds of judged motion.
 
-    A time that is not said to be of motion is taken as if the machine moved all the time, which is the stricter.
+    A time without "of motion" counts as if the machine moved all the time, which is stricter.
 
     Raises
     ------
@@ -89,11 +89,11 @@ def _number(word: str) -> float | None:
 
 
 def threshold(mean_s: float, step_s: float, charts: int) -> float:
-    """Of every one of `charts` CUSUMs of log-likelihood ratios that take a step every `step_s`.
+    """Threshold of each of `charts` CUSUMs of log-likelihood ratios with a step every `step_s`.
 
     Lorden (Ann. Math. Stat. 42, 1971): a CUSUM of log-likelihood ratios with threshold h has a mean time between false
-    alarms of at least e^h steps, whatever the distribution; the rates of several add up at most. It is a bound: what
-    really comes is rarer, for a sum overshoots its threshold.
+    alarms of at least e^h steps, whatever the distribution; the rates of several add up at most. It is a bound: real
+    false alarms are rarer, because a sum overshoots its threshold.
 
     >>> round(threshold(2592000.0, 0.1, 8), 1)
     19.1

@@ -1,4 +1,4 @@
-"""From healthy runs to a Machine: one model for all of them, by its own motion under their torque."""
+"""From healthy runs to a Machine: one model for all runs, driven by their torque."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from livebode.motion.fit import Fit, Rows
 
 Floats = NDArray[np.float64]
 Run = Callable[[], Iterable[Block]]
-"""Every call gives the samples of a run again, from the first."""
+"""Each call gives the samples of a run from the first one."""
 
 _PASSES = 5
 _MATTERS = 0.1  # of the noise: a smaller ripple changes no window
 _SEARCHES = 2  # for orders of a ripple: the second after a fit that allows for the first ones
 _CONVERGED = 1e-5
 _SPLINES = 12, 6  # of ln Keff(x), ln bs(x)
-_FLAT_M = 1e-2  # a way shorter than that has no curves
-_SLOWEST = 0.25  # of the fastest speed: slower, dry friction may hold the cart between the excitation's strokes
+_FLAT_M = 1e-2  # a shorter travel gives no curves
+_SLOWEST = 0.25  # of the fastest speed: below it, dry friction may stop the cart between the excitation's strokes
 _ROWS_MIN, _ROWS_MAX = 60, 4000
 # Of stiffness, load, damping, inertia; friction of a slow cart looks a little like the last two.
 _SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
-# While a change stands, another is seen from so much more on.
+# While a change is active, another one must be larger by this factor.
 _FURTHER = np.array([2.0, 2.0, 4.0, 4.0])
 _EXACT = Accuracy(np.ones(4), np.zeros(4), _SMALLEST)
 
@@ -53,19 +53,19 @@ def learn_machine(
     radius_m: float,
     covariates: Sequence[str] = (),
 ) -> Machine:
-    """The Machine that all runs share.
+    """The Machine that is common to all runs.
 
     Two masses are fitted to single windows first, as `MotionCorrection` does; then the model is driven through every
-    run, and corrected by what it leaves unexplained, until nothing is left (Gauss–Newton on the output's error). The
-    runs should hold every speed, both directions and the whole way: what they do not hold is not known.
+    run and corrected by its residual until it converges (Gauss–Newton on the output's error). The runs should contain
+    every speed, both directions and the whole travel: other motion is not monitored.
     `covariates` name channels, such as a temperature, that the four parameters may depend on linearly.
 
     Raises
     ------
     BaselineError
-        If the runs hold too little steady motion, or a covariate is constant.
+        If the runs contain too little steady motion, or a covariate is constant.
     FitError
-        If no two masses fit them.
+        If no two-mass model fits them.
     """
     names = input, output, schedule, *covariates
     rows, speed, covariate = _first_look(runs, lines, names)
@@ -118,10 +118,10 @@ def _fitted(
 def _fitted_apart(
     runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...]
 ) -> tuple[Machine, list[Evidence]]:
-    """The Machine whose runs have an offset each, and what it leaves of them.
+    """The Machine whose runs have an offset each, and its residuals.
 
-    Without that, what differs from run to run would be taken for what differs from place to place, because no two runs
-    go to all places equally often.
+    Without the offsets, differences between runs would appear as differences between positions, because no two runs
+    visit all positions equally often.
     """
     assert machine.between is not None
     own = np.zeros(len(runs))
@@ -135,7 +135,7 @@ def _fitted_apart(
 
 
 def _with_noise(machine: Machine, seen: Evidence) -> Machine:
-    """With the noise that these windows show, and the size of the ripple."""
+    """The Machine with the noise of these windows, and the size of the ripple."""
     if not len(machine.ripple):
         return replace(machine, noise_power=seen.power.mean(axis=0))
     ripple = Ripple(machine.ripple.cycles_per_m, amplitudes(seen.ripple_score, seen.ripple_information))
@@ -153,8 +153,8 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tu
     if use.size < _ROWS_MIN or fastest == 0:
         raise BaselineError(
             "too-few-windows",
-            f"the runs hold {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that a "
-            "model of the moving machine needs",
+            f"the runs contain {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that "
+            "a model of the moving machine needs",
             "give longer runs, or a shorter window",
             channel=names[2],
             windows=int(use.size),
@@ -184,7 +184,7 @@ def _spectra(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> Itera
 def _all_seen(
     runs: Sequence[Run], machine: Machine, lines: Lines, names: tuple[str, ...], own: Floats | None = None
 ) -> list[Evidence]:
-    """Of each run, which differs from the model by so much of what differs between runs."""
+    """Residuals of each run, with its own offset along the direction between runs."""
     if machine.between is None or own is None:
         return [_seen(run, machine, lines, names, Offset()) for run in runs]
     offsets = [Offset(machine.between.direction * amount) for amount in own]
@@ -192,7 +192,7 @@ def _all_seen(
 
 
 def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offset: Offset) -> Evidence:
-    """What the model leaves of a run, judged windows alone."""
+    """Residuals of the model for a run, judged windows only."""
     source, stretches = ModelEvidence(machine, lines), Stretches(names, lines.window, lines.rate_hz)
     parts = [source.process(stretch, offset) for block in run() for stretch in stretches.process(block)]
     parts += [source.process(stretch, offset) for stretch in stretches.finish()]
@@ -209,7 +209,7 @@ def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offs
 
 
 def _with_uncertainty(parts: Sequence[Evidence], machine: Machine, rate_hz: float) -> Machine:
-    """With the covariance of the covariates' slopes, from the fit with one run left out each."""
+    """The Machine with the covariance of the covariates' slopes, from fits with one run omitted each."""
     covariates, c = machine.covariates, len(machine.covariates)
     if not c:
         return machine
@@ -226,13 +226,13 @@ def _with_uncertainty(parts: Sequence[Evidence], machine: Machine, rate_hz: floa
 
 
 def _judged(seen: Evidence, machine: Machine) -> Machine:
-    """The Machine with its noise, and with what neighbouring windows and whole stretches have in common."""
+    """The Machine with its noise, and with the correlation of neighbouring windows and whole stretches."""
     held = accuracy(seen.score, np.einsum("rjj->rj", seen.information), _SMALLEST)
     if (between := machine.between) is not None:
         score, information = between.projected(seen.score, seen.information, _SMALLEST)
         held = held.at_least(accuracy(score, np.einsum("rjj->rj", information), _SMALLEST))
         held = held.widened(KNOWN * np.abs(between.direction))
-    # With all others free: the score that is left of a direction, and its information.
+    # With all others free: the remaining score of a direction, and its information.
     inverse = np.linalg.inv(seen.information)
     information = 1 / np.einsum("rjj->rj", inverse)
     score = information * np.einsum("rjk,rk->rj", inverse, seen.score)

@@ -1,4 +1,4 @@
-"""Machine: the healthy machine as a model that moves, and how well it is known."""
+"""Machine: model of the healthy moving machine, with its accuracy."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Floats = NDArray[np.float64]
 
 _KNOWN_WINDOWS = 5
 _CELLS = 28
-_STILL_M = 1e-9  # a way of no length has one cell
+_STILL_M = 1e-9  # a travel of zero length has one cell
 
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Two masses with Keff(x), bs(x), learned from healthy runs, and what their windows looked like.
+    """Two masses with Keff(x), bs(x), learned from healthy runs, and statistics of their windows.
 
     Attributes
     ----------
@@ -31,19 +31,19 @@ class Machine:
     noise_power, quiet_power
         Mean |E|² of the unexplained velocity at each line and each quiet bin, (lines,), (quiet,).
     held, free
-        How well a change of one direction is known with all others held at the model, and with all others free.
+        Accuracy of a change of one direction, with all others fixed at the model, and with all others free.
     slowest_m_per_s, fastest_m_per_s
-        Speeds that were learned.
+        Range of the learned speeds.
     windows
-        How many windows were learned in each of 28 cells of the way.
+        Number of learned windows in each of 28 cells of the travel.
     ripple
-        Torque that repeats with the motor's angle, as it was found.
+        Torque that repeats with the motor's angle.
     delay_s
-        Of the measured velocity behind the torque, beyond what two masses behind a zero-order hold have.
+        Delay of the measured velocity after the torque, beyond that of two masses behind a zero-order hold.
     covariates
-        What the parameters depend on, such as a temperature; the model is that of their mean.
+        Channels that the parameters depend on, such as a temperature; the model is valid for their mean.
     between
-        The direction in which the learned runs differ, which no covariate explains; None where they do not.
+        The direction in which the learned runs differ without a covariate that explains it; None without a difference.
     """
 
     model: MovingModel
@@ -61,11 +61,11 @@ class Machine:
 
     @property
     def way_m(self) -> float:
-        """From the lowest to the highest position that was learned."""
+        """Distance from the lowest to the highest learned position."""
         return self.model.high_m - self.model.low_m
 
     def cell(self, position_m: float) -> int:
-        """Number of the cell there."""
+        """Number of the cell at these positions."""
         return int(_cell(np.array([position_m]), self.model.low_m, self.model.high_m)[0])
 
     def known(self, position_m: Floats) -> NDArray[np.bool_]:
@@ -77,7 +77,7 @@ class Machine:
 
 
 def cells(position_m: Floats, low_m: float, high_m: float) -> NDArray[np.int64]:
-    """Number of windows in each of 28 cells of the way."""
+    """Number of windows in each of 28 cells of the travel."""
     return np.bincount(_cell(position_m, low_m, high_m), minlength=_CELLS)
 
 

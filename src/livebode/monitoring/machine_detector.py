@@ -1,4 +1,4 @@
-"""Sequential detection of changes against a learned Machine."""
+"""Sequential detection of changes relative to a learned Machine."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from livebode.monitoring.sentences import changed, cleared, corrected, far_away,
 from livebode.monitoring.standing import Standing
 
 CHARTS = 2 * len(DIRECTIONS) + 2
-"""That take a step with a window: up and down for each direction, and for stiffness in the cell where the cart is."""
+"""Charts that take a step with a window: up and down for each direction, and for stiffness in the cart's cell."""
 
-_DECISIVE = 7.0  # nats between the likeliest name and the next: wrong once in a thousand
-_LOOK_WINDOWS = 600  # after so many a change is named by what is likeliest
+_DECISIVE = 7.0  # nats between the likeliest change and the next: wrong once in a thousand
+_LOOK_WINDOWS = 600  # windows after which a change is identified as the likeliest one
 _OFTEN, _SELDOM = 40, 10  # windows during which every one, and then every tenth, is an occasion to name it
-_LEFT_WINDOWS = 300  # of motion elsewhere, after which a cell's chart does not keep the run's offset from following
-_LOOK = 0.22  # of the way: a change is a place's only if the rest is not changed, so one looks around
-_PASSED = 2.0  # standard deviations of a place, behind which its middle is known
+_LEFT_WINDOWS = 300  # of motion elsewhere, after which a cell's chart no longer prevents the update of the run's offset
+_LOOK = 0.22  # of the travel: a change is local only if the rest is unchanged, so this must be observed
+_PASSED = 2.0  # standard deviations of a place, after which its centre is known
 _STIFFNESS = DIRECTIONS.index("stiffness")
-_SMALL = 0.5  # of the smallest change that an alarm is for: less is none
+_SMALL = 0.5  # of the smallest change for an alarm: less is no change
 _STAYS = {word.SLOW, word.UNEVEN, word.DISTURBED, word.UNEXCITED}
 
 Moment = tuple[float, float, float]
@@ -40,18 +40,18 @@ Moment = tuple[float, float, float]
 class MachineDetector:
     """Evidence in, Events out: what changed, by how much, since when, where.
 
-    Every direction has a CUSUM up and one down, with all others held at the baseline, which sees a change soonest; so
-    has the stiffness of each of 28 cells of the way, over all passes. When one reaches the threshold, the windows since
-    it left zero are asked which single change they speak for: a direction, or a place of changed stiffness. It is named
-    when the likeliest leads by 7 nats, is half as large as an alarm is for, and the cart has gone a fifth of its way;
-    or after 600 windows, if it is as large as an alarm is for. It is told once the model has come along with it. While
-    a change stands, others are judged with it allowed for, whatever its size, and as coarsely as is known of them then;
-    it clears when its own sum is back at zero.
+    Every direction has a CUSUM up and one down, with all others fixed at the baseline, which detects a change soonest;
+    so has the stiffness of each of 28 cells of the travel, over all passes. When one reaches the threshold, the single
+    change that best explains the windows since it left zero is determined: a direction, or a place of changed
+    stiffness. It is identified when its lead is 7 nats, its size is half of the smallest change for an alarm, and the
+    cart has moved a fifth of its travel; or after 600 windows, if its size is at least that smallest change. It is
+    reported as soon as the model follows it. While a change is active, others are judged with this change free, so
+    with less accuracy. It is cleared when its own sum is back at zero.
 
     Parameters
     ----------
     machine
-        What was learned.
+        The learned machine.
     threshold
         See `false_alarms.threshold`, for `CHARTS` charts.
     """
@@ -74,12 +74,12 @@ class MachineDetector:
 
     @property
     def offset(self) -> Offset:
-        """What the model is to be driven with: the changes that stand, and what this run has of its own."""
+        """Offset of the model: the active changes, and this run's own offset."""
         standing = self.standing.offset
         return Offset(standing.logarithms + self._own.replayed, standing.places)
 
     def process(self, seen: Evidence) -> list[Event]:
-        """Events of these windows, whose evidence was made with `offset` as it is now."""
+        """Events of these windows, whose evidence was computed with the present `offset`."""
         events: list[Event] = []
         for i in range(len(seen)):
             status = str(seen.status[i])
@@ -97,14 +97,14 @@ class MachineDetector:
         return events + self._said(sample, time_s)
 
     def finish(self) -> list[Event]:
-        """A change that was found but not yet named, named by what is likeliest."""
+        """Identify a change that was found but not yet identified as the likeliest one."""
         if self._pending >= 0:
             self._name(final=True)
         _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
         return self._said(int(sample), time_s, known=False)
 
     def _said(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
-        """What is new, and what it makes of the amounts that are out."""
+        """Events of new changes, and corrections of the reported amounts."""
         if self._far:
             self._far = False
             return [far_away(self.standing.alarms[-1], sample, time_s)]
@@ -114,7 +114,7 @@ class MachineDetector:
         return events + [corrected(a, told, sample, time_s, within_run=self.within_run(a)) for a, told in wrong]
 
     def within_run(self, alarm: Alarm) -> bool:
-        """Whether its amount is from what this run was before, not from the baseline."""
+        """Whether its amount is relative to the earlier part of this run, not to the baseline."""
         return self._own.within_run(alarm.change.direction)
 
     def _window(self, seen: Evidence, i: int) -> list[Event]:
@@ -151,11 +151,11 @@ class MachineDetector:
 
     @property
     def _reference(self) -> Offset:
-        """What evidence is judged from."""
+        """The reference of the evidence."""
         return Offset(self.standing.offset.logarithms + self._own.reference)
 
     def _look(self) -> None:
-        """Name the change that the charts have found, if they have."""
+        """Identify the change that the charts have found, if any."""
         if self._pending < 0:
             found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.raised.any()]
             if self._own.chart.raised.any():
@@ -190,7 +190,7 @@ class MachineDetector:
             self._stand([best], rivals[0] if rivals else None, segment, moments)
 
     def _stand(self, changes: list[Change], rival: Change | None, segment: Segment, moments: list[Moment]) -> None:
-        """From now on these changes stand, since the likeliest of them began."""
+        """Make these changes active, since the likeliest of them began."""
         began = begin_of(segment, max(changes, key=lambda change: change.evidence))
         way = segment.position_m[began:]
         seen = self._own.segment(self._recent.segment(began - len(moments), Offset(self._own.reference)))
@@ -215,9 +215,9 @@ class MachineDetector:
         self._pending = -1
 
     def _oldest(self) -> int:
-        """Mark of the first window since which a chart is not at zero: from there on a change may be in them.
+        """Mark of the first window since which a chart is not at zero: a change may have begun there.
 
-        The chart of a cell that the cart has left for long stays as it is, whatever the machine does.
+        The chart of a cell that the cart left long ago is ignored, because nothing updates it.
         """
         visited = (self._cells.sums > 0) & (self._passed > self._taken - _LEFT_WINDOWS)
         since = np.concatenate([self._first.since[self._first.sums > 0], self._cells.since[visited]])

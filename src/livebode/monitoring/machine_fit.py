@@ -1,4 +1,4 @@
-"""Gauss–Newton on the output's error: the step of a Machine's model from what it leaves of healthy runs."""
+"""Gauss–Newton on the output's error: the step of a Machine's model from its residuals of healthy runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from livebode.motion.model import basis
 Floats = NDArray[np.float64]
 
 _SMOOTH = 1e-4
-_SLOPE_MAX = 0.5  # of a logarithm per half range of a covariate, as a standard deviation before anything is seen
+_SLOPE_MAX = 0.5  # of a logarithm per half range of a covariate: prior standard deviation
 
 
 def joint_step(parts: Sequence[Evidence], machine: Machine, own: Floats, rate_hz: float) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Samples in, Events out: a Machine held against what it does now."""
+"""Samples in, Events out: compares the machine with a learned Machine."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Look = Callable[[Evidence], object]
 class MachineMonitor:
     """Judges every steady window of a recording by a learned Machine.
 
-    Delay: an Event comes at the latest with the first sample of the twelfth window behind the one that it speaks of.
-    Wherever Blocks are cut, the Events are the same.
+    Delay: an Event is given at the latest with the first sample of the twelfth window after the one that it refers to.
+    The Events do not depend on how the samples are cut into Blocks.
     """
 
     def __init__(self, machine: Machine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
@@ -37,28 +37,28 @@ class MachineMonitor:
     def process(self, block: Block, look: Look | None = None) -> list[Event]:
         """Events of the windows that this Block completes; LivebodeError where a channel is missing.
 
-        `look` is called with the Evidence of every stretch, to show or keep it.
+        `look` is called with the Evidence of every stretch, to show or record it.
         """
         return self._judged(self._stretches.process(block), look)
 
     def rest(self, look: Look | None = None) -> list[Event]:
-        """Events of the windows that are left; the next Block starts anew."""
+        """Events of the remaining windows; the next Block starts again without history."""
         return self._judged(self._stretches.finish(), look)
 
     def finish(self, look: Look | None = None) -> list[Event]:
-        """The same, and a change that was found but not yet told apart from others."""
+        """The same, and a change that was found but not yet separated from others."""
         return self.rest(look) + self.detector.finish()
 
     def standing(self) -> list[dict[str, Any]]:
-        """Changes that stand, as plain data."""
+        """Active changes as plain data."""
         alarms = self.detector.standing.alarms
         far = [about_far(alarms[-1])] if self.detector.standing.far else []
         return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._told()]
 
     def together(self) -> str:
-        """Their amounts now, estimated together, in words; empty where none is known."""
+        """Their present amounts, estimated together, as text; empty where none is known."""
         if self.detector.standing.far:
-            return ": the machine is so far from the baseline that no amount can be told"
+            return ": the machine is so far from the baseline that no amount can be given"
         return joint(self._told())
 
     def _told(self) -> list[Alarm]:

@@ -1,4 +1,4 @@
-"""Evidence of a change from samples and a baseline's model: nothing is fitted, at any speed and in any direction."""
+"""Evidence of a change from samples and a baseline's model, without a fit, at any speed and in any direction."""
 
 from __future__ import annotations
 
@@ -22,38 +22,38 @@ from livebode.motion.replay import without_drift
 Floats = NDArray[np.float64]
 
 SIGNALS = 3
-"""Torque, velocity, position; the covariates are behind them."""
+"""Torque, velocity, position; the covariates follow them."""
 _UNEVEN = 0.1  # of a window's travel, against the window before it
 _SPEED_MARGIN = 0.1
 _OWN = len(DIRECTIONS)
 _LEVEL_MEMORY = 0.9  # per window, of the noise's level
 _LEVEL_RISE_MAX = 4.0
-_UNINFORMED = 1e-6  # of what tells a smallest change to one standard deviation: no run is long enough for that
-_DISTURBED = 20.0  # the mean of six quiet bins is that much above its own level once in 1e40 windows
+_UNINFORMED = 1e-6  # of the information for a smallest change at one standard deviation: no run is long enough for that
+_DISTURBED = 20.0  # the mean of six detection lines exceeds its own level by this factor once in 1e40 windows
 
 
 class ModelEvidence:
-    """Stretches in, Evidence out: what the baseline's model leaves unexplained, window by window.
+    """Stretches in, Evidence out: the residual of the baseline's model, window by window.
 
-    The model is driven by the measured torque along the measured way. E is the spectrum of the measured velocity less
-    the model's, Ψ that of the model's slope by the logarithm of Keff, mL, bs, Js, each at the lines; then with the
+    The model is driven by the measured torque along the measured positions. E is the spectrum of the measured velocity
+    less the model's, Ψ that of the model's slope by the logarithm of Keff, mL, bs, Js, each at the lines; then with the
     noise's power P at a line
 
         score = Σ 2·Re(Ψ*·E)/P,    information = Σ 2·Re(Ψ*·Ψ)/P.
 
     Without a change E is the sensor's noise alone, so windows that do not overlap are independent. P is the
-    baseline's, or higher by as much as the quiet bins have become louder.
+    baseline's, or higher in proportion to the noise at the detection lines.
 
-    With an Offset, E is what is left once the model is changed by it. A ripple of the Machine is allowed for,
-    whatever its phase (see `ripple.allowed_for`). What its covariates explain is no change: the model moves with their
-    mean over the stretch, and the windows' own values count to first order.
+    With an Offset, E is the residual of the model with this offset. A ripple of the Machine is allowed for at any
+    phase (see `ripple.allowed_for`). An influence of the covariates is not a change: the model follows their mean over
+    the stretch, and the windows' own values are included to first order.
     """
 
     def __init__(self, machine: Machine, lines: Lines) -> None:
         self._machine, self._lines = machine, lines
         self._replay = Replay(machine.model, lines.rate_hz, machine.delay_s)
         self.level = 1.0
-        """How much louder than when it was learned the noise is, at least 1."""
+        """Ratio of the noise to the learned one, at least 1."""
 
     def process(self, stretch: Stretch, offset: Offset) -> Evidence:
         """Evidence of every window of the stretch, in order."""
@@ -105,7 +105,7 @@ class ModelEvidence:
         )
 
     def _shifted(self, offset: Offset, covariate: Floats) -> tuple[Offset, Floats]:
-        """The offset with what the covariates explain on average, and the rest of that of each window, (windows, 4)."""
+        """The offset with the mean influence of the covariates, and its difference in each window, (windows, 4)."""
         covariates = self._machine.covariates
         if not len(covariates):
             return offset, np.zeros((len(covariate), _OWN))
@@ -115,7 +115,7 @@ class ModelEvidence:
         return replace(offset, logarithms=offset.logarithms + common), np.where(known, shift - common, 0.0)
 
     def way(self, stretch: Stretch) -> tuple[Floats, Floats, NDArray[np.str_]]:
-        """Position, speed and status of every window, but for disturbances that the noise shows."""
+        """Position, speed and status of every window, without the check for disturbances by the noise."""
         bad = missing(stretch.data[:SIGNALS])
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
         covariate = window_means(stretch.data[SIGNALS:], begin, self._lines.window)
@@ -130,7 +130,7 @@ class ModelEvidence:
         return rest, shaft_position(x, y, self._lines.window, self._lines.rate_hz)
 
     def _ripple(self, x: Floats, y: Floats) -> Floats:
-        """Velocity that each order of 1 N m leaves, without slow drift, (2·orders, samples)."""
+        """Velocity due to each order of 1 N m, without slow drift, (2·orders, samples)."""
         if not len(self._machine.ripple):
             return np.zeros((0, x.size))
         shaft_m = shaft_position(x, y, self._lines.window, self._lines.rate_hz)
@@ -160,7 +160,7 @@ class ModelEvidence:
         return centre, speed, np.select(list(reasons.values()), list(reasons), word.JUDGED)
 
     def _levels(self, quiet: Floats, status: NDArray[np.str_]) -> Floats:
-        """How much louder than when it was learned the noise is at each window, at least 1; marks what is disturbed."""
+        """Ratio of the noise to the learned one at each window, at least 1; marks disturbed windows."""
         levels = np.ones(len(quiet))
         if not quiet.size:
             return levels
@@ -180,7 +180,7 @@ def missing(data: Floats) -> NDArray[np.bool_]:
 
 
 def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
-    """A sample that is not finite is as the last one before it, or zero."""
+    """Replace a non-finite sample by the previous finite one, or by zero."""
     if not bad.any():
         return data
     last = np.maximum.accumulate(np.where(bad, -1, np.arange(bad.size)))
@@ -193,9 +193,9 @@ def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
 
 
 def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Position and speed at the centre of the windows that begin there, and whether they and the ones before are even.
+    """Position and speed at the centre of the windows that begin there, and whether the speed is steady.
 
-    Where the speed changes, friction lets go or takes hold, which is not in the model.
+    A window is steady together with the previous one. Where the speed changes, friction changes, which the model omits.
     """
     here, there, before = x[begin], x[begin + window - 1], x[(begin - window + 1).clip(0)]
     travel = there - here

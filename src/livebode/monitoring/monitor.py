@@ -1,4 +1,4 @@
-"""Monitor: a run held against a Baseline, whatever the Baseline knows."""
+"""Monitor: compares a run with a Baseline, by its model of the machine or by its tables."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from livebode.monitoring.table_monitor import TableMonitor
 class Monitor:
     """Events of changes, from the samples of a run and the responses that a Tracker made of them.
 
-    With a model of the moving machine in the Baseline, that judges; else its tables do, of lines and, where parameters
-    are handed in, of these. Wherever Blocks are cut, the Events are the same.
+    If the Baseline has a model of the moving machine, that model is used; else its tables of lines and, where
+    parameters are given, of parameters. The Events do not depend on how the samples are cut into Blocks.
 
     Parameters
     ----------
     baseline
-        What was learned from healthy runs.
+        Learned from healthy runs.
     settings
         Those of the run.
     false_alarms
-        How often one may come, in words (see `seconds_between`); shared by all that judges.
+        Permitted rate as text (see `seconds_between`); shared by all charts.
     corrected
         Whether the responses are freed from the axis's motion.
 
@@ -65,19 +65,19 @@ class Monitor:
 
     @property
     def tables(self) -> list[str]:
-        """What the tables that judge speak of; none where the model does."""
+        """Quantities of the tables in use; none where the model is used."""
         return list(self._tables)
 
     def process(self, block: Block, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
-        """Events of these samples and of what became of them."""
+        """Events of these samples and of their responses and parameters."""
         return self.process_samples(block) + self.process_responses(responses, parameters)
 
     def process_samples(self, block: Block) -> list[Event]:
-        """Events of these samples alone: what the model of the machine says, where there is one."""
+        """Events of these samples alone: those of the model of the machine, where there is one."""
         return self._counted(self._machine.process(block)) if self._machine is not None else []
 
     def process_responses(self, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
-        """Events of these responses and parameters: what the tables say, where there is no model."""
+        """Events of these responses and parameters: those of the tables, where there is no model."""
         events: list[Event] = []
         if "lines" in self._tables and len(responses):
             events += self._tables["lines"].process(self._apart["lines"].of_responses(responses))
@@ -88,7 +88,7 @@ class Monitor:
         return self._counted(events)
 
     def finish(self) -> list[Event]:
-        """Events of what is left at the end of a run."""
+        """Remaining Events at the end of a run."""
         events = self._machine.finish() if self._machine is not None else []
         return self._counted(events + [e for table in self._tables.values() for e in table.finish()])
 
@@ -99,7 +99,7 @@ class Monitor:
         return events
 
     def summary(self) -> dict[str, Any]:
-        """What the run comes to: how much was judged, how many alarms came and cleared, and what stands now."""
+        """Result of the run: judged time, numbers of raised and cleared alarms, and active changes."""
         standing = (
             self._machine.standing() if self._machine else [name for name, t in self._tables.items() if t.standing]
         )
@@ -143,9 +143,9 @@ class Monitor:
 def _message(summary: dict[str, Any], together: str) -> str:
     judged = f"{summary['judged_s']:.1f} s of the run judged"
     if not summary["judged_s"]:
-        return "Nothing of the run could be judged: the baseline knows nothing of what the machine did."
+        return "Nothing of the run could be judged: the baseline does not cover what the machine did."
     if not summary["changes"]:
         return f"No change against the baseline ({judged})."
     alarms = f"{summary['changes']} change{'s' * (summary['changes'] > 1)} against the baseline"
-    standing = f"{len(summary['standing']) or 'none'} of them standing at the end ({judged})"
+    standing = f"{len(summary['standing']) or 'none'} of them active at the end ({judged})"
     return f"{alarms}, {standing}{together}."

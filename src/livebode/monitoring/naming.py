@@ -1,4 +1,4 @@
-"""What changed: of all changes of one kind, everywhere or at one place, the one that the windows speak for."""
+"""Identifies a change: of all single changes, everywhere or at one place, the one that best explains the windows."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ _WIDTHS = np.array([0.015, 0.026, 0.045])
 _GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _FIRM = [DIRECTIONS.index(name) for name in ("stiffness", "load", "inertia")]  # damping doubles easily
-_EXPLAINED = 0.9  # of all evidence: a single change, ten percent of stiffness or double damping, leads to 0.93 … 0.99
+_EXPLAINED = 0.9  # of all evidence: a single change of ten percent of stiffness or double damping explains 0.93 … 0.99
 _CONFIDENCE = 1.96
-_SHAPE = 0.3  # of a place's depth, which depends on the shape that it is taken to have
+_SHAPE = 0.3  # of a place's depth, which depends on its assumed shape
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change of one kind.
+    """A change of one parameter, everywhere or at a place.
 
     Attributes
     ----------
     direction
         Number in `DIRECTIONS`.
     amount, bound
-        Of the logarithm, and the half-width that holds the truth with 95 %.
+        Of the logarithm, and the half-width of its 95 % bound.
     place
-        Where, None for a change of the whole way.
+        Place of the change, None for a change of the whole travel.
     evidence
-        By how many nats the windows speak for it against none.
+        Log-likelihood ratio of the windows with this change to no change, nats.
     """
 
     direction: int
@@ -46,7 +46,7 @@ class Change:
     place: Place | None = None
 
     def share(self, position_m: Floats) -> Floats:
-        """How much of the change there is at these positions, 0 … 1."""
+        """Share of the change at these positions, 0 … 1."""
         return np.ones(position_m.shape) if self.place is None else self.place.share(position_m)
 
 
@@ -59,7 +59,7 @@ class Segment:
     position_m: Floats
 
     def without(self, known: list[int]) -> Segment:
-        """The same with changes of these directions allowed for, whatever their size."""
+        """The same with changes of any size in these directions allowed for."""
         if not known:
             return self
         inverse = np.linalg.inv(self.information[:, known][:, :, known])
@@ -72,9 +72,9 @@ class Segment:
 
 
 def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = True) -> list[Change]:
-    """Every single change, the likeliest first; what is `known` of the healthy machine widens the bounds.
+    """Every single change, the likeliest first; the `known` accuracy of the healthy machine widens the bounds.
 
-    `way_m` is the way that was learned; with `local`, places of a few hundredths of it are looked for too.
+    `way_m` is the learned travel; with `local`, places of a few hundredths of it are searched too.
     """
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
@@ -91,7 +91,7 @@ def candidates(segment: Segment, known: Accuracy, way_m: float, local: bool = Tr
 
 
 def bound(known: Accuracy, direction: int, information: float) -> float:
-    """Half-width that holds the truth with 95 %, from windows with this information together."""
+    """Half-width of the 95 % bound, from windows with this total information."""
     noise = np.sqrt(known.inflation[direction] / information)
     return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
 
@@ -111,16 +111,16 @@ def _place(segment: Segment, known: Accuracy, way_m: float) -> Change:
         _STIFFNESS,
         amount,
         float(np.hypot(bound(known, _STIFFNESS, float(information[c, w])), _SHAPE * amount)),
-        # One of many places, chosen by the data: as likely as it looks, less what the choice is worth.
+        # One of many places, chosen by the data: the likelihood is reduced by the effect of this choice.
         float(evidence[c, w] - np.log(max(np.ptp(x) / widths[0], 1.0) * len(widths))),
         Place(float(centres[c]), float(widths[w])),
     )
 
 
 def far(segment: Segment, best: Change, known: Accuracy) -> list[Change]:
-    """All directions at once, where the machine is far from the baseline and no single change says why; else none.
+    """All directions at once, where the machine is far from the baseline and no single change explains it; else none.
 
-    A large change of one direction is not linear, and by a line looks like any other; but no line explains it.
+    A large change of one direction is nonlinear, so that a linear model confuses it with others and explains none.
     """
     score, information = segment.score.sum(axis=0), segment.information.sum(axis=0)
     amount = np.linalg.lstsq(information, score, rcond=None)[0]
@@ -133,10 +133,10 @@ def far(segment: Segment, best: Change, known: Accuracy) -> list[Change]:
 
 
 def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float:
-    """By how many nats the windows prefer one change to the other, allowing for what the model does not know.
+    """Log-likelihood ratio of the windows between two changes, nats, with the uncertainty of the model allowed for.
 
-    What tells two directions apart is how much of the one is left with the other free; and that much is known of a
-    healthy machine too, in `free`.
+    Two directions are separated by the part of one that remains with the other free; the accuracy of that part on a
+    healthy machine is in `free`.
     """
     ahead, b, r = best.evidence - rival.evidence, best.direction, rival.direction
     if best.place is not None or rival.place is not None:
@@ -147,7 +147,7 @@ def lead(segment: Segment, best: Change, rival: Change, free: Accuracy) -> float
 
 
 def begin_of(segment: Segment, change: Change) -> int:
-    """Row from which on the windows speak for the change most: the likeliest moment at which it began."""
+    """Row from which the windows best support the change: its likeliest beginning."""
     amount = change.amount * change.share(segment.position_m)
     score, information = segment.score[:, change.direction], segment.information[:, change.direction, change.direction]
     gain = amount * score - amount**2 * information / 2

@@ -1,4 +1,4 @@
-"""How much louder the noise has become, from rows alone: a change of the machine is not noise."""
+"""Increase of the noise, from rows alone: a change of the machine is not noise."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ Floats = NDArray[np.float64]
 
 _ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
 _MEDIAN = 0.4549364  # of chi square with one degree of freedom
-_BELIEVED = 3.0  # times what the differences show beyond the learned noise
+_BELIEVED = 3.0  # times the excess of the differences over the learned noise
 
 
 class NoiseLevel:
-    """Bounds what rows say of their own noise by how much neighbouring rows differ.
+    """Limits the rows' own noise estimates by the differences of neighbouring rows.
 
-    A response's sigma comes from how periods scatter. For some periods after a step of the machine the step is in it,
-    so that rows behind the step would weigh a hundredth of those before it. A step moves one difference of neighbouring
-    rows; noise moves all of them. The median over the newest 31 rows and all components of a line shows the second
-    alone. A row's noise beyond the learned one counts up to three times what that median shows.
+    A response's sigma is from the scatter of periods. For some periods after a step of the machine it contains the
+    step, so that rows after the step would weigh a hundredth of those before it. A step affects one difference of
+    neighbouring rows; noise affects all. The median over the newest 31 rows and all components of a line shows only
+    the noise. A row's noise beyond the learned one is limited to three times that median.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class NoiseLevel:
         self._squares = np.full((_ROWS - 1, components), np.nan)
 
     def process(self, deviation: Floats, own: Floats, more: Floats) -> Floats:
-        """Variance of rows from their deviation, the learned variance and what they say beyond, (rows, components)."""
+        """Variance of rows from their deviation, the learned variance and their own excess, (rows, components)."""
         if not len(own):
             return own
         known = np.where(np.isfinite(own), own, np.nan)
@@ -56,8 +56,8 @@ class NoiseLevel:
 
 
 def _median(values: Floats) -> Floats:
-    """Over the last axis, of those that are known; 0 where none is."""
+    """Median over the last axis of the known values; 0 where none is known."""
     count = np.isfinite(values).sum(axis=-1, keepdims=True)
-    order = np.sort(values, axis=-1)  # what is not known comes last
+    order = np.sort(values, axis=-1)  # NaN is sorted last
     middle = [np.take_along_axis(order, np.maximum(count - 1 + i, 0) // 2, axis=-1) for i in (0, 1)]
     return np.where(count > 0, (middle[0] + middle[1]) / 2, 0.0)[..., 0]

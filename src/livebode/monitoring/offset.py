@@ -1,4 +1,4 @@
-"""Offset: how far the machine is taken to be from the baseline by now, so that what is left stays small."""
+"""Offset: the assumed distance of the machine from the baseline, so that the residual remains small."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FAR = 0.2
-"""Of a logarithm: from here on it may be another machine, of which more differs than has a name."""
+"""Of a logarithm: beyond it, it may be another machine, with differences that are not identified."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Place:
     amount: float = 1.0
 
     def share(self, position_m: Floats) -> Floats:
-        """How much of it there is at these positions, 0 … 1.
+        """Share of the change at these positions, 0 … 1.
 
         >>> Place(1.0, 0.05).share(np.array([1.0, 1.05])).round(3)
         array([1.   , 0.607])
@@ -32,7 +32,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """Changes that stand: of the logarithms of stiffness, load, damping, inertia, (4,), and of places."""
+    """Active changes: of the logarithms of stiffness, load, damping, inertia, (4,), and of places."""
 
     logarithms: Floats = field(default_factory=lambda: np.zeros(4))
     places: tuple[Place, ...] = ()

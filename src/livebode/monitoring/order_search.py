@@ -1,4 +1,4 @@
-"""Orders of a ripple in what a Machine's model leaves of healthy runs."""
+"""Orders of a ripple in the residual of a Machine's model for healthy runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ripple: torque that repeats with the motor's angle, and what a window says once it is allowed for."""
+"""Ripple: torque that repeats with the motor's angle, and a window's evidence with the ripple allowed for."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Ripple:
     def spread(self) -> Floats:
         """Prior standard deviation of sine and cosine of each order, N m, (2·orders,).
 
-        A hundred windows' worth of power: while an order stays on a line its error is the same in each window, and a
-        sum over windows must not take it for ever better knowledge.
+        The power of a hundred windows: while an order is on a line its error is the same in each window, and a sum over
+        windows must not count as growing information.
         """
         return np.asarray(np.sqrt(_COHERENT) * np.repeat(self.amplitude_n_m, 2))
 
@@ -109,14 +109,14 @@ def amplitudes(e: Floats, gram: Floats) -> Floats:
 def noise_power(power: Floats, gain: Floats, ripple: Ripple) -> Floats:
     """Mean |E|² at each line without the ripple, (lines,).
 
-    Windows count the less the more of their power the ripple is expected to have.
+    A window's weight decreases with the share of its power that the ripple is expected to have.
 
     Parameters
     ----------
     power
         |E|², (windows, lines).
     gain
-        Power that an order of unit amplitude (sine and cosine) brings, (windows, orders, lines).
+        Power of an order of unit amplitude (sine and cosine), (windows, orders, lines).
     """
     if not len(ripple):
         return np.asarray(power.mean(axis=0))

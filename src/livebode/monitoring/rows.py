@@ -1,4 +1,4 @@
-"""Rows: what windows that do not overlap say, whether responses or fitted parameters."""
+"""Rows: values of windows that do not overlap, either responses or fitted parameters."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 class Rows:
     """One row for every window length, (rows, columns) for values.
 
-    `variance` is what a row says of itself, E|error|²; `step` what the schedule moved since the row before; `ok` is
-    False where a row is not to be judged.
+    `variance` is the row's own estimate of E|error|²; `step` is the schedule's change since the previous row; `ok` is
+    False where a row is not judged.
     """
 
     value: NDArray[np.complex128]
@@ -38,20 +38,20 @@ class Rows:
 
     @classmethod
     def join(cls, parts: Sequence[Rows]) -> Rows:
-        """Parts in order as one; at least one."""
+        """Join parts in order; at least one."""
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 
 PLACES = 5
-"""Places of the period that show what a window's place does to a moving machine's response."""
+"""Number of places in the period that shows the effect of a window's place on a moving machine's response."""
 
 
 def places(window: int, hop: int) -> tuple[int, ...]:
-    """Where in the period rows are to stand at this hop, in samples behind its end: first the one to judge at.
+    """Places of rows in the period at this hop, in samples after its end; the first one is used for monitoring.
 
     In a window over which the machine moves, each line leaks into the others, with a phase that depends on where in
     the excitation's period the window begins; five places or more show how much. Every hop that divides the window
-    has a row at the period's end, any other has its last one of a period as near to it as can be.
+    has a row at the period's end; for any other hop the last row of a period is as near to the end as possible.
 
     >>> places(400, 20), places(400, 200), places(400, 400), places(400, 800), places(400, 89)
     ((0, 320, 240, 160, 80), (0, 200), (0,), (0,), (356, 267, 178, 89))
@@ -61,7 +61,7 @@ def places(window: int, hop: int) -> tuple[int, ...]:
 
 
 class Apart:
-    """Takes rows whose windows do not overlap from a stream of responses or parameters.
+    """Selects rows whose windows do not overlap from a stream of responses or parameters.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Apart:
 
     def __init__(self, apart: int, place: int) -> None:
         self._apart, self._place = apart, place
-        self._sample, self._schedule = -2 * apart, np.nan  # no row stands so far behind it
+        self._sample, self._schedule = -2 * apart, np.nan  # no row is so far after it
 
     def of_responses(self, responses: Responses) -> Rows:
         """Rows of complex values at the lines."""

@@ -1,4 +1,4 @@
-"""RunOffset: how far this run is off the baseline along the direction in which healthy runs differ."""
+"""RunOffset: offset of this run from the baseline along the direction in which healthy runs differ."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from livebode.monitoring.naming import Segment
 Floats = NDArray[np.float64]
 
 _MEMORY = 600  # windows that have an offset in common: a minute of motion, as a recording to learn from
-_FULL = 0.8  # of the memory: more of it takes minutes to fill
+_FULL = 0.8  # of the memory: a larger share takes minutes to fill
 _PAUSE_S = 60.0  # without judged motion, after which the machine may be at another temperature
 
 
 class RunOffset:
-    """Follows this run's offset, so that only changes within the run, or in another direction, are left.
+    """Follows this run's offset, so that only changes within the run, or in another direction, remain.
 
-    The model moves with the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence
-    is projected too: an offset of any size explains what it can of each window. The offset is the mean over the windows
-    so far, with a memory of 600; a window enters it once every chart was at zero after it, so that a change does not,
-    and at the latest 600 windows later.
-    An offset beyond those of healthy runs has a chart of its own; where that raises an alarm, the baseline itself is
+    The model follows the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence is
+    also projected: an offset of any size is allowed for in each window. The offset is the mean over the previous
+    windows, with a memory of 600; a window is included once every chart was at zero after it, so that a change is not
+    included, and at the latest 600 windows later.
+    An offset beyond those of healthy runs has its own chart; where that raises an alarm, the baseline itself is
     the reference.
 
     Parameters
     ----------
     between
-        What was learned; None: runs do not differ, and evidence stays as it is.
+        Learned difference between runs; None: runs do not differ, and evidence is unchanged.
     held, threshold
         Of the charts.
     """
@@ -63,9 +63,9 @@ class RunOffset:
 
     @property
     def error_reachable(self) -> float:
-        """Standard deviation to which the offset gets known with windows like those so far, in smallest changes.
+        """Standard deviation of the offset that windows like the previous ones can reach, in smallest changes.
 
-        Zero before half of the memory is full: what windows tell depends on speed and place.
+        Zero before half of the memory is full: the information of windows depends on speed and position.
         """
         _, information, windows = self._sums
         if windows < _MEMORY / 2 or information <= 0:
@@ -74,16 +74,16 @@ class RunOffset:
 
     @property
     def unreachable(self) -> bool:
-        """Whether windows like those so far leave the offset unknown, or known only after minutes."""
+        """Whether the offset remains unknown with windows like the previous ones, or is known only after minutes."""
         return not self.known and self.error_reachable > KNOWN
 
     def within_run(self, direction: int) -> bool:
-        """Whether changes of this direction are from what the run was before, not from the baseline."""
+        """Whether changes of this direction are relative to the earlier part of the run, not to the baseline."""
         between = self._between
         return between is not None and not self._fixed and bool(between.dominant(self._held.smallest)[direction])
 
     def judged(self, score: Floats, information: Floats) -> tuple[Floats, Floats]:
-        """Evidence of windows around the reference, with an offset allowed for that is not known, (rows, 4 …)."""
+        """Evidence of windows around the reference, with an unknown offset allowed for, (rows, 4 …)."""
         if self._between is None or self.known:
             return score, information
         return self._between.projected(score, information, self._held.smallest)
@@ -93,7 +93,7 @@ class RunOffset:
         return Segment(*self.judged(segment.score, segment.information), segment.position_m)
 
     def step(self, score: Floats, information: Floats, mark: int, time_s: float) -> None:
-        """Take a window in which nothing is alarmed: evidence around the baseline, (4,), (4, 4)."""
+        """Process a window without an alarm: evidence around the baseline, (4,), (4, 4)."""
         if self._between is None:
             return
         if time_s - self._last_s > _PAUSE_S:
@@ -105,7 +105,7 @@ class RunOffset:
         self.chart.step(np.array([along]) / self._inflation, np.array([own]) / self._inflation, mark)
 
     def fix(self) -> None:
-        """From now on the baseline itself is the reference, for the offset is beyond those of healthy runs."""
+        """Make the baseline itself the reference, because the offset is beyond those of healthy runs."""
         self._fixed = True
 
     def settle(self, oldest: int, idle: bool) -> None:

@@ -1,4 +1,4 @@
-"""A MovingModel driven by the measured torque, and how its motion answers to each of its parameters."""
+"""A MovingModel driven by the measured torque, and the sensitivity of its motion to each parameter."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from livebode.motion.replay import INPUTS, PLACE_M, advance, engine, late, torqu
 Floats = NDArray[np.float64]
 
 DIRECTIONS = ("stiffness", "load", "damping", "inertia")
-"""What a change is told apart into: Keff, mL, bs, Js; each as a small change of its logarithm."""
+"""Directions of a change: Keff, mL, bs, Js; each as a small change of its logarithm."""
 
 _STEP = 1e-3  # of a logarithm; the change is linear to a twentieth of a percent
 _GRID = 4096
 
 
 class Replay:
-    """The model under a torque along a way, five times: as it is, and with each parameter a little larger.
+    """The model under a torque along measured positions, five times: as it is, and with each parameter a little larger.
 
-    What made the torque does not matter: excitation, motion, and the controllers' answer to noise move the model as
-    they moved the machine, at any speed and in any direction.
+    The origin of the torque does not matter: excitation, motion, and the controllers' response to noise move the model
+    as they moved the machine, at any speed and in any direction.
     """
 
     def __init__(self, model: MovingModel, rate_hz: float, delay_s: float = 0.0) -> None:
@@ -41,8 +41,8 @@ class Replay:
 
         By the logarithm of each direction, and by the velocity's delay, s.
 
-        The model is off its own parameters by `offset`. What is not in u or not in the model, such as friction, makes
-        the velocity drift away slowly.
+        The model's parameters are changed by `offset`. Effects that are not in u or not in the model, such as friction,
+        make the velocity drift slowly.
         """
         inputs, inertia_kg_m2 = self._inputs(u, position_m, offset)
         plain = self._run(inertia_kg_m2, inputs)

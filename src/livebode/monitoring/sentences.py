@@ -1,4 +1,4 @@
-"""Events of the monitoring, in sentences that a maintenance person understands."""
+"""Messages of the monitoring's Events, for maintenance staff."""
 
 from __future__ import annotations
 
@@ -32,34 +32,34 @@ WHAT = {
 
 
 def changed(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
-    """Something changed, as is known at this sample and time; `within_run`: from what this run was before."""
+    """A change, as known at this sample and time; `within_run`: relative to the earlier part of this run."""
     amount = _amount(alarm.change, alarm.now, alarm.bound)
     message = f"Since {moment(alarm.since_s)} {amount} than {_reference(within_run)}"
     if (rival := alarm.rival) is not None:
-        message += f"; it may also be that {_amount(rival, rival.amount, rival.bound)}"
+        message += f"; a possible alternative: {_amount(rival, rival.amount, rival.bound)}"
     if alarm.change.place is None and abs(alarm.now) > FAR:
-        message += ". That is so far from the baseline that it may be another machine; the amount is rough until all "
-        message += "that differs has its name"
+        message += ". This is so far from the baseline that it may be another machine; the amount is approximate until "
+        message += "all differences are identified"
     return Event("change", sample, time_s, message + ".", about(alarm, within_run=within_run))
 
 
 def far_away(alarm: Alarm, sample: int, time_s: float) -> Event:
-    """So much changed that no single change explains it."""
+    """A change so large that no single change explains it."""
     message = (
         f"Since {moment(alarm.since_s)} the machine is so far from the baseline that no single change explains it: it "
-        "may be another machine. Amounts follow where the model can come along."
+        "may be another machine. Amounts are reported as soon as the model can follow."
     )
     return Event("change", sample, time_s, message, about_far(alarm))
 
 
 def about_far(alarm: Alarm) -> dict[str, Any]:
-    """The same as plain data: all but the moment and the way is not known."""
+    """The same as plain data: only the time and the range of positions are known."""
     unknown = {"amount_percent": None, "bound_percent": None, "place_m": None, "place_width_m": None}
     return about(alarm) | unknown | {"what": "machine", "may_also_be": None}
 
 
 def corrected(alarm: Alarm, told: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
-    """The amount of a change that was told, once another that looked like a part of it has its name."""
+    """The corrected amount of a reported change, after another change was identified that seemed part of it."""
     message = (
         f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than "
         f"{_reference(within_run)}, not {_size(told)} as reported earlier."
@@ -69,14 +69,14 @@ def corrected(alarm: Alarm, told: float, sample: int, time_s: float, *, within_r
 
 
 def joint(alarms: list[Alarm]) -> str:
-    """What stands, estimated together, in half a sentence."""
+    """The active changes, estimated together, as half a sentence."""
     if not alarms:
         return ""
     return ": " + "; ".join(_amount(alarm.change, alarm.now, alarm.bound) for alarm in alarms)
 
 
 def cleared(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = False) -> Event:
-    """A change that was alarmed has gone."""
+    """An alarmed change has disappeared."""
     where = _where(alarm.change)
     name = WHAT[DIRECTIONS[alarm.change.direction]]
     message = (
@@ -87,12 +87,12 @@ def cleared(alarm: Alarm, sample: int, time_s: float, *, within_run: bool = Fals
 
 
 def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
-    """The machine does what was not learned in this window."""
+    """The machine is outside of the learned range in this window."""
     status, position_m, speed_m_per_s = str(seen.status[row]), seen.position_m[row], seen.speed_m_per_s[row]
     details = {"reason": status, "position_m": float(position_m), "speed_m_per_s": float(speed_m_per_s)}
     if status == word.FAST:
         message = (
-            f"The baseline knows speeds up to {machine.fastest_m_per_s:.3g} a second, and the axis moves at "
+            f"The baseline covers speeds up to {machine.fastest_m_per_s:.3g} a second, but the axis moves at "
             f"{abs(speed_m_per_s):.3g}: such motion is not monitored. Add a run with such speeds and learn again."
         )
     elif status in (word.COVARIATE, word.NO_COVARIATE):
@@ -100,14 +100,14 @@ def unknown(machine: Machine, seen: Evidence, row: int) -> Event:
         details |= dict(zip(machine.covariates.names, seen.covariate[row].tolist()))
     else:
         message = (
-            f"The baseline does not know the axis at position {position_m:.3g}: it is not monitored there. "
+            f"The baseline does not cover position {position_m:.3g}: the axis is not monitored there. "
             "Add a run with such positions and learn again."
         )
     return Event("baseline-unknown", int(seen.sample[row]), float(seen.time_s[row]), message, details)
 
 
 def offset_unknown(machine: Machine, error: float, sample: int, time_s: float) -> Event:
-    """The windows of this run tell too little of how far it is off the baseline; `error` is in smallest changes."""
+    """The windows of this run do not determine its offset from the baseline; `error` is in smallest changes."""
     between, smallest = machine.between, machine.held.smallest
     assert between is not None
     along = np.flatnonzero(between.dominant(smallest))
@@ -115,23 +115,23 @@ def offset_unknown(machine: Machine, error: float, sample: int, time_s: float) -
     size = np.abs(between.direction[along]) * 100
     beyond = ", ".join(f"{3 * between.spread * s:.2g} %" for s in size)
     message = (
-        f"The learned runs differ from each other in {what}, and the windows of this run tell its own offset only to "
-        f"± {error * size[0]:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from the "
-        "baseline. Use a stronger excitation, or learn with the cause as a covariate."
+        f"The learned runs differ from each other in {what}, and the windows of this run determine its own offset only "
+        f"to ± {error * size[0]:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from "
+        "the baseline. Use a stronger excitation, or learn with the cause as a covariate."
     )
     details = {"reason": word.OFFSET, "reachable_percent": float(error * size[0])}
     return Event("baseline-unknown", sample, time_s, message, details)
 
 
 def _not_covered(covariates: Covariates, value: Floats) -> str:
-    """The first covariate without a value, or outside of what was learned."""
+    """The first covariate without a value, or outside of the learned range."""
     for i, name in enumerate(covariates.names):
         if not isfinite(value[i]):
             return f"The covariate {name!r} has no value; the machine is not monitored without it. Check that channel."
     beside = np.maximum(covariates.low - value, value - covariates.high) / covariates.half_range
     i = int(np.argmax(beside))
     return (
-        f"The baseline knows {covariates.names[i]!r} from {covariates.low[i]:.4g} to {covariates.high[i]:.4g}, and it "
+        f"The baseline covers {covariates.names[i]!r} from {covariates.low[i]:.4g} to {covariates.high[i]:.4g}, but it "
         f"is {value[i]:.4g}: the machine is not monitored there. Add a run with such values and learn again."
     )
 

@@ -1,4 +1,4 @@
-"""The changes that stand: how large they are by now, and whether they have gone."""
+"""The active changes: their present amounts, and whether they have disappeared."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from livebode.monitoring.offset import FAR, Offset, Place
 
 Floats = NDArray[np.float64]
 
-_MEMORY = 0.95  # per window, of a change's size by now
-_HELD_FROM = 0.25  # of the change when it was named, or of the smallest if that is less: below it is on its way out
-_UNSEEN = 0.01  # of a change at a place: where there is less, the rest of the way is judged
-_MOVING = 0.005  # of the offset, from one stretch to the next: the others wait until the model has come along
+_MEMORY = 0.95  # per window, of a change's present size
+_HELD_FROM = 0.25  # of the change when it was identified, or of the smallest if that is less: below, it is disappearing
+_UNSEEN = 0.01  # of a change at a place: where its share is less, the rest of the travel is judged
+_MOVING = 0.005  # of the offset, from one stretch to the next: the others wait until the model has converged
 _MOST = 0.7  # of a logarithm: a factor of two
 
 
 class Standing:
-    """Alarms, with the Offset that they make of the model.
+    """Alarms, with the resulting Offset of the model.
 
-    The model follows the changes that stand, stretch by stretch, so that evidence stays small and a large change does
-    not look like another one besides (Gauss–Newton). Changes of directions are estimated together.
+    The model follows the active changes, stretch by stretch, so that evidence remains small and a large change does
+    not appear as an additional one (Gauss–Newton). Changes of directions are estimated together.
     """
 
     def __init__(self, machine: Machine, threshold: float) -> None:
@@ -42,36 +42,36 @@ class Standing:
 
     @property
     def directions(self) -> list[int]:
-        """Numbers of the directions that stand changed all along the way."""
+        """Numbers of the directions with an active change along the whole travel."""
         return sorted({a.change.direction for a in self.alarms if a.change.place is None})
 
     @property
     def far(self) -> bool:
-        """Whether the model has not come along with a machine that differs in more than one direction."""
+        """Whether the model does not yet follow a machine that differs in more than one direction."""
         return sum(not a.announced for a in self.alarms) > 1
 
     def hides(self, position_m: float) -> bool:
-        """Whether what stands keeps a window there from being judged for anything else."""
+        """Whether an active change prevents other judgements of a window at this position."""
         places = [a.change.place for a in self.alarms if a.change.place is not None]
         return self._moving or any(_share(place, position_m) > _UNSEEN for place in places)
 
     def add(
         self, change: Change, rival: Change | None, since: tuple[int, float], way_m: tuple[float, float], seen: Segment
     ) -> None:
-        """A change that was named, with the windows since it began: their evidence of changes from the baseline."""
+        """Add an identified change, with the windows since it began: their evidence of changes from the baseline."""
         alarm = Alarm(change, rival, *since, way_m, change.amount, change.bound, self._threshold)
         alarm.information = 2 * change.evidence / change.amount**2
         alarm.score = change.amount * alarm.information
-        if abs(change.amount) > FAR:  # not told from a model that came along: as linear as it is from the baseline
+        if abs(change.amount) > FAR:  # the model does not follow it yet: a linear estimate from the baseline
             alarm.bound = float(np.hypot(alarm.bound, _neglected(np.array([change.amount]))))
         self.alarms.append(alarm)
         self._score, self._information = seen.score.sum(axis=0), seen.information.sum(axis=0)
         self._moving = True
 
     def announced(self, known: bool = True) -> list[Alarm]:
-        """Alarms that were not out yet, and whose amount is `known`; that of a place is when it is next passed.
+        """Alarms not yet reported whose amount is `known`; the amount at a place is known when it is next passed.
 
-        One that comes to nothing once the model has come along is dropped.
+        An alarm whose amount vanishes once the model follows it is dropped.
         """
         new = [a for a in self.alarms if not a.announced]
         if self.far and (not known or any(abs(a.now) == _MOST for a in new)):
@@ -82,12 +82,12 @@ class Standing:
         return [a for a in new if not any(a is n for n in nothing)]
 
     def corrected(self) -> list[tuple[Alarm, float]]:
-        """Alarms that are out with an amount that does not hold now that the others have their names, and that."""
+        """Reported alarms whose amount is wrong now that the others are identified, with the reported amount."""
         wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.told_wrong]
         return [(alarm.tell(), told) for alarm, told in wrong]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
-        """Take a window; the alarms that it ends."""
+        """Process a window; returns the alarms that it ends."""
         if not self.alarms:
             return []
         hidden = any(_share(p, position_m) > _UNSEEN for p in self.offset.places)
@@ -104,7 +104,7 @@ class Standing:
         if not alarm.announced or (change.place is None and hidden) or share <= _UNSEEN:
             return False
         amount = self._amount(alarm)
-        # Against a machine without this change, with the others as they stand.
+        # Compared with a machine without this change, with the others at their present amounts.
         i = share**2 * information[j, j]
         s = share * score[j] + i * amount
         if change.place is not None:
@@ -118,17 +118,17 @@ class Standing:
         return min(abs(alarm.change.amount), float(self._machine.held.smallest[alarm.change.direction]))
 
     def _middle(self, alarm: Alarm) -> float:
-        """Between an alarm that stands and one that has gone."""
+        """Log-likelihood ratio between an active alarm and one that has disappeared."""
         return max(_HELD_FROM * self._size(alarm), float(self._machine.held.allowed[alarm.change.direction]))
 
     def _amount(self, alarm: Alarm) -> float:
-        """What the offset holds of this alarm."""
+        """The part of the offset that belongs to this alarm."""
         if alarm.change.place is None:
             return float(self.offset.logarithms[alarm.change.direction])
         return next((p.amount for p in self.offset.places if _same(p, alarm.change.place)), 0.0)
 
     def settle(self) -> None:
-        """At a stretch's end: the model comes along with what stands by now."""
+        """At a stretch's end: update the model to the active changes."""
         before, places = self.offset, []
         logarithms = self._directions_now()
         for alarm in self.alarms:
@@ -141,11 +141,11 @@ class Standing:
         local = np.abs(self.offset.stiffness(at) - before.stiffness(at)).max() if places else 0.0
         moved = np.abs(logarithms - before.logarithms).max()
         self._moving = bool(max(local, moved) > _MOVING)
-        if moved > _MOVING:  # what was gathered around the old offset would pull the new one back
+        if moved > _MOVING:  # evidence around the old offset would pull the new one back
             self._forget()
 
     def _directions_now(self) -> Floats:
-        """Amounts of the directions that stand, estimated together, with their bounds."""
+        """Amounts of the active directions, estimated together, with their bounds."""
         known, logarithms = self.directions, np.zeros_like(self.offset.logarithms)
         inside = self._information[np.ix_(known, known)]
         if known and np.all(np.diagonal(inside) > 0):
@@ -165,7 +165,7 @@ class Standing:
         return logarithms
 
     def _all_free(self) -> Floats:
-        """What every direction would be if none were held at the baseline, by the model as it follows now."""
+        """Amount of every direction if none were fixed at the baseline, by the model at its present offset."""
         return np.asarray(np.linalg.lstsq(self._information, self._score, rcond=None)[0])
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -187,7 +187,7 @@ class Standing:
 
 
 def _neglected(step: Floats) -> float:
-    """What a linear model leaves out of a change by so much, of second order in its largest part."""
+    """Error of a linear model for a change of this size, of second order in its largest part."""
     return float(np.abs(step).clip(0.0, _MOST).max() ** 2 / 2)
 
 

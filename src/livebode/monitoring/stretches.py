@@ -1,4 +1,4 @@
-"""Samples cut into stretches of whole windows, with what lies before and behind them."""
+"""Samples cut into stretches of whole windows, with the samples before and after them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from livebode.core import Block
 
 Floats = NDArray[np.float64]
 
-WINDOWS = 10  # of a stretch: what lies before is then half of the work, and an alarm at most a second late
-LEAD_S = 0.5  # for a model to come to the machine's state; a Q of 10 at 50 Hz forgets in 0.06 s
+WINDOWS = 10  # of a stretch: the lead is then half of the work, and an alarm at most a second late
+LEAD_S = 0.5  # for a model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Whole windows on the grid of sample numbers, the lead before them and up to a window behind them.
+    """Whole windows on the grid of sample numbers, the lead before them and up to a window after them.
 
     `data` (signals, samples) begins with sample number `start`, `first` and `last` are numbers of windows: window i
     has the samples i·N … i·N + N − 1. Samples before `settled` may come from a machine whose state is not known.
@@ -56,7 +56,7 @@ class Stretches:
         return done
 
     def finish(self) -> list[Stretch]:
-        """What is left, but for a last window that has none behind it; the next Block starts anew."""
+        """The remaining stretches, without a last window that has none after it; the next Block starts a new lead."""
         last = self._stop // self._window - 1
         done = [self._cut(last)] if self._stop >= 0 and last > self._next else []
         self._parts, self._stop = [], -1

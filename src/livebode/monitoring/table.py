@@ -14,17 +14,17 @@ Floats = NDArray[np.float64]
 
 WAYS = 3
 BACK, STILL, FORTH = range(WAYS)
-"""Which way the schedule goes: what a machine in motion shows depends on it."""
+"""Direction of the schedule: the values of a moving machine depend on it."""
 
 WINDOWS_MIN = 8
-KNOWN = 4.0  # a change is at least so many standard deviations of the mean that it is held against
+KNOWN = 4.0  # a change is at least this many standard deviations of the mean that it is compared with
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Mean and covariance of rows of numbers in every bin of a schedule, apart for each way of going.
+    """Mean and covariance of rows of numbers in every bin of a schedule, by direction.
 
-    A row is what a window says: its response at the lines, or the parameters that were fitted to it. Deviations are
+    A row is the result of a window: its response at the lines, or the parameters fitted to it. Deviations are
     relative to the mean, so that they are shares of a magnitude or of a parameter, and radians of a phase.
 
     Attributes
@@ -34,16 +34,16 @@ class Table:
     names
         Of the columns, (columns,): "20 Hz", or the parameter.
     low, step
-        Where the first bin begins, and how wide a bin is, in the schedule's unit; the step is 0 without a schedule.
+        Beginning of the first bin and width of a bin, in the schedule's unit; the step is 0 without a schedule.
     still
-        A schedule that moves less than that from window to window stands still.
+        A schedule that moves less than this from window to window is at standstill.
     mean
-        (bins, ways, columns); complex for lines. NaN where there is nothing.
+        (bins, ways, columns); complex for lines. NaN where nothing was learned.
     covariance
         Of the relative deviation, for lines of real and imaginary part (bins, ways, lines, 2, 2), for parameters
         (bins, ways, 1, parameters, parameters).
     variance
-        Mean of what the rows themselves said of their variance, relative, (bins, ways, columns).
+        Mean of the rows' own estimates of their variance, relative, (bins, ways, columns).
     count
         Windows learned, (bins, ways).
     accuracy
@@ -62,24 +62,24 @@ class Table:
     accuracy: Accuracy
 
     def place(self, rows: Rows) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Flat number of the cell (bin and way) of each row, and whether it is one that was learned."""
+        """Flat number of the cell (bin and direction) of each row, and whether the cell was learned."""
         cell, inside = cells(rows, self.low, self.step, self.still, len(self.count))
         return cell, inside & (self.count.ravel()[cell] >= WINDOWS_MIN)
 
     def deviation(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Relative deviation of every component, and its variance, (rows, components) each.
 
-        Where a row says that it is noisier than those that were learned, so is its deviation.
+        Where a row's own estimate exceeds the learned variance, the excess is added.
         """
         deviation, own, more = self.deviation_parts(rows, cell)
         return deviation, own + more
 
     def deviation_parts(self, rows: Rows, cell: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
-        """Relative deviation, its learned variance, and what a row says beyond that, (rows, components) each.
+        """Relative deviation, its learned variance, and the row's own excess over it, (rows, components) each.
 
-        A mean of n windows is
-        itself off by a variance/n; a component of a cell whose mean is known less well than the change that is looked
-        for has an infinite variance, and counts nothing.
+        A mean of n windows has
+        a variance/n of its own; a component of a cell whose mean is less accurate than the smallest change has an
+        infinite variance, so that it has no weight.
         """
         cells = self.count.size
         mean, learned = self.mean.reshape(cells, -1)[cell], self.variance.reshape(cells, -1)[cell]

@@ -22,12 +22,12 @@ _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest chang
 
 
 def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: int = 1) -> Table:
-    """Mean and covariance in 24 bins of the schedule, apart for each way.
+    """Mean and covariance in 24 bins of the schedule, by direction.
 
-    The runs should hold what is usual: speeds, directions, temperatures. What windows in a row have in common, and
-    whole stretches of them, is learned with it, and makes alarms as much slower. So is what differs between places of
-    the period: `runs` may hold each recording `overlap` times, with rows that stand at other places of it. These
-    overlap, and count as one.
+    The runs should contain the usual speeds, directions and temperatures. The correlation of consecutive windows and
+    of whole stretches is learned too, and delays alarms accordingly. So is the difference between places of the
+    period: `runs` may contain each recording `overlap` times, with rows at other places of the period. These overlap,
+    and count as one.
 
     Raises
     ------
@@ -38,8 +38,8 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
     if windows < 3 * WINDOWS_MIN:
         raise BaselineError(
             "too-few-windows",
-            f"the runs hold {windows} windows with valid {what} that do not overlap, less than the {3 * WINDOWS_MIN} "
-            "that a baseline needs",
+            f"the runs contain {windows} windows with valid {what} that do not overlap, less than the "
+            f"{3 * WINDOWS_MIN} that a baseline needs",
             "give longer runs",
             quantity=what,
             windows=windows,
@@ -54,8 +54,8 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
     if not np.any(table.count >= WINDOWS_MIN):
         raise BaselineError(
             "too-few-windows",
-            f"no bin of the schedule holds {WINDOWS_MIN} windows of {what}",
-            "give longer runs over the whole way",
+            f"no bin of the schedule has {WINDOWS_MIN} windows of {what}",
+            "give longer runs over the whole travel",
             quantity=what,
             windows_min=WINDOWS_MIN,
         )
@@ -110,7 +110,7 @@ def _moments(
 
 
 def _smallest(table: Table) -> Floats:
-    """What most cells know well enough, and at least a hundredth."""
+    """The change that most cells can detect, at least a hundredth."""
     own = np.einsum("...ii->...i", table.covariance).reshape(table.count.size, -1)
     enough = table.count.ravel() >= WINDOWS_MIN
     known = KNOWN * np.sqrt(own[enough] / table.count.ravel()[enough, np.newaxis])
@@ -118,10 +118,10 @@ def _smallest(table: Table) -> Floats:
 
 
 def _off(table: Table, cell: NDArray[np.intp], information: Floats) -> Floats:
-    """Standard deviation of what the means' own errors add up to over a stretch of rows, (components,).
+    """Standard deviation of the sum of the means' own errors over a stretch of rows, (components,).
 
-    The mean of n rows is off by a variance/n, by the same in every row of its cell: a machine that stays in one cell
-    shows all of it for ever, one that goes through many shows their mean.
+    The mean of n rows has an error of variance/n, the same in every row of its cell: a machine that remains in one cell
+    shows it permanently, one that passes many cells shows their mean.
     """
     cells, count = table.count.size, table.count.ravel()[:, np.newaxis]
     own = np.einsum("...ii->...i", table.covariance).reshape(cells, -1) / np.maximum(count, 1)

@@ -1,4 +1,4 @@
-"""Sequential detection of changes against a Table: which lines, or which parameters."""
+"""Sequential detection of changes relative to a Table: which lines, or which parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from livebode.monitoring.table_sentences import cleared, differs, unknown
 
 Floats = NDArray[np.float64]
 
-_LOOK_WINDOWS = 10  # between finding and telling, so that all that changed has shown itself
+_LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
 _KEPT = 600  # rows, over which the amount of a change is taken at most
 _CONFIDENCE = 1.96
 _TOLD = 3.0  # standard deviations, from which on a component counts among what changed
@@ -26,15 +26,15 @@ _TOLD = 3.0  # standard deviations, from which on a component counts among what 
 class TableMonitor:
     """Every component of a Table has a CUSUM up and one down; one that reaches the threshold raises an alarm for all.
 
-    The alarm names each component that differs by three standard deviations and half of the smallest change, with its
-    amount since the first of them began, and the part of the schedule where it was seen. It clears when every sum of
-    what was named is back at zero, of rows in the cells where it was seen. A row in a cell that was not learned is not
-    judged.
+    The alarm names each component that differs by three standard deviations and half of the smallest change, with
+    its amount since the first of them began, and the part of the schedule where it was seen. It clears when every
+    sum of the named components is back at zero, from rows in the cells where it was seen. A row in a cell that was
+    not learned is not judged.
 
     Parameters
     ----------
     table
-        What was learned.
+        The learned table.
     mean_s, step_s
         Mean time between false alarms, and between rows, s.
     """
@@ -59,7 +59,7 @@ class TableMonitor:
 
     @property
     def standing(self) -> bool:
-        """Whether an alarm stands."""
+        """Whether an alarm is active."""
         return bool(self._standing.any())
 
     def process(self, rows: Rows) -> list[Event]:
@@ -82,7 +82,7 @@ class TableMonitor:
         return events
 
     def finish(self) -> list[Event]:
-        """An alarm that was about to be told."""
+        """An alarm that is not reported yet."""
         if self._found < 0 or not len(self._moment):
             return []
         return self._tell()
@@ -111,7 +111,7 @@ class TableMonitor:
     def _tell(self) -> list[Event]:
         raised = self._charts.sums >= self._charts.threshold
         first = _began(self._score, self._information, np.asarray(raised.any(axis=0)))
-        # A window that holds the change itself has part of it; the amount is of those behind it.
+        # The window in which the change occurs contains a part of it; the amount is from the windows after it.
         whole = min(first + 1, len(self._moment) - 1)
         score, information = self._score[whole:].sum(axis=0), self._information[whole:].sum(axis=0)
         accuracy = self._table.accuracy
@@ -120,14 +120,14 @@ class TableMonitor:
         sigma = np.where(seen, np.hypot(1 / np.sqrt(np.where(seen, information, 1.0)), accuracy.scatter), np.inf)
         told = (np.abs(amount) >= np.maximum(_TOLD * sigma, accuracy.smallest / 2)) | raised.any(axis=0)
         self._standing, self._found = told, -1
-        if not told.any():  # what had raised it sank again while the window of looking went by
+        if not told.any():  # the sum that raised it decreased again before the report
             self._forget()
             return []
         moment = self._moment[first:]
         self._seen_in[:] = False
         self._seen_in[moment[:, 3].astype(int)] = True
         event = differs(self._table, told, amount, _CONFIDENCE * sigma, moment)
-        # What was named and has no sum of its own any more is held from here on by one.
+        # A named component without a sum of its own gets one that keeps the alarm active.
         up = np.stack([amount > 0, amount <= 0]) & told
         self._charts.sums = np.where(up, self._charts.threshold, 0.0)
         self._forget()

@@ -1,4 +1,4 @@
-"""Events of a Table's monitoring, in sentences."""
+"""Messages of the Events of a Table's monitoring."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NAMED = 4
 
 
 def differs(table: Table, told: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
-    """What changed; `moment` is schedule, sample and time of every row since it began."""
+    """A change; `moment` is schedule, sample and time of every row since it began."""
     if table.what == "lines":
         amount, bound = _polar(amount, bound)
     items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(told)]
@@ -51,15 +51,15 @@ def _polar(amount: Floats, bound: Floats) -> tuple[Floats, Floats]:
 
 
 def cleared(table: Table, sample: int, time_s: float) -> Event:
-    """All that had changed is as it was."""
-    message = f"At {clock_moment(time_s)} the {_KIND[table.what]} are as in the baseline again."
+    """All changes have disappeared."""
+    message = f"At {clock_moment(time_s)} the {_KIND[table.what]} agree with the baseline again."
     return Event("change-cleared", sample, time_s, message, {"what": table.what})
 
 
 def unknown(schedule: float, sample: int, time_s: float) -> Event:
-    """The machine is where, or goes as, it was not learned."""
+    """The machine is at a position or moves in a direction that was not learned."""
     message = (
-        f"The baseline does not know the machine at {schedule:.4g} going this way: it is not monitored there. "
+        f"The baseline does not cover {schedule:.4g} in this direction: the machine is not monitored there. "
         "Add a run with such motion and learn again."
     )
     return Event("baseline-unknown", sample, time_s, message, {"reason": "place", "schedule": schedule})
