@@ -1,4 +1,4 @@
-"""From responses to what the machine is: physical parameters and rational models, with covariance."""
+"""From responses to models of the machine: physical parameters and rational models, with covariance."""
 
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.fitter import Fitter

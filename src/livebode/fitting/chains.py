@@ -1,4 +1,4 @@
-"""Masses in a row, the motor first: what they share, one, and two."""
+"""Chains of masses, the motor first: their base class, one mass, and two masses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DAMPING = (1e-12, 1e12)
 
 @dataclass(frozen=True, kw_only=True)
 class Chain(PhysicalModel):
-    """What the models of masses in a row share.
+    """Base of the models of masses in a chain.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Chain(PhysicalModel):
         if self.output not in ("velocity", "position"):
             raise UsageError(
                 "not-one-of",
-                f"output={self.output!r} is not known",
+                f"output={self.output!r} is not supported",
                 "choose 'velocity' or 'position'",
                 argument="output",
                 value=self.output,
@@ -53,7 +53,7 @@ class Chain(PhysicalModel):
         if self.side not in ("motor", "load"):
             raise UsageError(
                 "not-one-of",
-                f"side={self.side!r} is not known",
+                f"side={self.side!r} is not supported",
                 "choose 'motor' or 'load'",
                 argument="side",
                 value=self.side,
@@ -107,14 +107,14 @@ class Chain(PhysicalModel):
         return dragged
 
     def _whole(self, found: Floats, grid: Grid) -> Floats:
-        """Found values (..., some) with frictions and no delay behind them."""
+        """Values (..., some) followed by frictions and a delay of zero."""
         rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
         return self.shown(np.concatenate([found, rest], axis=-1), grid)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rigid(Chain):
-    """One inertia, J, with viscous friction B (held at zero unless freed) and a delay.
+    """One inertia, J, with viscous friction B (default: fixed at zero) and a delay.
 
     >>> Rigid().names
     ('J', 'B', 'delay')
@@ -140,8 +140,8 @@ class Rigid(Chain):
 class TwoMass(Chain):
     """Motor, spring and load: Nevaranta 2016, (11), (12), whose motor side is (14).
 
-    Js, load (mL or JL), Keff and bs are fitted; B (viscous friction at the motor), BL (at the load) and delay are held
-    at zero unless freed. With a known ratio of the load's inertia to the motor's, the load is not fitted.
+    Js, load (mL or JL), Keff and bs are fitted; B (viscous friction at the motor), BL (at the load) and delay are fixed
+    at zero by default. With a known ratio of the load's inertia to the motor's, the load is not fitted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Competing models for one response: which adequate one explains it best, and how far the others are from it."""
+"""Competing models for one response: the adequate one that explains it best, and the distance of the others."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _TAKEN = 3  # at most
-_FRICTION_PRICE = 2.5  # that −2·ln(likelihood) must fall by: 1.6 sigma, for every machine has some
+_FRICTION_PRICE = 2.5  # required decrease of −2·ln(likelihood): 1.6 sigma, because every machine has some
 _PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0}
 _DAMPING_PRICE = 4.0  # of a mode whose damping is free
-_APART = 0.15  # of a frequency of the model itself: a further mode nearer to it would bend that one's own shape
+_APART = 0.15  # of a frequency of the model itself: a nearer further mode would change the model's own mode
 _MODES, _MODES_TRIED = 40, 3
 _LOWEST, _HIGHEST = 0.7, BEYOND  # of the lowest and of the highest line, where a further mode is looked for
 _NEAR_NYQUIST = 0.9
@@ -32,12 +32,12 @@ _EARLIEST_TICKS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Competitor:
-    """One model, its fit of one row, and what it costs: −2·ln(likelihood) and the price of what it has taken.
+    """One model, its fit of one row, and its cost: −2·ln(likelihood) plus the penalty for its additions.
 
     Attributes
     ----------
     taken
-        What it has beside the model that was asked for, in the order in which it was taken.
+        Additions to the specified model, in the order in which they were made.
     """
 
     problem: Problem
@@ -48,7 +48,7 @@ class Competitor:
 
 @dataclass(frozen=True)
 class Allowed:
-    """What competitors may change: not what the user holds, and a delay only where nobody else freed it."""
+    """Permitted changes by competitors: no parameter fixed by the user, and a delay only if it is not free already."""
 
     fixed: Set[str]
     delay: bool
@@ -58,8 +58,8 @@ class Allowed:
 def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: Allowed) -> list[Competitor]:
     """The model that explains one row best, then all others that were fitted.
 
-    From the model that was asked for on, the best of all that differ from it by one step is taken as long as the cost
-    falls, at most three times; what was taken before is left again where the cost is then less.
+    Starting with the specified model, the best of all models that differ by one step is selected as long as the cost
+    decreases, at most three times; an earlier addition is removed again where this reduces the cost.
     """
     every, best = [start], start
     for _ in range(_TAKEN):
@@ -81,7 +81,7 @@ def competitor(
     """A fit with its cost."""
     price = sum(_PRICE.get(name, _FRICTION_PRICE) for name in taken)
     if MODE in taken:
-        # It is looked for over all lines, and the largest of as many chances is found.
+        # The search is over all lines, so the largest of as many random values is found.
         price += 2 * float(np.log(np.count_nonzero(measured.use)))
         price += _DAMPING_PRICE * ("mode_damping" not in problem.held)
     return Competitor(
@@ -90,10 +90,10 @@ def competitor(
 
 
 def mixed(every: list[Competitor]) -> Floats:
-    """Covariance (parameters, parameters) of the first one's values that holds the choice too.
+    """Covariance (parameters, parameters) of the first one's values that includes the choice of the model.
 
-    Each model has the weight e^(−cost/2). What the models' values differ by, and what a wider model is less certain,
-    count by these weights: about the best one's values the mean square error of the mixture.
+    Each model has the weight e^(−cost/2). It is the mean square error of this mixture about the best model's values:
+    it includes the differences between the models and the larger variance of a wider model.
     """
     best = every[0]
     found = np.array(best.fitted.covariance[0])
@@ -113,7 +113,7 @@ def _weight(of: Competitor, every: list[Competitor]) -> float:
 
 
 def positive(matrix: Floats) -> Floats:
-    """The part of a symmetric matrix that is not negative, in units in which its diagonal is one."""
+    """The positive semidefinite part of a symmetric matrix, in units in which its diagonal is one."""
     scale = np.sqrt(np.abs(np.diag(matrix)))
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
@@ -131,7 +131,7 @@ def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allo
 
 
 def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
-    """The same without one of the parameters that it took before: a delay, say, that stood in for a mode."""
+    """The same without one of its earlier additions, such as a delay that approximated a mode."""
     for i, name in enumerate(of.taken[:-1]):
         if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
             problem = of.problem.variant(held={name: 0.0})
@@ -167,13 +167,13 @@ def _steps(of: Competitor, measured: Measured, allowed: Allowed) -> Iterator[tup
         moving = problem.variant(Extended(base, (*extras, MODE), allowed.top_hz))
         starts = _mode_starts(moving, problem, measured, of.fitted)
         yield MODE, moving, starts
-        # Far above the band its damping cannot be seen.
+        # Far above the band its damping has no visible effect.
         undamped = moving.variant(held={"mode_damping": START_DAMPING})
         yield MODE, undamped, undamped.with_held(starts)
 
 
 def _only(at: Floats, shown: Floats, problem: Problem, name: str) -> Floats:
-    """`at` with one parameter as large as the lines would just show."""
+    """`at` with one parameter at the smallest value that the lines show."""
     begun = problem.with_held(at)
     begun[problem.model.names.index(name)] = shown[problem.model.names.index(name)]
     return begun
@@ -188,8 +188,8 @@ def _padded(model: PhysicalModel, of: PhysicalModel, at: Floats) -> Floats:
 def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitted) -> Floats:
     """Values with a further mode where it would lower chi² most to first order, (starts, parameters).
 
-    For each frequency and damping the gain is the only new parameter, and linear: beside the slopes of the fit, which
-    take their share of it, least squares give it at once.
+    For each frequency and damping the gain is the only new parameter, and linear: least squares together with the
+    slopes of the fit give it directly.
     """
     grid = problem.grid
     weight = np.where(measured.use, weights(measured.sigma, np.abs(fitted.response), fitted.epsilon), 0.0)
@@ -218,7 +218,7 @@ def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitt
 
 
 def _near_own(problem: Problem, values: Floats, frequency_hz: Floats) -> NDArray[np.bool_]:
-    """Which frequencies are near a resonance or antiresonance of the model."""
+    """Frequencies near a resonance or antiresonance of the model."""
     transfer = problem.model.continuous(values[0])
     own_hz = np.abs(np.concatenate([transfer.poles(), transfer.zeros()])) / (2 * np.pi)
     return np.asarray((np.abs(np.log(np.divide.outer(frequency_hz, own_hz + 1e-300))) < _APART).any(axis=1))
@@ -230,7 +230,7 @@ def _stacked(values: Complex) -> Floats:
 
 
 def _best_start(problem: Problem, measured: Measured, fitted: Fitted, starts: Floats) -> Floats:
-    """One row, of the start that leads to the least."""
+    """One row, from the start with the least cost."""
     if len(starts) == 1:
         return starts
     weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)
@@ -240,7 +240,7 @@ def _best_start(problem: Problem, measured: Measured, fitted: Fitted, starts: Fl
 
 
 def _possible(problem: Problem, fitted: Fitted, allowed: Allowed) -> bool:
-    """Whether its mode is apart from the model's own, and its delay, if it has a free one, one that logging makes."""
+    """Whether its mode is separate from the model's own, and a free delay, if any, is one that logging can cause."""
     model = problem.model
     if isinstance(model, Extended) and MODE in model.extras:
         own = len(model.base.names)

@@ -1,4 +1,4 @@
-"""Whether the phase shows a delay that the model holds at zero: two competing fits, decided group by group."""
+"""Whether the phase shows a delay that the model fixes at zero: two competing fits, decided group by group."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from livebode.fitting.weighing import misfit
 Floats = NDArray[np.float64]
 
 SHOWN = 10.0
-"""By how much −2·ln(likelihood) falls where a delay is taken: 3.2 sigma of the delay, by chance once in 640 fits."""
+"""Decrease of −2·ln(likelihood) from which a delay is fitted: 3.2 sigma of the delay, by chance once in 640 fits."""
 
-_GONE = 4.0  # below it a delay is no longer taken: 2 sigma
+_GONE = 4.0  # below it a delay is no longer fitted: 2 sigma
 _EARLIEST_TICKS = 2.0  # an input that was logged after it acted, by no more than a tick of two channels
 _EVERY = 16  # groups between two decisions
 _TRIED_TICKS = (0.0, 1.0, 2.0, 4.0, 8.0)
 
 
 class DelayChoice:
-    """A model with its delay held and the same with it freed, and which of them rows are fitted with.
+    """A model with a fixed delay and the same with a free one, and the choice between them for the rows.
 
-    Rows of the first group choose one by one; those of a later group use what the groups before it show together, and
-    every sixteenth group decides again. A user who frees or holds the delay has decided: there is nothing to choose.
+    Rows of the first group choose one by one; those of a later group use the joint result of the previous groups, and
+    every sixteenth group decides again. If the user frees or fixes the delay, there is no choice.
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class DelayChoice:
 
     @property
     def problem(self) -> Problem:
-        """What rows are fitted with at present."""
+        """The problem that rows are fitted with at present."""
         return self.freed if self.taken else self.held
 
     def weigh(self, group: int, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
@@ -85,12 +85,12 @@ class DelayChoice:
 
 
 def _decides(group: int, taken: bool | None) -> bool:
-    """Undecided, groups 0, 1, 2, 4 …: a model that never fits costs no more and more."""
+    """If undecided, groups 0, 1, 2, 4 …: the cost of a model that never fits stays limited."""
     return group % _EVERY == 0 or (taken is None and group & (group - 1) == 0)
 
 
 def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: Floats, found: Fitted) -> Fitted:
-    """Rows fitted with a free delay, from where they were fitted without; where both failed, from several delays."""
+    """Rows fitted with a free delay, started from the fit without; where both failed, from several delays."""
     best = fit_rows(freed, measured, noise_dof, found.ended)
     lost = np.flatnonzero((found.status != OK) & (found.status != FRICTION) & (best.status != OK))
     some, dof = measured.rows(lost), noise_dof[lost]
@@ -107,7 +107,7 @@ def fitted_freely(held: Problem, freed: Problem, measured: Measured, noise_dof: 
 
 
 def gains(measured: Measured, noise_dof: Floats, less: Fitted, more: Fitted) -> Floats:
-    """By how much −2·ln(likelihood) falls from one fit to the other, (rows,), each with the ε that it needs."""
+    """Decrease of −2·ln(likelihood) from one fit to the other, (rows,), each with the ε that it needs."""
     before, after = (misfit(measured, x.response, x.dof, noise_dof) for x in (less, more))
     return np.asarray(before - after)
 

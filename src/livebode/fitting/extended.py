@@ -1,4 +1,4 @@
-"""A model with what a real machine has beside it: a lag, a further mode, the compliance of modes above the band."""
+"""A model extended by effects of a real machine: a lag, a further mode, the compliance of modes above the band."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Complex = NDArray[np.complex128]
 
 LAG, RESIDUAL, MODE = "lag", "residual compliance", "further mode"
 BEYOND = 3.0
-"""Frequency of the mode that stands for all above the band, over the highest line."""
+"""Frequency of the mode that represents all modes above the band, over the highest line."""
 
 START_DAMPING = 0.03
-"""Of a further mode whose damping the lines do not show."""
+"""Damping ratio of a further mode whose damping the lines do not show."""
 
 _BEYOND_DAMPING = 0.05
 _SHOWN = 0.1  # of |G| at the highest line
@@ -32,13 +32,13 @@ WORDS = {
     RESIDUAL: "the compliance of modes above the band",
     MODE: "a further mode",
 }
-"""What a model may lack."""
+"""Effects that a model may lack."""
 
 
 @dataclass(frozen=True)
 class Extended(PhysicalModel):
     """A model G and some of: a lag behind it, G/(1 + s·lag); a further mode, G + mode_gain·s/(s² + 2ζωs + ω²); the
-    compliance that modes above the band leave in it, the same with ω at three times the highest line.
+    compliance of modes above the band, the same with ω at three times the highest line.
 
     The last two are over s for a position. At the motor their gains are not negative. Its own parameters keep their
     meaning: rigid body and first mode (or modes), which those of a chain with one more mass would not.

@@ -1,4 +1,4 @@
-"""Fitter: responses in, parameters with bounds out, at the pace of the responses."""
+"""Fitter: responses in, parameters with bounds out, at the rate of the responses."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _KNOWN = 4  # rows that ε is taken from at least
 
 
 class Fitter:
-    """Fits a model to every Response as it comes, from where the last fits ended.
+    """Fits a model to each Response on arrival, starting from the last valid fits.
 
-    Rows count in groups of sixteen: a row starts from the last good fit of the groups before its own, and takes ε from
-    their newest 64 good rows, so that it stands still from row to row; only the rows of the first group find their own.
-    However the same responses are cut into batches, the results are the same (to rounding). A row whose fit fails from
-    there is scanned anew (docs/fits.md).
+    Rows are processed in groups of sixteen: a row starts from the last valid fit of the previous groups, and uses the ε
+    of their newest 64 valid rows, so that ε is constant within a group; only the rows of the first group find their
+    own. The results do not depend on how the responses are cut into batches (to rounding). A row whose fit fails from
+    this start is scanned again (docs/fits.md).
 
     Delay: none beyond that of the Responses.
 
-    Bias: a model that is not the machine's is wrong by more than noise, in the same way in neighbouring rows; ε covers
-    its size, but no averaging takes it away. Responses of a moving axis carry the motion (see `MotionCorrection`).
+    Bias: an incomplete model has an error beyond noise that is the same in neighbouring rows; ε covers its size, but
+    averaging does not remove it. Responses of a moving axis contain the motion (see `MotionCorrection`).
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ class Fitter:
     band_hz
         Lowest and highest frequency of the lines that are used; all by default.
     hold
-        "zero-order": the input stands between samples, as a drive's does; "none": the continuous response.
+        "zero-order": the input is held between samples, as in a drive; "none": the continuous response.
 
     Raises
     ------
     UsageError
-        If model, parameter names or bounds cannot be.
+        If model, parameter names or bounds are invalid.
     FitError
         If the band has too few lines.
 
@@ -77,7 +77,7 @@ class Fitter:
         self.model = model_named(model, **options) if isinstance(model, str) else model
         self._fixed, self._free = dict(fixed or {}), tuple(free)
         self._band, self._hold = band_hz, hold
-        Problem(self.model, Grid(np.ones(1), 1.0, hold), self._fixed, self._free)  # refused before anything starts
+        Problem(self.model, Grid(np.ones(1), 1.0, hold), self._fixed, self._free)  # rejected before anything starts
         self._lines: Lines | None = None
         self._events: list[Event] = []
         self._word = NO_RESPONSE
@@ -90,7 +90,7 @@ class Fitter:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the fitted parameters, those that are held included."""
+        """Names of the parameters, including fixed ones."""
         return self.model.names
 
     @property
@@ -106,7 +106,7 @@ class Fitter:
         SignalError
             If the Responses are not of a plant.
         GridError
-            If they are on other lines than those before.
+            If they are on other lines than the previous ones.
         """
         if responses.quantity != "plant":
             raise SignalError(
@@ -127,7 +127,7 @@ class Fitter:
         return Parameters.join(parts)
 
     def derived(self, parameters: Parameters) -> Parameters:
-        """What follows from fitted parameters: resonances, damping ratios, quality factors, ratios; with bounds."""
+        """Derived quantities with bounds: resonances, damping ratios, quality factors, ratios."""
         return parameters.derived(self.model.derived_names, self.model.derived_units, self.model.derived)
 
     @property
@@ -136,7 +136,7 @@ class Fitter:
         return Problem(self.model, Grid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
     def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, Measured, Floats]:
-        """What one row was fitted with: the problem, the lines that count, and the degrees of freedom of its sigmas."""
+        """The basis of one row's fit: the problem, the lines in use, and the degrees of freedom of its sigmas."""
         measured, noise_dof = measured_of(responses, self._prepare(responses.lines))
         late = DELAY in parameters.names and parameters.sigma[0, parameters.index(DELAY)] > 0
         return self._delay.freed if late else self._delay.held, measured, noise_dof
@@ -148,22 +148,22 @@ class Fitter:
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Names of what the user holds."""
+        """Names of the parameters that the user fixes."""
         return frozenset(self._fixed)
 
     def may_take_delay(self) -> bool:
-        """Whether a delay is held that nobody asked to hold."""
+        """Whether a delay is fixed by default, not by the user."""
         return DELAY in self.held and DELAY not in self._fixed
 
     @property
     def grid(self) -> Grid:
-        """The lines of the band; RuntimeError before the first responses, which bring them."""
+        """The lines of the band; RuntimeError before the first responses, which define them."""
         if self._lines is None:
-            raise RuntimeError("the fitter has seen no responses, so that its lines are not known; process some first")
+            raise RuntimeError("the fitter has processed no responses, so its lines are not known; process some first")
         return self._delay.problem.grid
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call: where fits begin to fail ("fit-failed") and hold again ("fit-resumed")."""
+        """Events since the last call: where fits begin to fail ("fit-failed") and are valid again ("fit-resumed")."""
         events, self._events = self._events, []
         return events
 
@@ -179,12 +179,12 @@ class Fitter:
         return json.dumps(state).encode()
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of a Fitter with the same settings.
+        """Continue from a snapshot of a Fitter with the same settings.
 
         Raises
         ------
         UsageError
-            If the snapshot is damaged or belongs to other settings; the Fitter is then as it was.
+            If the snapshot is damaged or belongs to other settings; the Fitter is then unchanged.
         """
         try:
             state = json.loads(snapshot)
@@ -239,15 +239,15 @@ class Fitter:
         elif lines != self._lines:
             raise GridError(
                 "not-alike",
-                "these responses are on other lines than those before",
-                "take a new Fitter for them",
+                "these responses are on other lines than the previous ones",
+                "use a new Fitter for them",
                 bins=list(lines.bins),
                 window=lines.window,
             )
         return self._use
 
     def _group(self, responses: Responses, use: NDArray[np.bool_]) -> Parameters:
-        """Rows of one group, or a part of it."""
+        """Rows of a group, or of a part of it."""
         measured, noise_dof = measured_of(responses, use)
         problem, rows = self._delay.problem, len(responses)
         epsilon = None if self._epsilon is None else np.full(rows, self._epsilon)
@@ -296,7 +296,7 @@ def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured,
     """The lines in use as rows to fit, and the degrees of freedom of their sigmas."""
     value, sigma = responses.value[:, use], responses.sigma[:, use]
     usable = responses.valid[:, use] & np.isfinite(value)
-    # A sigma that is known at some lines and not at others would weigh those as if they had no noise.
+    # If sigma is known at some lines only, the others would count as free of noise.
     known = np.isfinite(sigma) | ~usable
     sigma = np.where(known.all(axis=1, keepdims=True), sigma, np.nan)
     return Measured(value, sigma, usable), responses.dof

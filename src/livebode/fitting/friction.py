@@ -1,4 +1,4 @@
-"""Whether friction explains what a model without it lacks."""
+"""Whether friction explains the error of a model without it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _ROUNDS = 15
 def held_by_friction(problem: Problem, measured: Measured, without: Solution, dof: Floats) -> NDArray[np.bool_]:
     """Rows whose ε falls to less than half as soon as one viscous friction of the model is fitted too.
 
-    Dry friction that holds an axis at standstill acts on so small a motion much like a viscous one, and a real
-    viscous one biases stiffness and inertia alike. Looked at are rows that lack more than 3 % of |G|; what another
-    machine than the model's lacks, friction does not explain.
+    Dry friction of an axis at standstill acts on such a small motion much like a viscous one, and a real viscous one
+    biases stiffness and inertia alike. Only rows with a model error above 3 % of |G| are examined; the error of a wrong
+    model is not explained by friction.
     """
     found = np.zeros(len(dof), dtype=bool)
     frictions = [name for name in problem.model.frictions if name in problem.held]

@@ -1,4 +1,4 @@
-"""From continuous to discrete time and back, for an input that stands between its ticks."""
+"""From continuous to discrete time and back, for an input that is held between its ticks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def to_discrete(transfer: Transfer, rate_hz: float, delay_s: float = 0.0) -> tup
     """Coefficients of numerator and denominator in z of one system behind a zero-order hold and a delay ≥ 0.
 
     Exact; a delay adds poles at zero. For a single Transfer, whose coefficients have no further axes. Modes far slower
-    than the rate lie close to z = 1, where coefficients lose digits: a hundredth of the rate keeps six.
+    than the rate are close to z = 1, where coefficients lose digits: a hundredth of the rate leaves six.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def to_discrete(transfer: Transfer, rate_hz: float, delay_s: float = 0.0) -> tup
     ticks = delay_s * rate_hz
     late = int(np.floor(ticks)) + int(ticks != np.floor(ticks))
     denominator = np.concatenate([np.poly(at).real, np.zeros(late)])
-    # The numerator is a polynomial in z − 1; its values on a circle around 1, as wide as the poles lie, give it.
+    # The numerator is a polynomial in z − 1, found from its values on a circle around 1, about as wide as the poles.
     count = len(denominator) - 1
     around = _AROUND * min(max(np.max(np.abs(at - 1)), _NEAR), 2.0)
     turn = np.exp(2j * np.pi * (np.arange(count) + 0.3) / count)
@@ -59,8 +59,8 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
     Raises
     ------
     FitError
-        If a pole lies on the negative real axis or at zero (no system in s has one there), or the numerator's degree is
-        not below the denominator's. Poles that coincide, other than two at z = 1, cannot be told apart.
+        If a pole is on the negative real axis or at zero (no system in s has one there), or the numerator's degree is
+        not below the denominator's. Poles that coincide, other than two at z = 1, cannot be separated.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
 
 
 def _parts(n: Floats, lead: float, poles: Complex, integrators: int) -> Complex:
-    """Weights of 1/(z − pole), and of 1/(z − 1) and 1/(z − 1)²: solved at as many places as there are unknowns."""
+    """Weights of 1/(z − pole), and of 1/(z − 1) and 1/(z − 1)², solved at as many points as there are unknowns."""
     count = len(poles) + integrators
     z = _AROUND * np.exp(2j * np.pi * (np.arange(count) + 0.3) / count)
     columns = [1 / (z - p) for p in poles] + [1 / (z - 1) ** (i + 1) for i in range(integrators)]
@@ -125,7 +125,7 @@ def _parts(n: Floats, lead: float, poles: Complex, integrators: int) -> Complex:
 
 
 def _trimmed(coefficients: Floats) -> Floats:
-    """Without leading coefficients that are rounding."""
+    """Without leading coefficients that are rounding errors."""
     size = np.max(np.abs(coefficients), initial=0.0)
     above = np.flatnonzero(np.abs(coefficients) > 1e-12 * size)
     return coefficients[above[0] :] if above.size else coefficients[-1:]

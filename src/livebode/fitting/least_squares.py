@@ -12,15 +12,15 @@ Floats = NDArray[np.float64]
 
 Normal = Callable[[Floats], tuple[Any, ...]]
 """From parameters (problems, n): cost (problems,), gradient (problems, n), Gauss–Newton matrix (problems, n, n), and
-whatever arrays (problems, …) are to be known of the best place."""
+further arrays (problems, …) that are reported for the best point."""
 
 _RISE, _FALL = 10.0, 0.2
 _STEP_MAX = 0.7  # of a logarithm: a factor of two
 
 
 class Minimum(NamedTuple):
-    """Where each problem ended: parameters (problems, n), cost (problems,; infinite where there is none), whether it
-    settled, and what else `Normal` gave."""
+    """Result of each problem: parameters (problems, n), cost (problems,; infinite where there is none), whether it
+    converged, and the further arrays of `Normal`."""
 
     parameters: Floats
     cost: Floats
@@ -40,10 +40,10 @@ def minimise(
 ) -> Minimum:
     """Least cost of each problem near its `start`, between `low` and `high`.
 
-    A step is taken where it lowers the cost, and its damping falls; elsewhere the damping rises. A problem has settled
-    when no parameter would move by more than `tolerance`, or when a step promises to lower the cost by less than
-    `enough`; that last step is still taken, and the rest left as it was before it. Ends when all have, or after
-    `rounds`.
+    A step is accepted where it lowers the cost, and its damping decreases; elsewhere the damping increases. A problem
+    has converged when no parameter would move by more than `tolerance`, or when the predicted decrease of the cost is
+    less than `enough`; that last step is still made, and the other arrays are those before it. Ends when all have, or
+    after `rounds`.
     """
     now = start.copy()
     state = normal(now)
@@ -74,7 +74,7 @@ def minimise(
 def _stepped(
     now: Floats, gradient: Floats, matrix: Floats, damping: Floats, low: Floats | float, high: Floats | float
 ) -> tuple[Floats, Floats]:
-    """Where a step leads, within the bounds, and the step. One that only a bound keeps from moving is left out."""
+    """The point after a step, within the bounds, and the step. A parameter that its bound blocks is left out."""
     n = gradient.shape[-1]
     kept = ((now <= low) & (gradient > 0)) | ((now >= high) & (gradient < 0))
     if kept.any():

@@ -1,4 +1,4 @@
-"""At which lines a reason that was found later outweighs that they were valid."""
+"""Lines that are invalid in a mean, because a reason found later outweighs their valid time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from livebode.core import Responses
 
-_FIRST_VERDICT = 3  # windows that may be valid before what repeats is known: three periods, of which two are whole
+_FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
 
 
 class LineVerdicts:
-    """At each line the newest known distortion, and whether a reason against the line outweighs when it was valid."""
+    """At each line the newest known distortion, and whether its invalid time outweighs its valid time."""
 
     def __init__(self, window: int, lines: int) -> None:
         self._window, self._stop = window, 0
@@ -19,7 +19,7 @@ class LineVerdicts:
         self._valid, self._against = np.zeros(lines), np.zeros(lines)  # in samples
 
     def add(self, used: NDArray[np.bool_], part: Responses) -> None:
-        """The next responses, and which of them count at which line, (rows, lines)."""
+        """Process the next responses, with their valid lines, (rows, lines)."""
         if not len(part):
             return
         against = np.isinf(part.distortion)
@@ -34,6 +34,6 @@ class LineVerdicts:
 
     @property
     def against(self) -> NDArray[np.bool_]:
-        """Which lines are not valid in a mean, (lines,)."""
+        """Lines that are invalid in a mean, (lines,)."""
         late = self._valid <= self._against + _FIRST_VERDICT * self._window
         return np.asarray(np.isinf(self.distortion) & late)

@@ -21,50 +21,50 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     """Mean of the valid responses at each line as a batch of one: the ratio of the averages.
 
     A response Gᵢ = Yᵢ/Uᵢ carries the noise of Uᵢ, and a mean of quotients is biased by it: with ρ = |U|²/σ_u² by
-    e^(−ρ)·(G − G'), where G' = −1/F is what feedback alone shows. So each counts with its `weight` wᵢ = Uᵢ/Wᵢ,
+    e^(−ρ)·(G − G'), where G' = −1/F is the estimate from feedback alone. So each has the `weight` wᵢ = Uᵢ/Wᵢ,
 
         Ĝ = Σ Gᵢ·wᵢ / Σ wᵢ = Σ Yᵢ/Wᵢ / Σ Uᵢ/Wᵢ,
 
     which is eq. (2) of Nevaranta 2016 over all windows, with eᵢ = (Gᵢ − Ĝ)·wᵢ / mean(w) the error of one. Responses
-    without a weight (runs of earlier versions, other quantities than the plant) count alike, with that bias.
+    without a weight (runs of earlier versions, other quantities than the plant) have equal weights, with that bias.
 
     Windows that overlap share noise. Of two windows of N samples that start d apart the errors of white noise correlate
-    as ρ = max(0, 1 − d/N), so that n responses are worth m = n² / Σᵢⱼ ρᵢⱼ windows side by side, and
+    as ρ = max(0, 1 − d/N), so that n responses are equivalent to m = n² / Σᵢⱼ ρᵢⱼ windows without overlap, and
 
         sigma² = Σᵢ |eᵢ|² / n / (m − 1),
 
-    without bias, however the noise grows or fades. It has m − 1 degrees of freedom, a careful choice: the scatter of
-    windows that overlap tells a little more. With fewer than two such windows sigma is the least known one of the
-    responses.
+    without bias, also if the noise increases or decreases. It has m − 1 degrees of freedom, a conservative choice: the
+    scatter of overlapping windows contains slightly more information. With fewer than two such windows sigma is the
+    least known one of the responses.
 
-    The sigmas of single responses scatter and lag, so that weights of 1/sigma² would trust windows that have just
-    become noisy. For the same reason no bound of the mean is made from them. What repeats does not average out: the
-    newest known `distortion` of each line is added to sigma² as it is.
+    The sigmas of single responses scatter and lag, so that weights of 1/sigma² would prefer windows that have just
+    become noisy. For the same reason the bound of the mean is not computed from them. Errors that repeat do not average
+    out: the newest known `distortion` of each line is added to sigma² without reduction.
 
-    An infinite `distortion` is a reason against a line. Where the newest known one is infinite, the line is not valid
-    in the mean, unless it was valid for longer than invalid for that reason, as in motion, where nothing is known of
-    what repeats. The three windows that a first verdict takes do not count.
+    An infinite `distortion` marks a line as invalid. Where the newest known one is infinite, the line is invalid in the
+    mean, unless it was valid for longer than invalid for that reason, as in motion, where errors that repeat are not
+    known. The three windows before the first verdict are ignored.
 
     Bias: a machine that changes is averaged, and its change is in sigma. With a Hann window the errors correlate less,
     and sigma is too high. Responses that average over periods already contain each other: of these the newest valid
-    one is given, as it is.
+    one is returned unchanged.
 
     Parameters
     ----------
     responses
-        In order, as one or in parts such as `Run.batches()`; parts are read once, and no more of them is kept than a
-        window holds.
+        In order, as one or in parts such as `Run.batches()`; parts are read once, and at most one window of
+        them is retained.
 
     Returns
     -------
     Responses
-        `coherence`, `input_coherence`, `time_s` and `schedule` are means over the responses that went in, `first` and
+        `coherence`, `input_coherence`, `time_s` and `schedule` are means over the responses used, `first` and
         `sample` their extent, `dof` the least over the lines.
 
     Raises
     ------
     SignalError
-        If no line is ever valid, or there is a reason against each.
+        If no line is ever valid, or each was found invalid.
     """
     mean = RunningMean()
     for part in [responses] if isinstance(responses, Responses) else responses:
@@ -73,14 +73,14 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
 
 
 class RunningMean:
-    """`mean_response` of responses that come in parts, in order.
+    """`mean_response` of responses in parts, in order.
 
     Attributes
     ----------
     rows
-        How many responses went in, those with a valid line.
+        Number of responses used, those with a valid line.
     averages
-        Whether they average over periods already, so that the newest one is given.
+        Whether they average over periods already, so that the newest one is returned.
     """
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class RunningMean:
         self._first = np.iinfo(np.int64).max
 
     def add(self, part: Responses) -> None:
-        """The next responses."""
+        """Process the next responses."""
         used = part.valid & np.isfinite(part.value)
         if self._verdict is None:
             self._verdict = LineVerdicts(part.lines.window, len(part.lines))
@@ -127,7 +127,7 @@ class RunningMean:
         self._first = min(self._first, int(part.first[0]))
 
     def response(self) -> Responses:
-        """The mean so far; SignalError where no line was ever valid, or there is a reason against each."""
+        """The present mean; SignalError where no line was ever valid, or each was found invalid."""
         newest, verdict = self._newest, self._verdict
         if newest is None or verdict is None:
             raise SignalError("no-valid-response", "none of the responses is valid at any line", "track more periods")
@@ -136,8 +136,8 @@ class RunningMean:
         if not valid.any():
             raise SignalError(
                 "no-valid-response",
-                "no line is valid: what repeats with the excitation (distortion, hum of the mains, steps of a sensor) "
-                "is too large at each",
+                "no line is valid: errors that repeat with the excitation (distortion, mains hum, sensor steps) "
+                "are too large at each",
                 "see the run's events for the reason at each line",
             )
         return _without(newest, ~valid) if self.averages else self._mean_of_all(newest, verdict.distortion, valid)
@@ -189,7 +189,7 @@ def _without(one: Responses, lines: NDArray[np.bool_]) -> Responses:
 
 
 class _Mean:
-    """Mean of what is known at each line."""
+    """Mean of the known values at each line."""
 
     def __init__(self, lines: int) -> None:
         self._count, self._sum = np.zeros(lines), np.zeros(lines)
@@ -206,7 +206,7 @@ class _Mean:
 
 
 class _Pair:
-    """Means of numerator and denominator at each line, and how they scatter about them (as `PeriodMoments`)."""
+    """Means of numerator and denominator at each line, and their scatter (as `PeriodMoments`)."""
 
     def __init__(self, lines: int) -> None:
         self.count = np.zeros(lines)
@@ -235,7 +235,7 @@ class _Pair:
 
 
 class _Overlap:
-    """Σᵢⱼ max(0, 1 − dᵢⱼ/N) = Σₜ C(t)²/N, C(t) the number of windows that hold sample t, as windows go by in order."""
+    """Σᵢⱼ max(0, 1 − dᵢⱼ/N) = Σₜ C(t)²/N, C(t) the number of windows with sample t; windows are added in order."""
 
     def __init__(self, window: int, lines: int) -> None:
         self._window = window
@@ -247,7 +247,7 @@ class _Overlap:
     def add(self, stop: NDArray[np.int64], used: Floats) -> None:
         self._stop = np.concatenate([self._stop, stop])
         self._used = np.concatenate([self._used, used])
-        self._advance(int(self._stop[-1]) - self._window)  # no window to come begins before that
+        self._advance(int(self._stop[-1]) - self._window)  # no later window begins before that
 
     def total(self) -> Floats:
         self._advance(int(self._stop[-1]))

@@ -1,4 +1,4 @@
-"""First values for masses in a row: a scan of resonances, and from modes to masses and springs."""
+"""Start values for masses in a chain: a scan of resonances, and from modes to masses and springs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ QUALITY = 10.0
 
 _SCANNED = {0: 1, 1: 48, 2: 20}
 _TRIED = {0: 1, 1: 4, 2: 16}
-_LEAST = 1e-3  # of the largest weight, for one that came out negative
+_LEAST = 1e-3  # of the largest weight, for one that is negative
 
 
 def scan(
@@ -27,7 +27,7 @@ def scan(
     """Weights of the rigid body and of each mode, (starts, rows, 1 + modes), and the modes' ω, (starts, rows, modes).
 
     G = α/s + Σ β·s/(s² + ωs/Q + ω²) (over s for a position) is linear in α and β: for every resonance of a grid from
-    half the lowest to twice the highest line they are solved for, and the best few are kept. With a known `ratio`,
+    half the lowest to twice the highest line they are solved for, and the best few are selected. With a known `ratio`,
     β = ratio·α.
     """
     f = grid.frequency_hz
@@ -78,7 +78,7 @@ def _part(numerator: list[float], denominator: list[float], grid: Grid) -> Compl
 
 
 def _solved(basis: Complex, value: Complex, weight: Floats) -> tuple[Floats, Floats]:
-    """Weights (sets, rows, parts), made positive, and what they cost (sets, rows)."""
+    """Weights (sets, rows, parts), made positive, and their cost (sets, rows)."""
     square = weight**2
     product = (basis[:, :, np.newaxis] * basis[:, np.newaxis].conj()).real
     matrix = np.einsum("skml,rl->srkm", product, square)

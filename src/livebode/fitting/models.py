@@ -14,7 +14,7 @@ MODELS: dict[str, type[PhysicalModel]] = {m.name: m for m in (Rigid, TwoMass, Th
 
 
 def model_named(name: str, **options: Any) -> PhysicalModel:
-    """The model of that name with its options; those that are None are left out.
+    """The model of that name with its options; options that are None are omitted.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def model_named(name: str, **options: Any) -> PhysicalModel:
         if key not in known:
             raise UsageError(
                 "conflict",
-                f"the model {name!r} does not take {key} = {given[key]!r}",
+                f"the model {name!r} has no option {key} = {given[key]!r}",
                 "leave it out",
                 argument=key,
                 value=given[key],

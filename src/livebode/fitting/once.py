@@ -1,4 +1,4 @@
-"""fit: one model to one response, with everything that a person wants to see."""
+"""fit: one model to one response, with parameters, derived quantities and verdicts."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ class Fit:
     Attributes
     ----------
     model
-        What was fitted.
+        The fitted model.
     parameters, derived
-        One row each: the parameters, and the resonances, damping ratios and ratios that follow.
+        One row each: the parameters, and the derived resonances, damping ratios and ratios.
     held
         Parameters that were not fitted, and their values.
     band_hz, lines
         Lowest and highest line that was used, and how many.
     rate_hz, hold
-        How the input was held.
+        Rate and hold of the input.
     measured
-        What it was fitted to, one row; None for a fit that was restored from a snapshot.
+        The fitted response, one row; None for a fit that was restored from a snapshot.
     asked
-        The model that was asked for.
+        The specified model.
     taken
-        What `model` has beside it, because the lines show it: "delay", "B", "BL", "lag", "further mode", "residual
-        compliance". Values, bounds, response and margins are with it.
+        Additions in `model` that the lines show: "delay", "B", "BL", "lag", "further mode", "residual
+        compliance". Values, bounds, response and margins include them.
     correlation
-        Of the residuals of neighbouring lines, where they follow a pattern that no model tried explains; else None.
+        Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
     """
 
     model: PhysicalModel
@@ -63,7 +63,7 @@ class Fit:
 
     @property
     def status(self) -> str:
-        """ "ok", or why there are no numbers."""
+        """ "ok", or the reason why there are no numbers."""
         return str(self.parameters.status[0])
 
     @property
@@ -73,12 +73,12 @@ class Fit:
 
     @property
     def complete(self) -> bool:
-        """Whether the bounds are 95 % bounds: the residuals are noise, as far as they show."""
+        """Whether the bounds are 95 % bounds: no pattern is visible in the residuals."""
         return self.correlation is None
 
     @property
     def about_bounds(self) -> str:
-        """What the bounds hold, and what the model that was asked for lacks, for people."""
+        """What the bounds cover, and what the specified model lacks, as text."""
         words = []
         if self.taken:
             asked = self.model if self.asked is None else self.asked
@@ -88,15 +88,15 @@ class Fit:
             words.append("± covers 95 %")
         else:
             words.append(
-                "model incomplete: what it lacks follows a pattern over the lines (correlation of neighbours "
-                f"{self.correlation:.2f}), and no competing model explains it; ± holds it as far as the lines show it, "
-                "and is no 95 % bound"
+                "model incomplete: its error follows a pattern over the lines (correlation of neighbours "
+                f"{self.correlation:.2f}), and no competing model explains it; ± covers it as far as the lines show "
+                "it, but is not a 95 % bound"
             )
         return "; ".join(words)
 
     @property
     def epsilon(self) -> float:
-        """What the model lacks, as a share of |G|; 0 where noise alone explains the residuals."""
+        """Error of the model as a share of |G|; 0 where noise alone explains the residuals."""
         return float(self.parameters.epsilon[0])
 
     @property
@@ -162,7 +162,7 @@ class Fit:
         return control.tf(transfer.numerator, below)
 
     def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
-        """Name, value, half-width and unit of everything that was fitted or follows."""
+        """Name, value, half-width and unit of all fitted and derived quantities."""
         found = []
         for part in (self.parameters, self.derived):
             bound = part.bound(probability)[0]
@@ -194,16 +194,16 @@ def fit(
 ) -> Fit:
     """Fit a model to a Response, or to the mean of Responses (`mean_response`).
 
-    Lines weigh by sigma² + (ε|G|)², with ε ≥ 0 such that the reduced chi² is 1; see docs/fits.md for what the bounds
-    then hold. The other arguments are those of `Fitter`.
+    The variance of a line is sigma² + (ε|G|)², with ε ≥ 0 such that the reduced chi² is 1; docs/fits.md explains what
+    the bounds then cover. The other arguments are those of `Fitter`.
 
     Bias: as `Fitter`.
 
     Raises
     ------
     UsageError, FitError
-        If model, names, bounds or band cannot be, or the responses are not of a plant. A fit that fails is no error:
-        its status says why, and its values are NaN.
+        If model, names, bounds or band are invalid, or the responses are not of a plant. A fit that fails is not an
+        error: its status gives the reason, and its values are NaN.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def fit(
 
 
 def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
-    """One row that a Fitter gave, after a competition with models that have something beside it (docs/fits.md)."""
+    """One row of a Fitter, after a competition with extended models (docs/fits.md)."""
     found = fit_of(fitter, parameters, measured)
     if found.status != "ok":
         return found
@@ -238,10 +238,10 @@ def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
 
 
 def _chosen(found: Fit, every: list[Competitor], rows: Measured, noise_dof: NDArray[np.float64]) -> Fit:
-    """The best competitor as a Fit, with bounds that hold the choice and what even it lacks."""
+    """The best competitor as a Fit, with bounds that include the choice and its own model error."""
     pattern = None
     if follows_pattern(rows, every[0].fitted, noise_dof):
-        # Nothing explains it: the model that was asked for is as good as any, and the others say how wrong it may be.
+        # No model explains it: the specified model is as good as any, and the others show its possible error.
         every = sorted(every, key=lambda c: len(c.taken))
         pattern = correlation(rows, every[0].fitted)
     problem, fitted, model = every[0].problem, every[0].fitted, every[0].problem.model
@@ -260,9 +260,9 @@ def _chosen(found: Fit, every: list[Competitor], rows: Measured, noise_dof: NDAr
 
 
 def fit_of(fitter: Fitter, parameters: Parameters, measured: Responses | None = None) -> Fit:
-    """One row that a Fitter gave, with what it was fitted to."""
+    """One row of a Fitter, with the fitted response."""
     grid = fitter.grid
-    moving = parameters.sigma[0] > 0  # a delay that the phase shows is fitted, whatever holds it at first
+    moving = parameters.sigma[0] > 0  # a delay that the phase shows is fitted, even if it is fixed at first
     return Fit(
         model=fitter.model,
         parameters=parameters,

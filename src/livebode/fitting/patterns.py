@@ -1,4 +1,4 @@
-"""Whether residuals follow a pattern over the lines, and what a misfit that does adds to the covariance."""
+"""Whether residuals follow a pattern over the lines, and the covariance of such a misfit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LACKS = 10.0
-"""By how much −2·ln(likelihood) falls with an ε where noise alone does not explain the residuals."""
+"""Decrease of −2·ln(likelihood) by an ε from which noise alone does not explain the residuals."""
 
 _ROUNDING = 1e-8
 _RUNS = 2.6  # sigma: once in 200 fits by chance
@@ -33,15 +33,15 @@ def correlation(measured: Measured, fitted: Fitted) -> float:
 
 
 def follows_pattern(measured: Measured, fitted: Fitted, noise_dof: Floats) -> bool:
-    """Whether what is left is no noise: neighbouring lines agree, or there are too few lines to see it and noise does
-    not explain their residuals.
+    """Whether the residual is not noise: neighbouring lines correlate, or there are too few lines for this test and
+    noise does not explain their residuals.
 
     For independent lines the correlation's standard deviation is 1/√(2·lines).
     """
     lines = int(np.count_nonzero(measured.use))
     rest, size = (np.abs(x)[measured.use].max() for x in (measured.value - fitted.response, fitted.response))
     if rest < _ROUNDING * size:
-        return False  # what an iteration leaves of exact data
+        return False  # residual of the iteration for exact data
     if correlation(measured, fitted) * np.sqrt(2 * lines) > _RUNS:
         return True
     known = measured._replace(use=measured.use & (measured.sigma > 0))
@@ -54,10 +54,9 @@ def follows_pattern(measured: Measured, fitted: Fitted, noise_dof: Floats) -> bo
 def covariance(problem: Problem, measured: Measured, fitted: Fitted) -> Floats:
     """Covariance (parameters, parameters) of one row's values under a misfit that is smooth over the lines.
 
-    The misfit is m·G with E[mᵢ·mⱼ*] = ε²·ρ(|i − j|/length), ρ Matérn's of order 3/2. Its size and length are those
-    that make the residuals likely, the share that the parameters have taken from them allowed for (restricted
-    likelihood), on a grid over which the covariance is averaged. The values are those of the weighted fit:
-    C = A⁻¹·Xᵀ·W·K·W·X·A⁻¹.
+    The misfit is m·G with E[mᵢ·mⱼ*] = ε²·ρ(|i − j|/length), ρ Matérn's of order 3/2. Its size and length are weighted
+    by the restricted likelihood of the residuals, which allows for the fitted parameters, on a grid over which the
+    covariance is averaged. The values are those of the weighted fit: C = A⁻¹·Xᵀ·W·K·W·X·A⁻¹.
     """
     used = measured.use[0]
     weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)
@@ -87,7 +86,7 @@ def covariance(problem: Problem, measured: Measured, fitted: Fitted) -> Floats:
 
 
 def _pull(slope: Complex, variance: Floats) -> Complex:
-    """(parameters, lines): by how much each line's error, as a share of |G|, moves the parameters."""
+    """(parameters, lines): change of the parameters by each line's error, as a share of |G|."""
     weighted = slope.conj().T / variance
     return np.asarray(np.linalg.pinv((weighted @ slope).real, rcond=_ROUNDING) @ weighted)
 

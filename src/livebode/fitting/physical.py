@@ -22,7 +22,7 @@ DELAY = "delay"
 
 
 class Grid(NamedTuple):
-    """Where a model is compared: lines, the loop's rate, and what holds the input between its ticks."""
+    """Where a model is evaluated: lines, the loop's rate, and the hold of the input."""
 
     frequency_hz: Floats
     rate_hz: float
@@ -42,12 +42,12 @@ class Parameter:
     name, unit
         As in tables and files.
     start
-        Where a search begins, if the model knows no better.
+        Start value of the search, if the model gives no better one.
     low, high
         Bounds. A positive `low` makes the fit move the logarithm. A fit that ends at a bound has failed, except at a
-        `low` of zero: what cannot be negative may well be nothing, and the fit then gives its upper limit.
+        `low` of zero: a quantity that cannot be negative may be zero, and the fit then gives its upper limit.
     held
-        The value at which it is held unless it is freed; None for one that is fitted.
+        Value at which it is fixed by default; None for a fitted parameter.
     """
 
     name: str
@@ -81,18 +81,18 @@ class Parameter:
 
     @property
     def unsized(self) -> bool:
-        """Whether neither its bounds nor its start say what a step is: `PhysicalModel.shown` does."""
+        """Whether neither its bounds nor its start give the size of a step; `PhysicalModel.shown` gives it then."""
         return self.one_sided or self.low == -inf
 
     @property
     def scale(self) -> float:
-        """Of one that is not logarithmic: what counts as a step."""
+        """Size of a step of a parameter that is not logarithmic."""
         finite = [abs(x) for x in (self.low, self.high) if isfinite(x) and x]
         return abs(self.start) or min(finite, default=1.0)
 
 
 class PhysicalModel:
-    """Base of all models: name a class, its parameters and its transfer function, and it can be fitted.
+    """Base of all models: a subclass defines its name, its parameters and its transfer function.
 
     The transfer function is written with NumPy arithmetic on its arguments, one for each parameter in order, which may
     be numbers or arrays: fits evaluate it for many values at once. It gives the coefficients of numerator and
@@ -105,7 +105,7 @@ class PhysicalModel:
     name
         In tables, files and `livebode fit --model`.
     parameters
-        What can be fitted.
+        Parameters of the model.
 
     Examples
     --------
@@ -130,7 +130,7 @@ class PhysicalModel:
     parameters: tuple[Parameter, ...]
 
     frictions: ClassVar[tuple[str, ...]] = ()
-    """Parameters that are viscous frictions, which a fit tries where the model lacks something."""
+    """Parameters that are viscous frictions, which a fit tries where the model is incomplete."""
 
     def transfer(self, *parameters: Any) -> tuple[Sequence[ArrayLike], Sequence[ArrayLike]]:
         """Coefficients of numerator and denominator, each a number or an array like the arguments."""
@@ -139,7 +139,7 @@ class PhysicalModel:
     def starts(self, value: Complex, weight: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
         """First values to try for responses (rows, lines), shape (starts, rows, parameters).
 
-        Unless a model knows better: the declared ones, and each of them a third and three times as large.
+        By default: the declared ones, and each of them a third and three times as large.
         """
         middle = np.array([p.start for p in self.parameters])
         tried = [middle]
@@ -152,7 +152,7 @@ class PhysicalModel:
         return np.repeat(np.array(tried)[:, np.newaxis], len(value), axis=1)
 
     def shown(self, values: Floats, grid: Grid) -> Floats:  # noqa: ARG002  for those who look
-        """The same values (..., parameters), frictions that may be zero as large as lines would just show."""
+        """The same values (..., parameters), with frictions that may be zero at the smallest visible value."""
         return values
 
     @cached_property
@@ -217,21 +217,21 @@ class PhysicalModel:
 
     @cached_property
     def _late(self) -> int | None:
-        """Where the delay stands."""
+        """Position of the delay among the parameters."""
         return self.names.index(DELAY) if DELAY in self.names else None
 
 
 def delay(held: float | None = 0.0) -> Parameter:
-    """A delay, held at zero unless freed; negative where the input was logged later than it acted."""
+    """A delay, fixed at zero by default; negative where the input was logged later than it acted."""
     return Parameter(DELAY, "s", start=0.0, low=-0.02, high=0.02, held=held)
 
 
 def free_friction(name: str, unit: str) -> Parameter:
-    """A viscous friction, held at zero unless freed."""
+    """A viscous friction, fixed at zero by default."""
     return Parameter(name, unit, start=1e-3, low=0.0, high=1e12, held=0.0)
 
 
 def _paired(roots: Complex) -> Complex:
-    """Neighbours by size two by two, shape (..., pairs, 2); a real root that is left over, the smallest, is no mode."""
+    """Pairs of neighbours by size, shape (..., pairs, 2); the smallest real root, if left over, is not a mode."""
     left = roots.shape[-1] % 2
     return roots[..., left:].reshape(*roots.shape[:-1], -1, 2)

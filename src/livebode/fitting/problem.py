@@ -16,12 +16,12 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _STEP = 1e-7
-_ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, and what is left after it far less
+_ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, after which the remaining error is far smaller
 _AT_BOUND = 1e-6
 
 
 class Measured(NamedTuple):
-    """Values (rows, lines), their standard deviations E|e|² = sigma² (NaN: not known), and which count."""
+    """Values (rows, lines), their standard deviations E|e|² = sigma² (NaN: not known), and which are used."""
 
     value: Complex
     sigma: Floats
@@ -36,7 +36,7 @@ class Measured(NamedTuple):
 
 class Solution(NamedTuple):
     """Values (rows, parameters), the model's response (rows, lines) and slopes (rows, lines, free) there or a hundredth
-    of sigma beside, and whether each row settled."""
+    of sigma beside, and whether each row converged."""
 
     values: Floats
     response: Complex
@@ -50,11 +50,11 @@ class Problem:
     Parameters
     ----------
     model, grid
-        What is fitted, where.
+        The model, and where it is evaluated.
     fixed
-        Values at which parameters are held.
+        Values at which parameters are fixed.
     free
-        Names of parameters that are fitted although the model holds them at first.
+        Names of parameters that are fitted although the model fixes them by default.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class Problem:
         return int(np.count_nonzero(self.free))
 
     def with_held(self, values: Floats) -> Floats:
-        """Values (..., parameters) with those that are held at what they are held."""
+        """Values (..., parameters) with the fixed ones at their values."""
         values = np.array(values, dtype=np.float64)
         for name, value in self.held.items():
             values[..., self.model.names.index(name)] = value
@@ -139,7 +139,7 @@ class Problem:
 
         def normal(x: Floats) -> tuple[Floats, Floats, Floats, Complex, Complex]:
             response, slope = self._slopes(x, start, scale)
-            # One matrix of slopes and, behind them, the residual: its square holds all that is needed.
+            # One matrix of slopes followed by the residual: its square contains all that is needed.
             both = np.concatenate([slope, (response - value)[..., np.newaxis]], axis=-1) * weight[..., np.newaxis]
             square = (both.conj().swapaxes(1, 2) @ both).real
             if not np.isfinite(square).all():
@@ -160,7 +160,7 @@ class Problem:
         return Solution(values, response, slope, found.settled), found.cost
 
     def at_bound(self, values: Floats) -> NDArray[np.bool_]:
-        """Rows of which a free parameter lies at one of its bounds, unless at a zero that it cannot pass."""
+        """Rows with a free parameter at one of its bounds, except at a zero that it cannot pass."""
         x = self._inward(values, self._scale)
         low, high = self._bounds(self._scale)
         return np.asarray((((x - low < _AT_BOUND) & ~self._unsized) | (high - x < _AT_BOUND)).any(axis=1))
@@ -174,8 +174,8 @@ class Problem:
         return self._log
 
     def _scales(self, start: Floats) -> Floats:
-        """What counts as a step of each free parameter, (free,), or (rows, free) where one may be zero: its own size
-        says nothing then, and what the lines would show of it does."""
+        """Size of a step of each free parameter, (free,), or (rows, free) where one may be zero: its own value gives
+        no scale then, so the smallest value that the lines show is used."""
         if not self._unsized.any():
             return self._scale
         shown = self.model.shown(start, self.grid)[:, self.free]

@@ -24,7 +24,7 @@ _ORDER_MAX = 20
 
 
 class _Equations(NamedTuple):
-    """Powers of z (lines, order + 1), the number of b's, and what was measured."""
+    """Powers of z (lines, order + 1), the number of b's, and the measured values."""
 
     powers: Complex
     above: int
@@ -37,22 +37,22 @@ def fit_rational(
     """b0 … bm and a0 … a(q−1) of (b_m z^m + … + b0)/(z^q + a_(q−1) z^(q−1) + … + a0) for each Response.
 
     "levy": least squares of A·Ĝ − B, (19) … (27): linear, and biased by noise and towards high frequencies, where |A|
-    is large. "sanathanan-koerner": the same with 1/|A| of the round before, which takes the second away; "maximum
-    likelihood": least squares of (Ĝ − B/A)/sigma, started from it, unbiased to first order and best where the model is
-    true. Where no sigma is known lines weigh by their size.
+    is large. "sanathanan-koerner": the same with 1/|A| of the previous iteration, which removes the second bias;
+    "maximum likelihood": least squares of (Ĝ − B/A)/sigma, started from it, unbiased to first order and best where the
+    model is true. Where no sigma is known, the weight of a line is its size.
 
-    The covariance of the first two is that of noise by sigma through the linear equations; that of the third takes in
-    ε, what B/A lacks. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true.
+    The covariance of the first two is that of noise by sigma through the linear equations; that of the third includes
+    ε, the error of B/A. `chi2` is by sigma alone; that of the first two is above `dof` also where the model is true.
 
     Parameters
     ----------
     order, numerator_order
-        q and m; m is q − 1 unless said.
+        q and m; default of m: q − 1.
 
     Raises
     ------
     UsageError
-        If the orders cannot be.
+        If the orders are invalid.
     FitError
         If there are fewer lines than they need.
 
@@ -81,7 +81,7 @@ def fit_rational(
     if method not in ("levy", "sanathanan-koerner", "maximum likelihood"):
         raise UsageError(
             "not-one-of",
-            f"{method=} is not known",
+            f"{method=} is not supported",
             "choose 'levy', 'sanathanan-koerner' or 'maximum likelihood'",
             argument="method",
             value=method,
@@ -176,7 +176,7 @@ def _cost(equations: _Equations, theta: Floats, weight: Floats) -> Floats:
 
 
 def _covariance(equations: _Equations, theta: Floats, weight: Floats, eps: Floats, method: Method) -> Floats:
-    """Through the linear equations an error of Ĝ enters as A times it; through the nonlinear ones as itself."""
+    """An error of Ĝ enters the linear equations multiplied by A, the nonlinear ones unchanged."""
     measured = equations.measured
     size = np.where(measured.use, np.abs(_ratio(equations, theta)), 0.0)
     if method == "maximum likelihood":

@@ -36,7 +36,7 @@ class Rational:
         return np.asarray(np.polyval(self.numerator, z) / np.polyval(self.denominator, z))
 
     def continuous(self) -> Transfer:
-        """The system in s behind a zero-order hold that this samples; see `to_continuous`."""
+        """The system in s whose zero-order-hold equivalent this is; see `to_continuous`."""
         return to_continuous(self.numerator, self.denominator, self.rate_hz)
 
     def to_control(self) -> Any:
@@ -55,7 +55,7 @@ class Rational:
 
 
 def rational_of(parameters: Parameters, row: int, rate_hz: float) -> Rational:
-    """One row of what `fit_rational` gave, as a Model."""
+    """One row of the result of `fit_rational`, as a Model."""
     m = sum(name.startswith("b") for name in parameters.names)
     value = parameters.value[row]
     return Rational(value[:m][::-1], np.concatenate([[1.0], value[m:][::-1]]), rate_hz)

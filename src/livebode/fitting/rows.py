@@ -1,4 +1,4 @@
-"""Fits of rows of responses: from measured values to values, covariance and the reason where there are none."""
+"""Fits of rows of responses: from measured values to parameters, covariance, or the reason for a failure."""
 
 from __future__ import annotations
 
@@ -23,22 +23,25 @@ NO_FIT = "model does not fit"
 FRICTION = "friction"
 
 SENTENCES = {
-    OK: "the fit holds",
+    OK: "the fit is valid",
     NO_RESPONSE: "too few lines are valid for the model's free parameters",
-    NOT_CONVERGED: "the fit did not converge; the lines may not show what the model says",
-    BOUND: "a parameter ended at its bound; the lines do not hold it",
-    NOT_SEEN: "the lines do not show what the model says: a parameter is uncertain by more than half; take lines "
-    "around the resonance and the antiresonance, or hold parameters that are known",
-    NO_FIT: "the model misses the response by more than half of it: another machine than the model's, or no response",
-    FRICTION: "friction holds the machine and explains most of what the model lacks; move, excite more, or free the "
-    "model's viscous friction",
+    NOT_CONVERGED: "the fit did not converge; the lines may not determine the model's parameters",
+    BOUND: "a parameter ended at its bound; the lines do not determine it",
+    NOT_SEEN: "the lines do not determine the model: a parameter is uncertain by more than half; take lines "
+    "around the resonance and the antiresonance, or fix parameters that are known",
+    NO_FIT: "the model differs from the response by more than half of it: the machine needs another model, or there is "
+    "no response",
+    FRICTION: "friction stops the machine and explains most of the model's error; move the axis, increase the "
+    "excitation, or free the model's viscous friction",
 }
-"""What each status means, for people."""
+"""The meaning of each status as text."""
 
 EPSILON_MAX = 0.5
 _UNCERTAIN = 0.5  # of a logarithm
 _WORD = "<U20"
-_FIRST_EPSILON = 0.1  # so that no line that is measured far better than the model holds decides a first fit
+_FIRST_EPSILON = (
+    0.1  # so that a line measured much more accurately than the model is valid does not dominate a first fit
+)
 _REWEIGHTED, _SAME = 8, 0.01
 _SUSPICIOUS = 4.0  # of a reduced chi², ε and all
 _WARM_ROUNDS = 12
@@ -48,8 +51,8 @@ _ROUNDING = 1e-14
 
 
 class Fitted(NamedTuple):
-    """What a batch of rows came to: the arrays of `Parameters`, and, failed or not, the model's response (rows, lines)
-    and the values where the search ended."""
+    """Result of a batch of rows: the arrays of `Parameters`, and, failed or not, the model's response (rows, lines)
+    and the values at the end of the search."""
 
     values: Floats
     covariance: Floats
@@ -70,7 +73,7 @@ def fit_rows(
 ) -> Fitted:
     """Fit each row, from `start` (rows, parameters) where there is one; where there is none or it fails, from a scan.
 
-    `epsilon` (rows,) is held where it is given; else each row's own is found, such that its reduced chi² is 1.
+    `epsilon` (rows,) is fixed where it is given; else each row's own is found, such that its reduced chi² is 1.
     `noise_dof` (rows,) are the degrees of freedom behind the sigmas.
     """
     dof = 2.0 * np.count_nonzero(measured.use, axis=1) - problem.size
@@ -100,14 +103,14 @@ def _fitted(
     problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
 ) -> Fitted:
     eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
-    # Before a model is known the measured size stands for the model's.
+    # Before a model is known the measured size replaces the model's.
     size = np.where(measured.use, np.abs(measured.value), 0.0)
     weight = _weights(measured, size, eps)
     found = _begun(problem, measured, weight, start, dof)
     if epsilon is None:
         found, eps = _reweighted(problem, measured, found, dof)
     else:
-        # A row that lacks much more than those before it is not known as well as they were.
+        # A row with a much larger model error than the previous ones is less certain than they were.
         more = own_epsilon(measured, found.response, _SUSPICIOUS * dof) > eps
         if more.any():
             eps = np.where(more, own_epsilon(measured, found.response, dof), eps)
@@ -115,7 +118,7 @@ def _fitted(
 
 
 def _weights(measured: Measured, size: Floats, epsilon: Floats) -> Floats:
-    """Where neither noise nor ε is known, lines weigh by their size."""
+    """Where neither noise nor ε is known, the weight of a line is its size."""
     found = weights(measured.sigma, size, epsilon)
     unknown = ~(np.where(measured.use, found, 0.0) > 0).any(axis=1)
     if unknown.any():
@@ -124,7 +127,7 @@ def _weights(measured: Measured, size: Floats, epsilon: Floats) -> Floats:
 
 
 def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats | None, dof: Floats) -> Solution:
-    """From the start, and for rows that it does not suit the best fit of a scan."""
+    """From the start, and for rows where this fails the best fit of a scan."""
     if start is None:
         return _scanned(problem, measured, weight)
     found, cost = problem.solve(measured, weight, start, _WARM_ROUNDS)
@@ -149,7 +152,7 @@ def _scanned(problem: Problem, measured: Measured, weight: Floats) -> Solution:
 
 
 def _reweighted(problem: Problem, measured: Measured, found: Solution, dof: Floats) -> tuple[Solution, Floats]:
-    """Fits repeated with the ε of their residuals until it stays; each row by itself."""
+    """Fits repeated with the ε of their residuals until it converges; each row by itself."""
     eps = np.full(len(dof), _FIRST_EPSILON)
     for _ in range(_REWEIGHTED):
         new = own_epsilon(measured, found.response, dof)
@@ -195,11 +198,11 @@ def _judged(
 
 
 def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floats) -> Floats:
-    """Of the free parameters in their coordinates, (rows, free, free); not finite where the lines do not hold them.
+    """Covariance of the free parameters' coordinates, (rows, free, free); not finite where it is singular.
 
     A sigma that was estimated with d degrees of freedom makes a weight that scatters; weighted least squares then
-    scatter more than the weights say, by d/(d − 2) where noise alone is in the weight and parameters are few; with as
-    many as there are data the weights have no say.
+    scatter more than the weights indicate, by d/(d − 2) where the weight is noise alone and parameters are few; with as
+    many parameters as data the weights have no effect.
     """
     size = np.abs(found.response)
     weight = np.where(measured.use, _weights(measured, size, eps), 0.0)

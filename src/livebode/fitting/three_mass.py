@@ -1,4 +1,4 @@
-"""Three masses in a row."""
+"""A chain of three masses."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Complex = NDArray[np.complex128]
 class ThreeMass(Chain):
     """Motor, middle and load, joined by two springs: torque on the first.
 
-    At the motor any machine of one rigid and two lightly damped modes looks like such a chain, also one whose springs
-    form a ring, as (8) … (10); its middle mass then need not be a part that one could touch.
+    At the motor any machine of one rigid and two lightly damped modes is equivalent to such a chain, also one whose
+    springs form a ring, as (8) … (10); its middle mass is then not necessarily a physical part.
 
     >>> ThreeMass().names
     ('Js', 'J2', 'J3', 'K1', 'K2', 'b1', 'b2', 'delay')
@@ -38,7 +38,7 @@ class ThreeMass(Chain):
     def transfer(self, *parameters: Any) -> tuple[list[Any], list[Any]]:
         js = parameters[0]
         j2, j3, k1, k2, b1, b2 = (x * self.arm for x in parameters[1:])
-        # The load's side of the first spring, over s²: N/D of what it takes to move it.
+        # The load's side of the first spring, over s²: its dynamic stiffness N/D.
         below = [j3, b2, k2]
         above = [j2 * j3, (j2 + j3) * b2, (j2 + j3) * k2]
         joined = plus(times(above, [1.0, 0.0, 0.0]), times([b1, k1], below))

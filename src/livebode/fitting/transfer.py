@@ -1,4 +1,4 @@
-"""Transfer functions in s for many parameters at once: their poles and zeros, and how a held input samples them."""
+"""Transfer functions in s for many parameters at once: poles, zeros, and sampling behind a hold."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Transfer(NamedTuple):
         found: Any = 0.0
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
-            poles[poles == 0] = _TINY**0.1  # a pole that friction just does not move: as good as an integrator
+            poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
             residues = (self._residues(poles) / poles)[..., np.newaxis]
             poles = poles[..., np.newaxis] * tick
             end: Any = np.expm1(poles)
@@ -89,7 +89,7 @@ class Transfer(NamedTuple):
         return np.asarray(found)
 
     def poles(self) -> Complex:
-        """Without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
+        """Poles without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
         found = roots(self.denominator)
         if found.shape[-1] == 2:
             near = np.abs(found[..., 0] - found[..., 1]) < _APART * np.abs(found[..., 0])
@@ -102,7 +102,7 @@ class Transfer(NamedTuple):
         return roots(self.numerator)
 
     def _residues(self, poles: Complex) -> Complex:
-        """Of each pole, shape (..., poles)."""
+        """Residue of each pole, shape (..., poles)."""
         apart = poles[..., :, np.newaxis] - poles[..., np.newaxis, :]
         index = np.arange(poles.shape[-1])
         apart[..., index, index] = self.denominator[..., :1]

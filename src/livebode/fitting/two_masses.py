@@ -18,7 +18,7 @@ def sampled(parameters: Floats, z: Complex, rate_hz: float) -> Complex:
     """Sampled response of (14) from torque to motor velocity, exact behind a zero-order hold, rad/s per N m.
 
     (14) is α/s + β·s/(s² + 2δ·s + ω²) with α = 1/(Js + m), β = 1/Js − α, m = mL·r²: a rigid body and one resonance.
-    Held and sampled, pole by pole, this is T·α/(z − 1) + β/(p1 − p2)·((E1 − 1)/(z − E1) − (E2 − 1)/(z − E2)) with
+    With a zero-order hold, pole by pole, this is T·α/(z − 1) + β/(p1 − p2)·((E1 − 1)/(z − E1) − (E2 − 1)/(z − E2)) with
     E = e^(p·T).
 
     Parameters

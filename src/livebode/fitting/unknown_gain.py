@@ -1,4 +1,4 @@
-"""Two masses behind a gain that is not known: frequencies, damping and the ratio of inertias, but no inertia."""
+"""Two masses behind an unknown gain: frequencies, damping and the ratio of inertias, but no inertia."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _RATIO = (1e-6, 2.0)
 class TwoMassGain(PhysicalModel):
     """One antiresonance and one resonance over a rigid body, seen at the motor through an unknown gain.
 
-    Where the input is a current and the torque constant is not known, no inertia or stiffness can be: `gain` is the
-    acceleration of the rigid body per unit of input, and both masses and the spring may be larger by any factor. What
-    stays are the frequencies, the damping ratios, each by itself, so that friction need not be that of a damper beside
-    the spring, and `inertia_ratio` = (resonance/antiresonance)² − 1, load over motor.
+    Where the input is a current and the torque constant is not known, inertia and stiffness cannot be determined:
+    `gain` is the acceleration of the rigid body per unit of input, and both masses and the spring may be larger by any
+    factor. The model gives the frequencies, independent damping ratios (so that friction is not restricted to a damper
+    parallel to the spring), and `inertia_ratio` = (resonance/antiresonance)² − 1, load over motor.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class TwoMassGain(PhysicalModel):
         if self.output not in ("velocity", "position"):
             raise UsageError(
                 "not-one-of",
-                f"output={self.output!r} is not known",
+                f"output={self.output!r} is not supported",
                 "choose 'velocity' or 'position'",
                 argument="output",
                 value=self.output,

@@ -1,4 +1,4 @@
-"""Weights of lines: their noise, and what the model lacks."""
+"""Weights of lines: their noise, and the error of the model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def weights(sigma: Floats, size: Floats, epsilon: Floats) -> Floats:
 
     sigma (rows, lines), NaN or zero where it is not known; size |G|, (rows, lines); epsilon (rows,).
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # a fit that ran away has no size
+    with np.errstate(divide="ignore", invalid="ignore"):  # a fit that diverged has no size
         variance = np.where(sigma > 0, sigma, 0.0) ** 2 + (epsilon[:, np.newaxis] * size) ** 2
         return np.where(variance > 0, np.sqrt(2 / variance), 0.0)
 
@@ -36,7 +36,7 @@ def epsilon_for(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Float
         least = (2 * rest / dof[:, np.newaxis] - noise) / size
         square = np.max(np.where(used & np.isfinite(least), least, 0.0), axis=-1, initial=0.0)
         noisy = _reduced(rest, noise, size, np.zeros(len(rest))) <= dof
-        moving = ~noisy  # each row by itself, so that it ends alike whatever other rows it is fitted beside
+        moving = ~noisy  # each row by itself, so that its result does not depend on the other rows
         for _ in range(_STEPS):
             share = np.where(used, 1 / (noise + square[:, np.newaxis] * size), 0.0)
             total = 2 * np.einsum("rl,rl->r", rest, share)
