@@ -1,4 +1,4 @@
-"""Margins of the loop around a fitted plant, with bounds, and filters that would widen them."""
+"""Margins of the loop around a fitted plant, with bounds, and filters that would increase them."""
 
 from livebode.margins.against_lines import against_lines
 from livebode.margins.at_lines import peak_sensitivity_at_lines

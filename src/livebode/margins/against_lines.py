@@ -1,4 +1,4 @@
-"""Margins by a fit compared with what the lines show without it."""
+"""Margins of a fit compared with the sensitivity at the lines."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _CHANCE = 0.01  # of all lines of a row together
 def against_lines(found: Margins, responses: Responses, loop: Loop) -> Margins:
     """The same margins, without numbers where the lines show a larger Ms than the fit allows.
 
-    A row is contradicted where |S| = 1/|1 + F·G| at a line, less its bound, is above Ms plus its bound: the model lacks
-    what brings the loop nearer to −1, and then no margin by it is worth anything. The lines' bound holds all lines of a
-    row together with 99 %, by Bonferroni: 1 − exp(−c²) = 1 − 0.01/lines.
+    A row is contradicted where |S| = 1/|1 + F·G| at a line, less its bound, is above Ms plus its bound: the model omits
+    what brings the loop nearer to −1, so all its margins are invalid. The lines' bound covers all lines of a row
+    together with 99 %, by Bonferroni: 1 − exp(−c²) = 1 − 0.01/lines.
 
     Parameters
     ----------
     found
         Margins, a row for each fit.
     responses
-        What each was fitted to, shapes (rows, lines).
+        The fitted responses, shapes (rows, lines).
     loop
-        With its feedback.
+        The loop with its feedback.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def against_lines(found: Margins, responses: Responses, loop: Loop) -> Margins:
         return found
     behind = loop.feedback_at(responses.lines.frequency_hz)
     c = float(np.sqrt(np.log(len(responses.lines) / _CHANCE)))
-    with np.errstate(invalid="ignore", divide="ignore"):  # of lines that are not valid
+    with np.errstate(invalid="ignore", divide="ignore"):  # of invalid lines
         sensitivity = 1 / (1 + responses.value * behind)
         least = np.abs(sensitivity) - responses.bound(c) * np.abs(behind * sensitivity**2)
         shown = np.where(responses.valid & np.isfinite(least), least, -np.inf).max(axis=1)

@@ -1,4 +1,4 @@
-"""What lines say about the loop without any model."""
+"""Sensitivity of the loop at the lines, without a model."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ Floats = NDArray[np.float64]
 
 
 def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) -> tuple[Floats, Floats, Floats]:
-    """The largest |S| seen at a valid line: a lower bound for Ms, the only margin that lines have without a model.
+    """The largest |S| at a valid line: a lower bound for Ms, the only margin that lines give without a model.
 
-    Between lines a loop can come nearer to −1 without a line that tells, so no crossing is read from them.
+    Between lines a loop can come nearer to −1 unnoticed, so no crossing is read from them.
 
     Parameters
     ----------
     responses
         Of the plant; shapes (rows, lines).
     loop
-        With its feedback.
+        The loop with its feedback.
     c
         For the bound: the truth at that line is in it with probability 1 − exp(−c²).
 
@@ -41,7 +41,7 @@ def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) 
     """
     f = responses.lines.frequency_hz
     behind = loop.feedback_at(f)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of lines that are not valid
+    with np.errstate(invalid="ignore", divide="ignore"):  # of invalid lines
         sensitivity = 1 / (1 + responses.value * behind)
     size = np.where(responses.valid, np.abs(sensitivity), -np.inf)
     at = np.argmax(size, axis=1)

@@ -1,4 +1,4 @@
-"""Where an open loop crosses what a margin is read from, for many rows at once."""
+"""The crossings of an open loop from which margins are read, for many rows at once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Crossings(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """What changes its sign at a crossing, and which changes count."""
+    """Function whose sign changes at a crossing, and which of the changes are used."""
 
     side: Callable[[Complex], Floats]
     counts: Callable[[Complex], NDArray[np.bool_]]
@@ -50,9 +50,9 @@ def crossings(
     """Where |L| = 1, where L is a negative number, and where |T| = |L/(1 + L)| first falls 3 dB below one.
 
     Half the rate, where a sampled loop is real, is a crossing of the second kind if L is negative there. A row whose
-    |T| begins below has no bandwidth.
+    |T| is below from the start has no bandwidth.
     """
-    with np.errstate(divide="ignore"):  # a sampled loop may be nought at half the rate
+    with np.errstate(divide="ignore"):  # a sampled loop may be zero at half the rate
         at_gain, at_phase = (_changes(grid, kind) for kind in (GAIN, PHASE))
     below = np.abs(grid / (1 + grid)) < BANDWIDTH
     first = np.argmax(below, axis=1)
@@ -91,9 +91,9 @@ Starts = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def _changes(grid: Complex, kind: Kind) -> Starts:
-    """Row and grid point before every change of sign that counts.
+    """Row and grid point before every change of sign that is used.
 
-    At half the rate L is real but for rounding, and its sign there says nothing.
+    At half the rate L is real except for rounding, so the sign there is meaningless.
     """
     sign = kind.side(grid) > 0
     row, at = np.nonzero(sign[:, 1:] != sign[:, :-1])
@@ -104,7 +104,7 @@ def _changes(grid: Complex, kind: Kind) -> Starts:
 
 
 def _roots(loop: OpenLoop, values: Floats, frequency_hz: Floats, starts: list[Starts]) -> list[Crossings]:
-    """The roots between neighbours of the grid; all kinds at once, for it is the number of calls that costs."""
+    """The roots between neighbours of the grid; all kinds at once, because the number of calls determines the time."""
     from scipy.optimize import elementwise
 
     row, at = (np.concatenate(part) for part in zip(*starts))

@@ -25,7 +25,7 @@ class Biquad(Algebra):
     a
         a1, a2; a0 is 1.
     rate_hz
-        How often it is computed.
+        Computations per second.
     """
 
     b: tuple[float, float, float]
@@ -95,7 +95,7 @@ def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: fl
     """A notch that is at least half its depth (in dB) down everywhere from `low_hz` to `high_hz`.
 
     With v = (f/f0 − f0/f)/2 its size squared is (v² + g²ζ²)/(v² + ζ²), which is g at v = √g·ζ. Its zeros are damped by
-    `least_damping` at least: by as much as the resonance, so that it takes the peak away and leaves no dip beside it.
+    at least `least_damping`, the damping of the resonance, so that it removes the peak without a dip beside it.
 
     Raises
     ------
@@ -112,7 +112,10 @@ def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: fl
             rate_hz=rate_hz,
         )
     share = 10 ** (-depth_db / 20)
-    low, high = tan(pi * low_hz / rate_hz), tan(pi * high_hz / rate_hz)  # as the bilinear transformation bends them
+    low, high = (
+        tan(pi * low_hz / rate_hz),
+        tan(pi * high_hz / rate_hz),
+    )  # with the frequency warping of the bilinear transformation
     centre_hz = atan(sqrt(low * high)) * rate_hz / pi
     edge = (sqrt(high / low) - sqrt(low / high)) / 2
     return notch(centre_hz, depth_db, max(edge / sqrt(share), least_damping / share), rate_hz)

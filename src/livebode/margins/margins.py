@@ -38,14 +38,14 @@ class Margins:
     ----------
     names, units
         Of the columns. ``gain_margin``: dB by which the loop's gain may rise; ``gain_reduction``: dB by which it may
-        fall; ``phase_margin``: the smallest turn of L, deg, that makes it unstable, at any |L| = 1 (negative
-        for a turn ahead); ``delay_margin``: ms; ``peak_sensitivity``: Ms, largest |S|; ``bandwidth``: where |T| first
+        fall; ``phase_margin``: the smallest rotation of L, deg, that makes it unstable, at any |L| = 1 (negative
+        for phase lead); ``delay_margin``: ms; ``peak_sensitivity``: Ms, largest |S|; ``bandwidth``: where |T| first
         falls 3 dB below one, Hz.
     value, sigma
         Shape (rows, margins); sigma by linear propagation of the fit's covariance. Infinite (0 for sigma) where there
-        is no crossing, so that nothing of the kind can make the loop unstable; NaN where `status` is not "ok".
+        is no crossing, so that no such change makes the loop unstable; NaN where `status` is not "ok".
     frequency_hz, frequency_sigma_hz
-        Where each was read, and how sure that place is; NaN where there is none.
+        Frequency at which each was read, and its sigma; NaN where there is none.
     place
         ``interpolated`` by the fitted model within the band of the lines, ``extrapolated`` by it beyond, or ``none``.
     status
@@ -76,7 +76,7 @@ class Margins:
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """Rows that hold numbers, shape (rows,)."""
+        """Which rows are valid, shape (rows,)."""
         return np.asarray(self.status == OK)
 
     def of(self, name: str) -> Floats:
@@ -97,7 +97,7 @@ class Margins:
         return NAMES.index(name)
 
     def bound(self, probability: float = 0.95) -> Floats:
-        """Half-width of the interval that holds the truth with this probability, shape (rows, margins).
+        """Half-width of the interval that covers the truth with this probability, shape (rows, margins).
 
         Raises
         ------
@@ -132,5 +132,5 @@ class Margins:
 
     @classmethod
     def join(cls, parts: list[Margins]) -> Margins:
-        """Parts of one run, in order, as one."""
+        """Join parts of one run, in order."""
         return cls(**joined(parts, PER_ROW, "margins"))

@@ -33,9 +33,9 @@ class OpenLoop:
     rate_hz
         Of the loop, which is that of the recording; L is known up to half of it.
     hold
-        What holds the plant's input between ticks.
+        Hold of the plant's input between ticks.
     filters
-        Models in series with the controllers: a notch that is being tried.
+        Models in series with the controllers, such as a notch under test.
 
     Raises
     ------
@@ -71,15 +71,15 @@ class OpenLoop:
         return replace(self, filters=(*self.filters, extra))
 
     def unstable_poles(self, values: Floats) -> NDArray[np.int64]:
-        """Of the plant, for each row."""
+        """Quantities of the plant, for each row."""
         poles = self.plant.continuous(values).poles()
         return np.asarray(np.count_nonzero(poles.real > 0, axis=-1))
 
     def frequencies(self, values: Floats, band_hz: tuple[float, float]) -> Floats:
         """Frequencies up to half the rate that are dense enough for every crossing and peak of these rows.
 
-        Logarithmic; over and around the band they are closer, and around what the model calls a resonance as close as
-        its damping asks for.
+        Logarithmic; denser in and around the band, and around a resonance of the model as dense as its damping
+        requires.
         """
         nyquist = self.rate_hz / 2
         low, high = band_hz[0] / 10, nyquist

@@ -1,4 +1,4 @@
-"""Margins read from open loops: crossings, slopes, and what they say."""
+"""Margins read from open loops: crossings, slopes, and the resulting values."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     """Margins of the loop at each row of `fits`.
 
     Read from L = F·G(fit) where it crosses, exact to 1e-10 of a frequency, on the model and never between lines without
-    one. Linear propagation of the fit's covariance: right where the covariance is (docs/margins.md), and where the
-    crossing that is nearest to harm stays the nearest.
+    one. Linear propagation of the fit's covariance: valid if the covariance is (docs/margins.md), and if the critical
+    crossing remains the critical one.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     loop
         The controllers around it.
     band_hz
-        Lowest and highest line that the fits are of.
+        Lowest and highest line of the fits.
 
     Raises
     ------
@@ -150,12 +150,12 @@ def _write(
 
 
 def _spread(by: Floats, correlation: Floats) -> Floats:
-    """Sigma of what moves by so much for a sigma of each parameter."""
+    """Sigma of a quantity from its changes per sigma of each parameter."""
     return np.asarray(np.sqrt(np.einsum("ri,rij,rj->r", by, correlation, by).clip(0)))
 
 
 def _nearest(places: Crossings, cost: Floats, counts: NDArray[np.bool_] | None = None) -> Crossings:
-    """Of each row the place of least cost."""
+    """The place of least cost in each row."""
     kept = np.arange(len(cost)) if counts is None else np.flatnonzero(counts)
     order = kept[np.lexsort((cost[kept], places.row[kept]))]
     _, first = np.unique(places.row[order], return_index=True)
@@ -167,7 +167,7 @@ Reading = tuple[Floats, Floats, Floats]
 
 
 def _gain(loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Reading:
-    """−|L| in dB where L is negative. At half the rate, the place itself stays."""
+    """−|L| in dB where L is negative. At half the rate, the place itself is fixed."""
     by_f, by = along
     by_log_f = moved(by_f.imag, by.imag)
     by_log_f[at.frequency_hz >= loop.rate_hz / 2] = 0.0
@@ -189,7 +189,7 @@ def _phase(_loop: OpenLoop, _fits: Fits, at: Crossings, along: Slopes) -> Readin
 
 
 def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
-    """The delay that turns L to −1 where |L| = 1, ms."""
+    """The delay that rotates L to −1 where |L| = 1, ms."""
     turn, by_turn, by_log_f = _phase(loop, fits, at, along)
     late = (turn % 360) / 360e-3 / at.frequency_hz
     by = by_turn / 360e-3 / at.frequency_hz[:, np.newaxis] - late[:, np.newaxis] * by_log_f
@@ -197,7 +197,7 @@ def _delay(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
 
 
 def _peak(loop: OpenLoop, fits: Fits, at: Crossings, along: Slopes) -> Reading:
-    """1/|1 + L| where it is largest; to first order the place does not matter."""
+    """1/|1 + L| at its maximum; to first order a shift of the place has no effect."""
     largest = 1 / np.abs(1 + at.open_loop)
     closed = at.open_loop / (1 + at.open_loop)
     by = -largest[:, np.newaxis] * (closed[:, np.newaxis] * along.by_parameter).real

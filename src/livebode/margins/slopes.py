@@ -1,4 +1,4 @@
-"""How what is read from an open loop moves with the fit's parameters, to first order."""
+"""Slopes of the values read from an open loop by the fit's parameters, to first order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 
 _STEP = 1e-5
 _PEAK_STEP = 1e-3
-_OF_SIGMA, _OF_VALUE = 1e-3, 1e-7  # what a parameter is moved by
+_OF_SIGMA, _OF_VALUE = 1e-3, 1e-7  # step of a parameter
 
 
 class Fits(NamedTuple):
@@ -39,19 +39,19 @@ class Slopes(NamedTuple):
 
 
 def slopes(loop: OpenLoop, fits: Fits, at: Crossings) -> Slopes:
-    """Central differences of ln L where `at` says; by frequency one-sided at half the rate."""
+    """Central differences of ln L at these places; by frequency one-sided at half the rate."""
     return _slopes(loop, fits.of(at.row), at.frequency_hz)
 
 
 def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
-    """For one row of fits and one frequency each. A parameter without variance is not moved: it may not bear it."""
+    """For one row of fits and one frequency each. A parameter without variance is not moved: it may be at its limit."""
     values, sigma = fits
     places, n = values.shape
     above, below = np.minimum(frequency_hz * (1 + _STEP), loop.rate_hz / 2), frequency_hz * (1 - _STEP)
     free = np.flatnonzero(np.any(sigma > 0, axis=0))
     step = np.maximum(_OF_SIGMA * sigma, _OF_VALUE * np.abs(values))[:, free]
     shifts = (step[:, :, np.newaxis] * np.eye(n)[free]).swapaxes(0, 1)
-    # All in one go: for few places it is the number of calls that costs.
+    # All in one call: for few places the number of calls determines the time.
     tried = np.concatenate([values[np.newaxis], values[np.newaxis], values + shifts, values - shifts])
     at_hz = np.concatenate([above, below, np.tile(frequency_hz, 2 * free.size)])
     found = loop.at(tried.reshape(-1, n), at_hz[:, np.newaxis]).reshape(len(tried), places)
@@ -65,13 +65,13 @@ def _slopes(loop: OpenLoop, fits: Fits, frequency_hz: Floats) -> Slopes:
 
 
 def moved(residual: Floats, by: Floats) -> Floats:
-    """d ln f by each parameter of a frequency at which something stays zero: −(slope by parameter)/(slope by ln f)."""
+    """d ln f by each parameter for the root of a function: −(slope by parameter)/(slope by ln f)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(-by / residual[:, np.newaxis])
 
 
 def peak_moved(loop: OpenLoop, fits: Fits, at: Crossings) -> Floats:
-    """d ln f by each parameter of the frequency where |1 + L| is least; NaN at half the rate, where it stays."""
+    """d ln f by each parameter of the frequency where |1 + L| is least; NaN at half the rate, where it is fixed."""
     inside = at.frequency_hz < loop.rate_hz / 2
     found = np.full((len(at.row), fits.values.shape[1]), np.nan)
     if inside.any():

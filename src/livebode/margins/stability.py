@@ -1,4 +1,4 @@
-"""Whether a closed loop is stable, from its open loop's frequency response alone."""
+"""Stability of a closed loop from the frequency response of its open loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def stable(open_loop: Complex, frequency_hz: Floats, unstable_poles: NDArray[np.
     """By Nyquist's criterion for a sampled loop, shape (rows,).
 
     Along the upper half of the unit circle, and around its integrators at z = 1, the angle of 1 + L turns by π times
-    the closed loop's poles inside less the open loop's poles inside. As there are as many of both, it ends at π times
+    the closed loop's poles inside less the open loop's poles inside. As both have equally many, it ends at π times
     (the open loop's unstable poles less those of the closed loop). With ν integrators it begins at −ν·π/2.
 
     Parameters

@@ -1,4 +1,4 @@
-"""A filter for the found resonance, with the margins that it would give, or the reason why none is proposed."""
+"""A filter for the resonance, with the resulting margins, or the reason why none is proposed."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _DEPTHS_DB = (6.0, 10.0, 14.0, 20.0, 26.0, 32.0)
 _LOW_PASSES = 24
 _ROWS = 32
 _WIDEST = 2.0  # highest over lowest frequency of a resonance that a notch can follow
-_SURE = 0.25  # of Ms: with a wider bound there is nothing to compare
+_SURE = 0.25  # of Ms: with a wider bound a comparison is meaningless
 _PLACES = 1.96
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """One filter and what it would do.
+    """One filter and its effect.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Proposal:
     biquad
         Its coefficients at the controller's rate.
     about
-        Centre or corner, depth and width in words and numbers.
+        Centre or corner, depth and width as text and numbers.
     after
         Margins of the rows that were judged, with the filter.
     enough
@@ -54,14 +54,14 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """What is proposed for a loop.
+    """Proposal for a loop.
 
     Attributes
     ----------
     verdict, sentence
-        "none needed", "suggested" or "refused", and why.
+        "none needed", "suggested" or "refused", and the reason.
     before
-        Margins of the rows that were judged, as the loop is.
+        Margins of the rows that were judged, without a filter.
     proposals
         The notch and the low-pass, the better one first; empty unless suggested.
     """
@@ -101,14 +101,14 @@ def tuning(
     controller_rate_hz: float | None = None,
     peak_sensitivity: float = 2.0,
 ) -> Tuning:
-    """Propose a notch and a low-pass where the loop comes too near to instability.
+    """Propose a notch and a low-pass where the loop is too close to instability.
 
-    Judged is the largest Ms over the rows (over positions, where the fits are of several), each with its 95 % bound.
-    A notch covers the resonance's whole range over the rows, bound included, at half its depth or more; depth, and the
-    low-pass's corner, are the mildest that reach the target, or else those with the least Ms. Every one is judged on
-    the whole loop, its stability included.
+    The criterion is the largest Ms over the rows (over positions, if the fits are of several), each with its 95 %
+    bound. A notch covers the resonance's whole range over the rows, bound included, at half its depth or more; depth,
+    and the low-pass's corner, are the mildest that reach the target, or else those with the least Ms. Each filter is
+    judged on the whole loop, including its stability.
 
-    Bias: a filter is as good as the model of the plant; what the model lacks, another resonance say, it cannot know.
+    Bias: a filter is as good as the model of the plant; it ignores what the model omits, such as another resonance.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def tuning(
     loop, band_hz
         As for `margins`.
     controller_rate_hz
-        How often the filter would be computed; the loop's rate by default.
+        Computations of the filter per second; the loop's rate by default.
     peak_sensitivity
         Target for Ms. 2 leaves a gain margin of 6 dB and a phase margin of 29° or more.
 
@@ -142,7 +142,7 @@ def tuning(
     if not before.ok.all():
         return Tuning(
             "refused",
-            f"with {np.count_nonzero(~before.ok)} of {len(rows)} fits the loop would be unstable; where the machine "
+            f"with {np.count_nonzero(~before.ok)} of {len(rows)} fits the loop would be unstable; if the machine "
             "runs, the loop's description or the fit is wrong",
             before,
         )
@@ -164,9 +164,9 @@ def tuning(
     found = [p for p in (*notches, tried(_low_passes(ranges[0][1], rate_hz), "low-pass")) if p is not None]
     better = sorted((p for p in found if largest_ms(p.after) < largest), key=lambda p: largest_ms(p.after))
     if not better:
-        return Tuning("refused", f"no notch and no low-pass brings Ms below the {largest:.3g} that it is", before)
+        return Tuning("refused", f"no notch or low-pass reduces Ms below its present value of {largest:.3g}", before)
     best = better[0]
-    reached = "reaches" if best.enough else "comes nearest to"
+    reached = "reaches" if best.enough else "comes closest to"
     sentence = f"Ms is up to {largest:.3g}, above {peak_sensitivity:g}; a {best.kind} {reached} it with "
     sentence += f"{largest_ms(best.after):.3g}"
     kinds = {p.kind: p for p in reversed(better)}
@@ -182,7 +182,7 @@ def largest_ms(found: Margins) -> float:
 
 
 def worst(found: Margins) -> dict[str, float]:
-    """The least of each margin over the rows (of Ms the largest), where there are numbers."""
+    """The least of each margin over the valid rows (of Ms the largest)."""
     rows = found.value[found.ok]
     if not len(rows):
         return {}
@@ -194,12 +194,12 @@ def worst(found: Margins) -> dict[str, float]:
 
 
 def _spread(fits: Parameters) -> Parameters:
-    """Up to 32 rows that hold numbers, evenly spread over the schedule, or over the run without one."""
+    """Up to 32 valid rows, evenly spread over the schedule, or over the run without one."""
     good = np.flatnonzero(fits.ok)
     if not good.size:
         raise FitError(
             "not-fitted",
-            "no response could be fitted, so that there is no model to tune for",
+            "no response could be fitted, so there is no model to design a filter for",
             "see the status of the fits",
             rows=len(fits.ok),
         )
@@ -223,8 +223,8 @@ def _ranges(rows: Parameters, loop: OpenLoop) -> tuple[list[tuple[float, float, 
         if low > 0 and high < _WIDEST * low and high < loop.rate_hz / 2:
             found.append((low, high, float(np.max(derived[f"{name}_damping"]))))
         else:
-            reason = f"the {name.replace('_', ' ')} lies anywhere from {max(low, 0):.4g} to {high:.4g} Hz, bound and "
-            reason += "wandering included: too wide for a filter"
+            reason = f"the {name.replace('_', ' ')} is anywhere from {max(low, 0):.4g} to {high:.4g} Hz, bound and "
+            reason += "variation included: too wide for a filter"
     return found, reason
 
 
@@ -249,7 +249,7 @@ def _mildest(
     band_hz: tuple[float, float],
     target: float,
 ) -> Proposal | None:
-    """The first candidate that is enough, or the best."""
+    """The first candidate that reaches the target, or the best."""
     best: Proposal | None = None
     for biquad, about in candidates:
         after = margins(rows, loop.behind(biquad), band_hz)

@@ -1,4 +1,4 @@
-"""What a person calls the margins."""
+"""Names of the margins for people."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Responses of an axis in motion, corrected by a model that moves as the axis did."""
+"""Responses of an axis in motion, corrected by a model that follows the axis's motion."""
 
 from livebode.motion.correction import MotionCorrection
 from livebode.motion.model import Curve, MovingModel

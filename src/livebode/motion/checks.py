@@ -1,4 +1,4 @@
-"""What a MotionCorrection cannot be made of."""
+"""Checks of the arguments of a MotionCorrection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.estimation import Settings
 def check(
     settings: Settings, radius_m: float, chunk_samples: int, driven_by: str, passes: int, splines: tuple[int, int]
 ) -> None:
-    """UsageError where a correction cannot be made of these, with the value and the remedy."""
+    """Raise UsageError for arguments that a correction does not support, with the value and the remedy."""
     if settings.input is None or settings.schedule is None:
         raise UsageError(
             "missing",
@@ -42,7 +42,7 @@ def check(
     if driven_by not in ("torque", "excitation"):
         raise UsageError(
             "not-one-of",
-            f"{driven_by=} is not known",
+            f"{driven_by=} is not supported",
             "choose 'torque' or 'excitation'",
             argument="driven_by",
             value=driven_by,
@@ -74,7 +74,7 @@ def _check_lengths(window: int, hop: int, chunk_samples: int) -> None:
     if hop > window:
         raise UsageError(
             "out-of-range",
-            f"{hop=} is longer than the window of {window}, and a correction follows the motion",
+            f"{hop=} is longer than the window of {window}, but a correction must follow the motion",
             "take a shorter hop",
             argument="hop",
             value=hop,

@@ -1,4 +1,4 @@
-"""The samples that one fit sees, and the buffer that they come from."""
+"""The samples of one fit, and their buffer."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 class Chunk:
     """Consecutive samples of w, u, y, x, shape (samples,) each.
 
-    `start` is the number of the first one, `first` that of the first one that is new; what is before it is the lead, in
-    which the model comes to the machine's state. `stop` is the number behind the last one that is new; a window more
-    may follow. `missing` (samples,) is True where a sample was not finite or implausibly large, and is the one before.
+    `start` is the number of the first one, `first` that of the first new one; the samples before it are the lead, in
+    which the model reaches the machine's state. `stop` is the number after the last new one; one more window may
+    follow. `missing` (samples,) is True where a sample was not finite or implausibly large; it then has the value of
+    the previous one.
     """
 
     start: int
@@ -38,7 +39,7 @@ class Chunk:
         return np.asarray(np.abs(self._windows(self.u, lines.window, sample) @ wave))
 
     def drag(self, window: int, sample: NDArray[np.int64], inertia_kg_m2: float) -> Floats:
-        """Torque along the motion that accelerates nothing, over two windows up to these samples, (rows,)."""
+        """Drag torque in the direction of motion, without acceleration, over two windows up to each sample, (rows,)."""
         u = self._windows(self.u, 2 * window, sample).mean(axis=1)
         before, after = (self._windows(self.y, window, at).mean(axis=1) for at in (sample - window, sample))
         return np.asarray((u - inertia_kg_m2 * (after - before) * self.rate_hz / window) * np.sign(after))
@@ -56,7 +57,7 @@ class Recorded:
         self.forget()
 
     def forget(self) -> None:
-        """No samples are left; the size of those before still says what is implausible."""
+        """Drop all samples; the size of the previous ones still limits what is plausible."""
         self._parts: list[Floats] = []
         self.start = self.stop = 0
 
@@ -81,7 +82,7 @@ class Recorded:
             self.start = before
 
     def chunk(self, first: int, stop: int, end: int) -> Chunk:
-        """All up to the one before `end`."""
+        """All samples before the number `end`."""
         data = self._whole()[:, : end - self.start]
         missing = np.isnan(data[0])
         if not np.isfinite(data).all():

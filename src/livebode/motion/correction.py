@@ -1,4 +1,4 @@
-"""MotionCorrection: responses of an axis in motion, freed from what the motion does to them."""
+"""MotionCorrection: responses of an axis in motion, corrected for the effect of the motion."""
 
 from __future__ import annotations
 
@@ -24,47 +24,47 @@ from livebode.motion.waiting import Waiting
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_LEAD_S = 0.5  # before a chunk, for the model to come to the machine's state; a Q of 10 at 50 Hz forgets in 0.06 s
+_LEAD_S = 0.5  # before a chunk, for the model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 
 
 class MotionCorrection:
-    """A Tracker whose Responses are those of the machine held at each window's centre.
+    """A Tracker whose Responses are those of the machine at a fixed position, each window's centre.
 
-    A window sees a machine that changes, and its resonance rings on from where the machine was: in motion a response
-    is off, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses, the
-    first time from a scan of ten stiffnesses, later from the model before; the model is driven as the machine was,
-    along the measured positions; what it leaves of the output, r = y − y_model, goes through the same windows; and
+    The machine changes within a window, and its resonance still rings from earlier positions: in motion a response
+    is biased, by an amount odd in speed. Here two masses with Keff(x) and bs(x) are fitted to a chunk of responses, the
+    first time from a scan of ten stiffnesses, later from the previous model; the model is driven as the machine was,
+    along the measured positions; the residual of the output, r = y − y_model, is analysed in the same windows; and
 
         Ĝ = G_frozen(x_centre) + R/U = Y/U + G_frozen(x_centre) − Y_model/U
 
     with G_frozen the model's sampled (zero-order hold) response. The fit is then repeated on Ĝ. Only w, u, y, x, the
     radius and (driven by the excitation) the loop's description are used.
 
-    Driven by "torque", the model moves under the measured u, so that whatever rings from accelerations, and the answer
-    of the controllers to noise, is in y_model as in y. Driven by "excitation", Ĝ = Y/U + G_frozen − Y_model/U_model
-    with the described loop simulated under w alone; what accelerations leave behind then stays in Ĝ for some 0.5 s.
+    Driven by "torque", the model moves under the measured u, so that oscillations from accelerations, and the response
+    of the controllers to noise, are in y_model as in y. Driven by "excitation", Ĝ = Y/U + G_frozen − Y_model/U_model
+    with the described loop simulated under w alone; transients of accelerations then remain in Ĝ for some 0.5 s.
 
     To first order the same is (Y/U)·G_frozen/(Y_model/U_model) (`quotient`); at a line near the antiresonance, where
-    the model's window sees much less than it has at its centre, that multiplies the noise.
+    the model's response over the window is much smaller than at its centre, this amplifies the noise.
 
-    `sigma` is that of the corrected response: it comes from how R scatters between periods (or from the quiet bins of
-    r), and the motion, which is in y_model too, is not in it. Windows in which the axis stands, reverses or creeps
-    while dry friction holds it are not valid, and an Event of kind "held" says so; a standing axis without dry friction
-    stays valid. See docs/motion.md for what that finds.
+    `sigma` is that of the corrected response: it is from the scatter of R between periods (or from the detection lines
+    of r), without the motion, which is also in y_model. Windows in which the axis is at standstill, reverses or creeps
+    while dry friction stops it are invalid, and an Event of kind "held" reports them; an axis at standstill without dry
+    friction remains valid. docs/motion.md gives the detection rate.
 
-    Delay: a response comes out when its chunk and one more window are complete, at most chunk + window samples after
-    its newest sample; `finish` hands out the rest at once. Wherever Blocks are cut, the results are the same, and a
-    restored correction goes on as if it had never stopped. It keeps chunk + window + 0.5 s of samples.
+    Delay: a response is returned when its chunk and one more window are complete, at most chunk + window samples after
+    its newest sample; `finish` returns the rest at once. The results do not depend on how the samples are cut into
+    Blocks, and a restored correction continues as if it had never stopped. It stores chunk + window + 0.5 s of samples.
 
-    Bias: where the machine is not two masses, only what it shares with them is corrected. A window within 0.5 s of a
-    gap, or of a start in motion, is not.
+    Bias: where the machine is not two masses, only the part that two masses explain is corrected. A window within 0.5 s
+    of a gap, or of a start in motion, is not corrected.
 
     Parameters
     ----------
     settings
         As for a Tracker; names excitation (joint), input, output (motor velocity, rad/s) and schedule (position, m).
     radius_m
-        Pulley's radius: metres of belt per radian; only Keff, bs and mL are in its units, the correction is the same.
+        Pulley's radius: metres of belt per radian; only Keff, bs and mL depend on it, not the correction.
     chunk_samples
         Responses are fitted together over this many samples; by default 4 s. A stroke is a good choice.
     driven_by
@@ -72,14 +72,14 @@ class MotionCorrection:
     quotient
         Correct by a quotient instead of a difference.
     passes
-        How often model and correction are repeated after a scan; from the model before two less.
+        Iterations of model and correction after a scan; two fewer from the previous model.
     stiffness_splines, damping_splines
-        How freely ln Keff(x) and ln bs(x) move over a chunk: 1 for a constant, else 4 or more B-splines.
+        Number of B-splines of ln Keff(x) and ln bs(x) over a chunk: 1 for a constant, else 4 or more.
 
     Raises
     ------
     UsageError
-        If a signal is not named, the quantity is not the plant, or a number is out of its range.
+        If a signal is missing, the quantity is not the plant, or a number is out of range.
     SimulationError
         If the loop cannot be simulated.
 
@@ -121,7 +121,7 @@ class MotionCorrection:
         self._identity = repr((settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines))
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
-        # The sigma comes from what the model leaves, in which there is no motion.
+        # Sigma is from the residual of the model, which does not contain the motion.
         self._tracker = Tracker(replace(settings, noise="periods") if settings.noise == "auto" else settings)
         self._recorded = Recorded(self._names, lines)
         self._waiting = Waiting(lines)
@@ -141,12 +141,12 @@ class MotionCorrection:
 
     @property
     def model(self) -> MovingModel | None:
-        """The fit of the newest chunk that travelled; None before the first."""
+        """The fit of the newest chunk with travel; None before the first."""
         return self._learner.model
 
     @property
     def counts(self) -> dict[str, int]:
-        """As of a Tracker: samples that came, were missing, and were left out for each reason."""
+        """As of a Tracker: numbers of received, missing, and excluded samples for each reason."""
         return self._tracker.counts
 
     def found(self) -> dict[str, Any]:
@@ -167,11 +167,11 @@ class MotionCorrection:
         return self._tracker.repeatability()
 
     def drain_events(self) -> list[Event]:
-        """Events since the last call, those of the Tracker and of chunks that were completed."""
+        """Events since the last call, those of the Tracker and of completed chunks."""
         return sorted(self._tracker.drain_events() + self._standstill.drain(), key=lambda event: event.sample)
 
     def process(self, block: Block) -> Responses:
-        """Responses of the chunks that this Block completes; often none, once a chunk many.
+        """Responses of the chunks that this Block completes; often none, for a completed chunk many.
 
         Raises
         ------
@@ -198,7 +198,7 @@ class MotionCorrection:
         return Responses.join(done) if done else tracked[0:0]
 
     def finish(self) -> Responses:
-        """Responses of what is left, fitted as a short chunk; the next Block starts anew."""
+        """Responses of the remaining samples, fitted as a short chunk; the next Block starts a new chunk."""
         if not self._recorded:
             raise SignalError("too-short", "there are no samples to finish", "process a block first", samples=0)
         last = self._corrected(self._recorded.stop)
@@ -206,7 +206,7 @@ class MotionCorrection:
         return last
 
     def snapshot(self) -> bytes:
-        """Everything that the next sample's result depends on, exact; see `restore`. Drain events before."""
+        """Everything that the next sample's result depends on, exact; see `restore`. Drain events first."""
         own: dict[str, NDArray[np.generic]] = {
             "tracker": np.frombuffer(self._tracker.snapshot(), dtype=np.uint8),
             "from": np.array([self._from]),
@@ -214,12 +214,12 @@ class MotionCorrection:
         return snapshots.pack({name: part.state() for name, part in self._parts.items()} | {"own": own}, self._identity)
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of a MotionCorrection with the same settings.
+        """Continue from a snapshot of a MotionCorrection with the same settings.
 
         Raises
         ------
         LivebodeError
-            If the snapshot is damaged or belongs to other settings; the correction is then as it was.
+            If the snapshot is damaged or belongs to other settings; the correction is then unchanged.
         """
         parts = snapshots.unpack(snapshot, self._identity)
         self._tracker.restore(parts["own"]["tracker"].tobytes())
@@ -228,7 +228,7 @@ class MotionCorrection:
             part.load(parts.get(name, {}))
 
     def _corrected(self, stop: int) -> Responses:
-        """Responses up to the sample before `stop`, and their fit; forgets what no later chunk needs."""
+        """Responses up to the sample before `stop`, and their fit; drops what no later chunk needs."""
         tracked = self._waiting.take(stop)
         end = min(stop + self.settings.lines.window, self._recorded.stop)
         chunk = self._recorded.chunk(self._from, stop, end)
@@ -275,7 +275,7 @@ class MotionCorrection:
         return Replayed(model, left, seen, frozen(model, tracked.schedule, self.settings) + seen.value)
 
     def _value(self, now: Replayed, tracked: Responses, chunk: Chunk) -> Complex:
-        """The tracked responses, moved as the model's had to be to its frozen one; NaN where it has no whole window."""
+        """The tracked responses plus the model's difference to its frozen response; NaN without a whole window."""
         if self._drive is None and not self._quotient:
             return now.value
         held = frozen(now.model, tracked.schedule, self.settings)

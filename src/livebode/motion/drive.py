@@ -1,4 +1,4 @@
-"""From the described controllers to a drive that can be simulated."""
+"""Conversion of the described controllers to a drive that can be simulated."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from livebode.simulation.settings import Drive
 
 
 def drive_of(loop: Loop, rate_hz: float) -> Drive:
-    """The described controllers as the simulation takes them.
+    """The described controllers as parameters of the simulation.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def _controllers(loop: Loop) -> tuple[PID, PID | None]:
     if not isinstance(feedback, PID) or not (position is None or isinstance(position, PID)):
         raise SimulationError(
             "loop-unsupported",
-            f"a loop whose feedback is {type(given).__name__} cannot be simulated",
+            f"a loop with a feedback of type {type(given).__name__} cannot be simulated",
             "describe the feedback as Cascade(velocity=PID(...), position=PID(...)) or a PID on the velocity, or drive "
             "the model by 'torque'",
             key="loop.feedback",

@@ -1,4 +1,4 @@
-"""One MovingModel for all responses along the way."""
+"""One MovingModel for all responses along the travel."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """How a MovingModel is fitted.
+    """Options of the fit of a MovingModel.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ class Fit:
     radius_m
         r.
     stiffness_splines, damping_splines
-        How freely ln Keff(x) and ln bs(x) move: 1 for a constant, else 4 or more B-splines. No shape is assumed.
+        Number of B-splines of ln Keff(x) and ln bs(x): 1 for a constant, else 4 or more. No shape is assumed.
     delayed
-        Whether the output may be late behind the input; else the model has no delay.
+        Whether the output may lag the input; else the model has no delay.
     """
 
     z: Complex
@@ -61,7 +61,7 @@ class Fit:
         if np.count_nonzero(good) < 1:
             raise FitError(
                 "no-model",
-                "no two masses fit these responses",
+                "no two-mass model fits these responses",
                 "check the lines, the signals and the loop",
                 rows=len(chosen),
             )
@@ -77,7 +77,7 @@ class Fit:
         return self._model(np.concatenate([found[0, :2], *weights, np.zeros(1)]), low, high)
 
     def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
-        """A model from before, over another range of positions."""
+        """A previous model, over another range of positions."""
         at, arm = (
             np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)),
             2 * np.log(self.radius_m),
@@ -93,12 +93,12 @@ class Fit:
         return self._model(np.concatenate([known[:2], *weights, known[-1:]]), low, high)
 
     def misfit(self, rows: Rows, model: MovingModel) -> float:
-        """Share of the weighted responses that the model leaves, rms."""
+        """Residual of the model as a share of the weighted responses, rms."""
         rest = sampled(model, rows.position_m, self.z, self.rate_hz) - rows.value
         return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
 
     def refine(self, rows: Rows, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
-        """Weighted least squares over all rows, from a model on; `masses_known` holds Js, mL and the delay."""
+        """Weighted least squares over all rows, started from a model; `masses_known` fixes Js, mL and the delay."""
         low, high = model.low_m, model.high_m
         known = self._unknowns(model)
         free = slice(2 if masses_known else 0, None if self.delayed and not masses_known else -1)
@@ -157,7 +157,7 @@ class Fit:
 
 
 def sampled(model: MovingModel, position_m: Floats, z: Complex, rate_hz: float) -> Complex:
-    """Response at e^(jωT) behind a zero-order hold, of the model held at these positions, (rows, lines)."""
+    """Response at e^(jωT) behind a zero-order hold, of the model at these fixed positions, (rows, lines)."""
     return np.asarray(z ** (-model.delay_s * rate_hz) * two_masses.sampled(model.parameters(position_m), z, rate_hz))
 
 

@@ -1,4 +1,4 @@
-"""From chunk to chunk: the model that the machine's responses show."""
+"""From chunk to chunk: the model of the machine's responses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """A model driven through a chunk: what it leaves, R/U of that, and the corrected responses (rows, lines)."""
+    """A model driven through a chunk: its residual, R/U of the residual, and the corrected responses (rows, lines)."""
 
     model: MovingModel
     left: Residual
@@ -34,16 +34,16 @@ class Replayed:
 Replay = Callable[[MovingModel], Replayed]
 
 _ROWS_MIN = 12
-_OVERLAP = 4  # windows of a period that go into the fit: more share their samples, and say nothing new
-_REACH = 0.25  # of the new range that may lie outside of the model's, for a start from it
+_OVERLAP = 4  # windows of a period in the fit: more windows share their samples without new information
+_REACH = 0.25  # of the new range that may be outside of the model's, for a start from it
 _CHECKED = 50  # positions
-_WORSE = 1.5  # misfit against the one before from which a start from the model before is doubted
+_WORSE = 1.5  # misfit relative to the previous one from which a start from the previous model is rejected
 
 
 class Learner:
-    """Fits a MovingModel to each chunk, the first from a scan, the next ones from the model before.
+    """Fits a MovingModel to each chunk, the first from a scan, the next ones from the previous model.
 
-    A chunk that does not travel says nothing of the curves: after one that did, the model stays.
+    A chunk without travel has no information on the curves: after one with travel, the model is unchanged.
     """
 
     def __init__(self, settings: Settings, radius_m: float, splines: tuple[int, int], passes: int) -> None:
@@ -55,11 +55,11 @@ class Learner:
 
     @property
     def has_travelled(self) -> bool:
-        """Whether the model knows the machine in motion."""
+        """Whether the model was fitted to the machine in motion."""
         return self.model is not None and len(self.model.log_stiffness.weights) > 1
 
     def learn(self, tracked: Responses, chunk: Chunk, replay: Replay) -> Replayed | None:
-        """The model after this chunk's steady motion; None as long as there is too little to fit."""
+        """The model after this chunk's steady motion; None while there is too little to fit."""
         usable = self._usable(tracked)
         steady = usable[steady_rows(tracked.sample[usable], chunk, self._settings.lines.window)]
         if steady.size >= _ROWS_MIN:
@@ -71,13 +71,13 @@ class Learner:
         return None if self.model is None else replay(self.model)
 
     def widened(self, tracked: Responses, chunk: Chunk, now: Replayed) -> MovingModel:
-        """The model over all positions of the chunk, with the stiffness and damping that all responses show."""
+        """The model over all positions of the chunk, with the stiffness and damping of all responses."""
         rows, fit, model = self._over_all(tracked, now)
         wide = fit.refine(self._rows(tracked, rows, chunk, now), model, masses_known=True)
         return wide if self._sound(wide) else now.model
 
     def completed(self, tracked: Responses, chunk: Chunk, replay: Replay, now: Replayed) -> Replayed:
-        """The model fitted to all responses, for a chunk in which friction holds nowhere."""
+        """The model fitted to all responses, for a chunk in which friction never stops the axis."""
         rows, fit, model = self._over_all(tracked, now)
         model = fit.refine(self._rows(tracked, rows, chunk, now), model)
         if not self._sound(model):
@@ -133,7 +133,7 @@ class Learner:
         return now, fit.misfit(rows, now.model)
 
     def _onward(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> NDArray[np.intp]:
-        """Those in whose window neither motor nor cart turns, which friction would bias; all, if few are left."""
+        """Rows whose window has no reversal of motor or cart, where friction would bias them; all, if few remain."""
         where, newest = turns(now.left, chunk, chunk.start), tracked.sample[used]
         inside = np.searchsorted(where, newest, "right") - np.searchsorted(
             where, newest - self._settings.lines.window, "right"
@@ -142,7 +142,7 @@ class Learner:
         return onward if onward.size >= max(_ROWS_MIN, used.size // 4) else used
 
     def _rows(self, tracked: Responses, used: NDArray[np.intp], chunk: Chunk, now: Replayed) -> Rows:
-        # The error of a response is n/|U|: white noise on y over the torque at the line.
+        # The error of a response is n/|U|: white noise on y divided by the torque at the line.
         weight = chunk.torque(self._settings.lines, tracked.sample[used])
         value = np.where(np.isfinite(now.value[used]), now.value[used], tracked.value[used])
         return Rows(value, weight, tracked.schedule[used])
@@ -156,7 +156,7 @@ class Learner:
         return rows[np.unique(tracked.sample[rows] // apart, return_index=True)[1]]
 
     def _sound(self, model: MovingModel) -> bool:
-        """Whether all poles are slower than the rate; else too little was in the responses to fit it."""
+        """Whether all poles are slower than the rate; else the responses had too little information for a fit."""
         js, load, stiffness, damping = np.exp(model.parameters(np.linspace(model.low_m, model.high_m, _CHECKED))).T
         reduced = js * load / (js + load)
         fastest = np.maximum(np.sqrt(stiffness / reduced), damping / reduced)
@@ -187,7 +187,7 @@ class Learner:
 
 
 def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
-    """Whether a model has seen enough of these positions to start from."""
+    """Whether a model covers enough of these positions to start from."""
     if splines != (len(model.log_stiffness.weights), len(model.log_damping.weights)):
         return False
     outside = max(model.low_m - at.min(), at.max() - model.high_m, 0.0)
@@ -195,6 +195,6 @@ def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
 
 
 def frozen(model: MovingModel, position_m: Floats, settings: Settings) -> Complex:
-    """The model's response held at these positions (the lowest it knows, where NaN), (rows, lines)."""
+    """The model's response at these fixed positions (its lowest one, where NaN), (rows, lines)."""
     at = np.where(np.isfinite(position_m), position_m, model.low_m)
     return sampled(model, at, settings.lines.z, settings.lines.rate_hz)

@@ -13,14 +13,14 @@ Floats = NDArray[np.float64]
 
 _DEGREE = 3
 _SHOWN = 11
-_BEYOND = 0.1  # of the range, on either side, where a curve goes on straight
+_BEYOND = 0.1  # of the range, on either side, where a curve continues straight
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A smooth function of the position: a cubic spline with evenly spaced knots.
 
-    Outside of its range it goes on straight for a tenth of it, and is constant from there.
+    Outside of its range it continues straight for a tenth of the range, and is constant beyond.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Curve:
 
 
 def _knots(low: float, high: float, splines: int) -> tuple[Floats, float, float]:
-    """Knots; what the slope at an end is per difference of its two weights; how far a curve goes on straight."""
+    """Knots; slope at an end per difference of its two weights; length of the straight extension."""
     inner = np.linspace(low, high, splines - _DEGREE + 1)
     knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
     return knots, _DEGREE / float(inner[1] - inner[0]), _BEYOND * (high - low)
@@ -66,16 +66,16 @@ def basis(position_m: Floats, low: float, high: float, splines: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class MovingModel:
-    """What was fitted: two masses (11), (12) with Keff(x) and bs(x).
+    """The fitted model: two masses (11), (12) with Keff(x) and bs(x).
 
     Attributes
     ----------
     inertia_kg_m2, load_kg, radius_m
         Js, mL, r.
     low_m, high_m
-        The positions that the fit has seen.
+        Range of positions of the fit.
     delay_s
-        Of the measured velocity behind the torque, beyond what two masses behind a zero-order hold have.
+        Delay of the measured velocity after the torque, beyond that of two masses behind a zero-order hold.
     """
 
     inertia_kg_m2: float
@@ -99,7 +99,7 @@ class MovingModel:
         return self.log_stiffness.high
 
     def stiffness_at(self, position_m: ArrayLike) -> Floats:
-        """Keff, N/m; beyond the range that the fit has seen it goes on for a tenth of it."""
+        """Keff, N/m; it is extended by a tenth of the fit's range on either side."""
         return np.asarray(np.exp(self.log_stiffness(position_m)))
 
     def damping_at(self, position_m: ArrayLike) -> Floats:

@@ -1,4 +1,4 @@
-"""Orders: what repeats with the motor's angle, such as cogging, found in what a model leaves of ordinary strokes."""
+"""Orders: torque that repeats with the motor's angle, such as cogging, found in a model's residual of usual strokes."""
 
 from __future__ import annotations
 
@@ -15,24 +15,25 @@ from livebode.motion.replay import without_drift
 
 Floats = NDArray[np.float64]
 
-_PADDED = 2  # ways: length of the transform over the position
+_PADDED = 2  # travels: length of the transform over the position
 _FINE = 2.5  # samples of the position in the shortest cycle that is looked for
-_FROM = 0.25  # of a bin, Hz: slower than that, the drift is taken off
+_FROM = 0.25  # of a bin, Hz: slower drift is removed
 _BEYOND = 2  # bins above the highest line, whose orders still leak into it
 _FLOOR = 32  # widths of a peak, over which the noise is taken as constant
-_MASKED = 4.5  # widths of a peak, beside a line: what the model lacks may be there
-_CAP = 12.0  # of a stroke's power over its noise: a single stroke makes no order
+_MASKED = 4.5  # widths of a peak, beside a line: the model's error may be there
+_CAP = 12.0  # of a stroke's power over its noise: a single stroke does not make an order
 _STROKES_MIN = 5
-_FALSE = 1e-4  # chance of an order that is not there
-_APART = 8.0  # ways: peaks closer than that are one order
+_FALSE = 1e-4  # probability of a false order
+_APART = 8.0  # travels: peaks closer than this are one order
 _MOST = 8
 
 
 def shaft_position(position_m: Floats, velocity: Floats, window: int, rate_hz: float) -> Floats:
-    """Where the motor's shaft is, as metres of belt: the slow part from the position, the fast one from the velocity.
+    """Position of the motor's shaft, as metres of belt: the slow part from the position, the fast one from the
+    velocity.
 
-    The excitation swings the shaft by a hundredth of a radian, which an order of 24 a turn sees as a quarter of one; a
-    measured position may be the cart's, or too coarse to hold it.
+    The excitation swings the shaft by a hundredth of a radian, which is a quarter of a radian of an order of 24 a turn;
+    a measured position may be that of the cart, or too coarse to resolve it.
 
     Parameters
     ----------
@@ -50,20 +51,20 @@ def shaft_position(position_m: Floats, velocity: Floats, window: int, rate_hz: f
 class OrderSpectrum:
     """Power spectrum of a residual over the position, in cycles a metre, mean over steady strokes.
 
-    Over time a ripple's frequency follows the speed; over the position it stays. Each stroke is averaged onto an even
-    grid of positions (boxcar) and weighted with a Blackman–Harris window. Its power is divided by the noise around
-    (median over 32 widths of a peak), so that without a ripple it is exponentially distributed with mean 1. Around
-    the excitation's lines a stroke does not count: there the model may lack something, at a place that moves with the
-    speed. The sum over strokes is Gamma distributed. An order is a peak whose chance, times the places looked at, is
-    below 1e-4.
+    Over time a ripple's frequency follows the speed; over the position it is constant. Each stroke is averaged onto an
+    even grid of positions (boxcar) and weighted with a Blackman–Harris window. Its power is divided by the noise around
+    (median over 32 widths of a peak), so that without a ripple it is exponentially distributed with mean 1. Around the
+    excitation's lines a stroke is not used: there the model may be incomplete, at a place that moves with the speed.
+    The sum over strokes is Gamma distributed. An order is a peak whose probability by chance, times the places
+    searched, is below 1e-4.
 
     Bias: a ripple whose order meets a line in every stroke is not found, because the machine's response and the ripple
-    are then the same to every method. Strokes at two speeds tell them apart.
+    cannot then be separated by any method. Strokes at two speeds separate them.
 
     Parameters
     ----------
     lines
-        Of the excitation; orders that stay two bins above the highest one are not looked for.
+        Of the excitation; orders that are always two bins above the highest one are not searched.
     way_m
         From the lowest to the highest position.
     slowest_m_per_s
@@ -83,9 +84,9 @@ class OrderSpectrum:
         self._count = np.zeros(self.cycles_per_m.size, dtype=np.int64)
 
     def add(self, residual: Floats, position_m: Floats, gain: Callable[[Floats], Floats] | None = None) -> None:
-        """A steady stroke: what the model leaves, and where, shape (samples,) each.
+        """Process a steady stroke: residual of the model and position, shape (samples,) each.
 
-        `gain` gives |G| at frequencies in Hz; with it the torque of each order is known too (`amplitudes`).
+        `gain` gives |G| at frequencies in Hz; with it the torque of each order is also known (`amplitudes`).
         """
         even = _over_position(residual, position_m, self._step_m)
         width = self._points / max(even.size, 1)
@@ -130,7 +131,7 @@ class OrderSpectrum:
         enough = self._count >= _STROKES_MIN
         strength = np.where(enough, self._whole / np.maximum(self._count, 1), 0.0)
         mean = np.where(enough, self._sum / np.maximum(self._count, 1), 1.0)
-        # What moves with the speed, as an eccentric pulley's sidebands do, raises whole ranges.
+        # Components that move with the speed, such as an eccentric pulley's sidebands, raise whole ranges.
         around = np.maximum(median_filter(mean, 2 * _FLOOR * _PADDED + 1), 1.0)
         chance = np.where(enough, gamma.logsf(self._sum / around, np.maximum(self._count, 1)), 0.0)
         limit = np.log(_FALSE / max(np.count_nonzero(enough) / _PADDED, 1))

@@ -1,4 +1,4 @@
-"""A MovingModel driven as the machine was, along its measured positions."""
+"""Simulation of a MovingModel driven as the machine was, along its measured positions."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _ANYWHERE_M = 1e12
 def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats) -> tuple[Floats, Floats]:
     """Velocities of motor (rad/s) and cart (m/s) under the measured torque u, N m, from rest, shape (samples,) each.
 
-    Whatever made the torque (excitation, motion, the controllers' answer to noise) moves the model as it moved the
-    machine. What is not in u or not in the model, such as friction, makes it drift away slowly; see `without_drift`.
+    Torque of any origin (excitation, motion, the controllers' response to noise) moves the model as it moved the
+    machine. Effects that are not in u or not in the model, such as friction, make it drift slowly; see `without_drift`.
     """
     _, motor, cart = _run(model, torque_only(rate_hz), u, position_m)
     return late(motor, model.delay_s * rate_hz), cart
@@ -37,8 +37,8 @@ def by_torque(model: MovingModel, rate_hz: float, u: Floats, position_m: Floats)
 def by_excitation(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tuple[Floats, Floats]:
     """u, N m, and velocity, rad/s, of the model's loop under w alone, from rest, shape (samples,) each.
 
-    The motion itself is left out: what remains is linear and varies in time. A transient that the reference's
-    acceleration leaves behind is not in it. The loop is closed over the velocity without the model's delay, which is
+    The motion itself is excluded: the rest is linear and time-varying. It does not include transients after an
+    acceleration of the reference. The loop is closed over the velocity without the model's delay, which is
     in the result alone.
     """
     u, motor, _ = _run(model, drive, w, position_m)
@@ -55,7 +55,7 @@ def late(velocity: Floats, samples: float) -> Floats:
 def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
     """The model's velocity, with its slow difference from the measured one added: two boxcars of a window each.
 
-    A boxcar of N samples is blind to every line, and two in a row, centred, hand on a constant and a ramp unchanged.
+    A boxcar of N samples is zero at every line, and two in series, centred, leave a constant and a ramp unchanged.
     At the ends the last value is repeated.
     """
     slow = measured - model
@@ -67,7 +67,7 @@ def without_drift(model: Floats, measured: Floats, window: int) -> Floats:
 
 
 def torque_only(rate_hz: float) -> Drive:
-    """A drive whose controllers do nothing: its torque is what is put in as w."""
+    """A drive without controllers: its torque is the input w."""
     return Drive(rate_hz=rate_hz, velocity_rate_hz=rate_hz, position_rate_hz=rate_hz, velocity_gain_n_m_s=0.0,
                  position_gain_per_s=0.0)  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""What the machine did and the model did not, through the windows of the Tracker."""
+"""The residual of the model in the windows of the Tracker."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Residual:
 
 
 def residual(model: MovingModel, chunk: Chunk, settings: Settings) -> Residual:
-    """What is left over a chunk; NaN where a sample is missing. Arrays of shape (samples,)."""
+    """The residual over a chunk; NaN where a sample is missing. Arrays of shape (samples,)."""
     lines = settings.lines
     motor, cart = by_torque(model, lines.rate_hz, chunk.u, chunk.x)
     slow = without_drift(motor, chunk.y, lines.window) - motor
@@ -33,10 +33,10 @@ def residual(model: MovingModel, chunk: Chunk, settings: Settings) -> Residual:
 
 
 class Scatter:
-    """A Tracker on the residual: R/U, and the noise by how R scatters from period to period, or by the quiet bins.
+    """A Tracker on the residual: R/U, and the noise from the scatter of R between periods, or from detection lines.
 
-    The motion is in the model too, so it does not count. What is remembered goes from chunk to chunk; the windows that
-    hold a chunk's end are in none, for they would hold two models.
+    The motion is also in the model, so the residual does not contain it. The memory continues from chunk to chunk;
+    windows across a chunk's end are not used, because they would contain two models.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -44,11 +44,11 @@ class Scatter:
         self._memory = b""
 
     def once(self, velocity: Floats, chunk: Chunk) -> Responses:
-        """Responses R/U of this residual; remembers nothing."""
+        """Responses R/U of this residual, without memory."""
         return Tracker(self._settings, repeating=False).process(self._block(velocity, chunk))
 
     def then(self, velocity: Floats, chunk: Chunk) -> tuple[Responses, bytes]:
-        """The same with the sigma that goes with it, and the memory that `keep` takes."""
+        """The same with its sigma, and the memory for `keep`."""
         tracker, block = Tracker(self._settings, repeating=False), self._block(velocity, chunk)
         if self._memory:
             tracker.restore(self._memory)
@@ -63,7 +63,7 @@ class Scatter:
         self._memory = memory
 
     def _block(self, velocity: Floats, chunk: Chunk) -> Block:
-        """From the first sample on that a new window holds."""
+        """The residual from the first sample of a new window on."""
         s = self._settings
         rows = {s.output: velocity, s.input: chunk.u} | ({s.excitation: chunk.w} if s.excitation else {})
         names = [name for name in rows if name]

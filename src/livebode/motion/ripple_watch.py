@@ -1,4 +1,4 @@
-"""Ripple in what a model leaves of an axis's strokes: its orders, their size, and what they add to the bounds."""
+"""Ripple in a model's residual of an axis's strokes: its orders, their size, and their effect on the bounds."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from livebode.motion.steady import steady_rows
 
 Floats = NDArray[np.float64]
 
-_SLOWER = 0.5  # of the first stroke's speed: how slow a later one may be
+_SLOWER = 0.5  # of the first stroke's speed: lowest speed of a later one
 _GRID = 64  # frequencies at which the model's gain is computed
 
 
 class RippleWatch:
-    """Orders of a ripple that the settings name, or that the strokes so far show (`OrderSpectrum`).
+    """Orders of a ripple that the settings name, or that the previous strokes show (`OrderSpectrum`).
 
-    Five strokes whose order does not meet a line are needed to find it. Delay: what is found counts from the chunk in
+    Five strokes whose order does not meet a line are needed to find it. Delay: an order is used from the chunk on in
     which it is found. A ripple that meets a line in every stroke is not found; name it in the settings then.
     """
 
@@ -32,10 +32,10 @@ class RippleWatch:
         self._spectrum: OrderSpectrum | None = None
         self._made_for = np.zeros(2)  # way and slowest speed
         self.orders = settings.ripple
-        """As they are known."""
+        """The known orders."""
 
     def take(self, residual: Floats, chunk: Chunk, model: MovingModel) -> None:
-        """What a model leaves of a chunk, (samples,)."""
+        """Process a model's residual of a chunk, (samples,)."""
         if self._settings.ripple:
             return
         strokes = list(self._strokes(residual, chunk))
@@ -50,7 +50,7 @@ class RippleWatch:
         self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in zip(found, sizes) if a > 0)
 
     def power(self, chunk: Chunk, sample: NDArray[np.int64]) -> Floats:
-        """Of the ripple at the lines of windows that end at these samples, (rows, lines)."""
+        """Power of the ripple at the lines of windows that end at these samples, (rows, lines)."""
         speed = RippleSpeed(self._settings.lines).at(chunk.x, sample - chunk.start)
         return ripple_power(self.orders, self._settings.lines, speed)
 
@@ -60,7 +60,7 @@ class RippleWatch:
         return self._spectrum
 
     def _strokes(self, residual: Floats, chunk: Chunk) -> Iterator[tuple[Floats, Floats]]:
-        """Residual and shaft's position of steady windows in a row."""
+        """Residual and shaft's position of consecutive steady windows."""
         window = self._settings.lines.window
         newest = np.arange(chunk.first + window - 1, chunk.stop, window)
         begin = newest - chunk.start - window + 1
@@ -86,7 +86,7 @@ class RippleWatch:
 
 
 class _Gain:
-    """|G| of a model held at a position, interpolated between frequencies."""
+    """|G| of a model at a fixed position, interpolated between frequencies."""
 
     def __init__(self, model: MovingModel, position_m: float, settings: Settings) -> None:
         rate_hz = settings.lines.rate_hz

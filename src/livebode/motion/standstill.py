@@ -1,4 +1,4 @@
-"""Where dry friction holds an axis that stands or reverses."""
+"""Detection of dry friction that stops an axis at standstill or reversal."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from livebode.motion.steady import steady_rows
 Floats = NDArray[np.float64]
 
 _UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
-_DRAG = 0.01  # of the torque's amplitude at the lines, rms; friction that small cannot leave the share above
+_DRAG = 0.01  # of the torque's amplitude at the lines, rms; smaller friction cannot cause the share above
 _SLOW = 0.05  # of the largest speed: friction at its bend
-_LONGEST = 4  # windows that are judged together
+_LONGEST = 4  # windows per verdict
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples `first` to `last` in which motor or cart stand or reverse; `unexplained`: share of the output, rms."""
+    """Samples `first` to `last` with standstill or reversal of motor or cart; `unexplained`: share of the output."""
 
     first: int
     last: int
@@ -31,27 +31,27 @@ class Stretch:
 
 
 class Standstill:
-    """Finds the stretches in which the axis does not answer as the model that was fitted to its motion.
+    """Finds the stretches in which the axis does not respond as the model that was fitted to its motion.
 
-    Coulomb friction is a constant torque while motor and cart keep their direction, and no line sees it. Where one of
-    them stands or reverses, it is not. Such stretches are judged by how much of the output's power at the lines
-    a belt on the masses known from the motion leaves, beyond what is left elsewhere (the noise): more than 3 % in
-    amplitude is friction, where steady motion has shown that there is a drag. Masses that really changed while an axis
-    with drag stood would look the same.
+    Coulomb friction is a constant torque while motor and cart do not change their direction, and does not affect a
+    line. Where one of them is at standstill or reverses, it is not constant. Such stretches are judged by the residual
+    power of the output at the lines, for a belt on the masses known from the motion, beyond the residual elsewhere (the
+    noise): more than 3 % in amplitude is friction, if steady motion has shown a drag. A real change of the masses at
+    standstill of an axis with drag has the same effect.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._window = settings.lines.window
         self._noise = 0.0  # Σ|R|² over the lines where the axis moves
-        self._drag = np.inf  # mean torque along a steady motion; unknown, it may be any
-        self._until = -1  # end of the last stretch in which it was held
+        self._drag = np.inf  # mean torque in steady motion; unlimited while unknown
+        self._until = -1  # end of the last stretch in which friction stopped it
         self._events: list[Event] = []
 
     def stretches(self, left: Residual, chunk: Chunk) -> list[tuple[int, int]]:
         """Numbers of the first and last sample of stretches with changes of sign less than a window apart.
 
-        None is longer than four windows, so that each speaks for one place.
+        None is longer than four windows, so that each belongs to one place.
         """
         where = turns(left, chunk, max(chunk.first - self._window + 1, chunk.start))
         apart = (np.diff(where) >= self._window) | (np.diff(where // (_LONGEST * self._window)) > 0)
@@ -59,16 +59,16 @@ class Standstill:
         return [(int(group[0]), int(group[-1])) for group in groups if group.size]
 
     def tail(self, chunk: Chunk) -> list[Stretch]:
-        """The end of a stretch that the chunk before found held, if it reaches into this one."""
+        """The end of a stretch with friction from the previous chunk, if it reaches into this one."""
         reaches = self._until >= 0 and self._until + 2 * self._window > chunk.first
         return [Stretch(self._until, self._until, 0.0)] if reaches else []
 
     def held(
         self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
     ) -> list[Stretch]:
-        """Those of the stretches in which friction holds.
+        """The stretches in which friction stops the axis.
 
-        `seen` is R/U with a model whose belt fits here too, `inertia_kg_m2` what the motor moves in all.
+        `seen` is R/U with a model whose belt fits here too, `inertia_kg_m2` the total inertia at the motor.
         """
         rows = np.flatnonzero(tracked.valid.all(axis=1))
         rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
@@ -109,8 +109,8 @@ class Standstill:
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
         message = (
-            f"dry friction holds the axis, which stands or reverses: {100 * stretch.unexplained:.0f} % of its output "
-            "is not as in motion; responses are invalid until it has moved for two windows"
+            f"dry friction stops the axis at standstill or reversal: {100 * stretch.unexplained:.0f} % of its output "
+            "differs from the response in motion; responses are invalid until it has moved for two windows"
         )
         self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
 
@@ -124,7 +124,7 @@ class Standstill:
 
 
 def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
-    """Numbers of the samples, from `first` on, at which motor or cart changes its direction, or all but stands."""
+    """Numbers of the samples, from `first` on, at which motor or cart reverses or is nearly at standstill."""
     at, end = first - chunk.start, chunk.stop - chunk.start
     changes = np.zeros(max(end - at - 1, 0), dtype=np.bool_)
     for velocity in (chunk.y[at:end], left.cart[at:end]):
@@ -134,7 +134,7 @@ def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
 
 
 def without(velocity: Floats, held: list[Stretch], chunk: Chunk, window: int) -> Floats:
-    """The residual with NaN where friction holds and a window to either side: its drift has a kink there."""
+    """The residual with NaN where friction stops the axis and a window to either side: its drift has a kink there."""
     left = velocity.copy()
     for stretch in held:
         left[max(stretch.first - window - chunk.start, 0) : max(stretch.last + window + 1 - chunk.start, 0)] = np.nan

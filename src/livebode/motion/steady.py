@@ -1,4 +1,4 @@
-"""Which windows belong to a steady motion."""
+"""Windows of steady motion."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from livebode.motion.chunk import Chunk
 
 _UNEVEN = 0.1
 _STANDING = 0.5
-FLAT_M = 1e-3  # a chunk that travels less has no curves to fit
+FLAT_M = 1e-3  # a chunk with less travel has no curves to fit
 
 
 def steady_rows(sample: NDArray[np.int64], chunk: Chunk, window: int) -> NDArray[np.bool_]:
-    """Rows during whose window, and the window before it, the axis travelled evenly and about as fast as it does.
+    """Rows whose window and the previous one have a constant speed that is near the usual one.
 
-    Elsewhere accelerations ring, and dry friction may hold. Even is a travel of the two windows that differs by up to
-    10 % of it from twice that of one; about as fast is half the farthest travel of the stretch, and more than 1 mm.
+    Elsewhere accelerations excite oscillations, and dry friction may stop the axis. Constant: the travel of the two
+    windows differs by up to 10 % from twice that of one. Near the usual speed: at least half of the farthest travel of
+    the stretch, and more than 1 mm.
     """
     x, last = chunk.x, sample - chunk.start
     known = last >= 2 * window

@@ -23,10 +23,10 @@ class Waiting:
         self._parts.append(responses)
 
     def take(self, stop: int) -> Responses:
-        """Those whose newest sample is before `stop`, which wait no longer."""
+        """Remove and return those whose newest sample is before `stop`."""
         whole = Responses.join(self._parts)
         count = int(np.searchsorted(whole.sample, stop))
-        # Joining copies, so that what was taken does not stay in memory behind a view.
+        # Joining copies, so that the removed responses do not remain in memory behind a view.
         self._parts = [Responses.join([whole[count:]])]
         return whole[:count]
 

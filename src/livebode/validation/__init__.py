@@ -1,4 +1,4 @@
-"""Fitted models judged on fresh data."""
+"""Validation of fitted models on independent data."""
 
 from livebode.validation.correlation import LIMIT, SMALL, Correlation
 from livebode.validation.validate import Validation, validate

@@ -1,4 +1,4 @@
-"""The response of a system in s to a long recording, exact behind its hold, without a polynomial in z."""
+"""Response of a system in s to a long recording, exact behind its hold, without a polynomial in z."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Complex = NDArray[np.complex128]
 def respond(
     transfer: Transfer, u: Floats, rate_hz: float, delay_ticks: float = 0.0, hold: str = "zero-order"
 ) -> Floats:
-    """Output of the system from rest, its input u standing between ticks or, with hold "none", joined by lines.
+    """Output of the system from rest, its input u held between ticks or, with hold "none", joined by lines.
 
-    The poles stand in a chain, each driven by the one before and the integrators last: x_k = u/Π(s − p_j), j ≤ k. Its
+    The poles form a chain, each driven by the previous one, with the integrators last: x_k = u/Π(s − p_j), j ≤ k. Its
     matrix is triangular, so the exact step over one tick is done state by state, each a recursion of first order.
     Coefficients of the whole denominator would split a double pole at z = 1 by 1e-8, which drifts in a long recording;
     partial fractions lose as many digits where a pole is nearly an integrator.
@@ -25,11 +25,11 @@ def respond(
     Parameters
     ----------
     transfer
-        A single one, whose coefficients have no further axes.
+        A single system, whose coefficients have no further axes.
     u
         Shape (samples,).
     delay_ticks
-        ≥ 0; with hold "none" rounded to whole ticks. Before its first sample u is taken as that.
+        ≥ 0; with hold "none" rounded to whole ticks. Before its first sample u has the first value.
     hold
         "zero-order" or "none".
 
@@ -58,7 +58,7 @@ def respond(
 
 
 def _held(poles: Complex, late: float) -> list[Complex]:
-    """Step of the chain over one tick, and what this input and the one of the tick before push."""
+    """Step of the chain over one tick, and the effect of this input and that of the previous tick."""
     soon, before = _step(poles, 1 - late, 1), _step(poles, late, 1)
     states = len(poles)
     return [
@@ -69,14 +69,14 @@ def _held(poles: Complex, late: float) -> list[Complex]:
 
 
 def _lines(poles: Complex) -> list[Complex]:
-    """The same where the input runs straight to the next one: step, and what both ends push."""
+    """The same for a linear input between ticks: step, and the effect of both ends."""
     whole, states = _step(poles, 1.0, 2), len(poles)
     rising = whole[:states, states + 1]
     return [whole[:states, :states], whole[:states, states] - rising, rising]
 
 
 def _step(poles: Complex, ticks: float, powers: int) -> Complex:
-    """exp of the chain with as many powers of time as inputs below it."""
+    """Matrix exponential of the chain with as many powers of time as inputs."""
     states = len(poles)
     chain = np.zeros((states + powers, states + powers), dtype=np.complex128)
     chain[range(states), range(states)] = poles
@@ -88,7 +88,7 @@ def _step(poles: Complex, ticks: float, powers: int) -> Complex:
 
 
 def _weights(transfer: Transfer, poles: Complex, rate_hz: float) -> Complex:
-    """Of the chain's states in the output: N(s) in Newton's form, by division through one factor after the other."""
+    """Weights of the chain's states in the output: N(s) in Newton's form, by successive division by each factor."""
     rest = (transfer.numerator / transfer.denominator[0]).astype(np.complex128)
     found = np.zeros(len(poles), dtype=np.complex128)
     for k in range(len(poles) - 1, -1, -1):

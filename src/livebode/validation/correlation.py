@@ -1,4 +1,4 @@
-"""The correlation of a residual with a signal, and how large it may be by chance."""
+"""Correlation of a residual with a signal, and its limit by chance."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scipy import linalg, signal, stats
 Floats = NDArray[np.float64]
 
 LIMIT = 2.17
-"""Of a normal number: 97 % lie within so many sigma."""
+"""Normal quantile: 97 % are within this many sigma."""
 SMALL = 0.1
-"""Of the output that follows the driving signal: a model that misses less is wrong by a small error, however sure."""
+"""Share of the driven output: a model that misses less has a small error, even if it is significant."""
 
-_WINDOW_SHARE = 10  # of the samples: how far the residual's own correlation is taken in
+_WINDOW_SHARE = 10  # of the samples: range of lags of the residual's autocorrelation
 _RANK = 1e-3  # of the largest variance of a combination of lags; below it is rounding
-_SHOWS = 2.0  # times what chance makes: an error that the chi² finds nearly always
+_SHOWS = 2.0  # times the effect of chance: an error that the chi² finds nearly always
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,25 +27,25 @@ class Correlation:
     Attributes
     ----------
     name
-        Of the signal.
+        Name of the signal.
     lags
         In samples, (lags,): at a positive lag the residual comes after the signal.
     value
         r(τ) = Σ ε(t + τ)·x(t)/√(Σε²·Σx²), (lags,).
     limit
-        2.17 sigma at each lag, for a residual that is independent of the signal but not white, and a model whose
-        parameters are known as well as the fit says, (lags,).
+        2.17 sigma at each lag, for a residual that is independent of the signal but not white, and a model with the
+        covariance of the fit, (lags,).
     white_limit
         2.17/√L.
     judged
-        Lags that can tell a wrong model, (lags,).
+        Lags that can detect a wrong model, (lags,).
     p
         Probability that a true model's correlations at the judged lags, taken together, are as large.
     missed
-        |ε|/|y|, of both the part only that follows the signal over the judged lags: what the model gets wrong of what
-        the signal makes, whatever else is in the output.
+        |ε|/|y|, of both only the part that follows the signal over the judged lags: relative error of the model in the
+        output due to the signal, independent of other parts of the output.
     resolution
-        The `missed` that would show: twice what chance and the fit's own error make.
+        Smallest detectable `missed`: twice the effect of chance and the fit's own error.
     """
 
     name: str
@@ -60,17 +60,17 @@ class Correlation:
 
     @property
     def share(self) -> float:
-        """Of the judged lags inside `limit`."""
+        """Share of the judged lags inside `limit`."""
         return float(np.mean(np.abs(self.value) <= self.limit, where=self.judged))
 
     @property
     def white_share(self) -> float:
-        """Of the judged lags inside `white_limit`."""
+        """Share of the judged lags inside `white_limit`."""
         return float(np.mean(np.abs(self.value) <= self.white_limit, where=self.judged))
 
     @property
     def largest(self) -> float:
-        """Largest size at a judged lag."""
+        """Largest absolute value at a judged lag."""
         return float(np.max(np.abs(self.value), where=self.judged, initial=0.0))
 
 
@@ -87,8 +87,8 @@ def correlation(
     """Correlation of `residual` with `x` at lags −lags … lags.
 
     The variance under a true model is Bartlett's, Σ ρ_ε(k)·ρ_x(k)/L: 1/L for a white residual whatever the signal's
-    colour. ρ_ε is taken in through a Parzen window of a tenth of the samples. The fit's own error adds J·P·Jᵀ: a wrong
-    parameter leaves its share of the signal in the residual.
+    colour. ρ_ε is estimated with a Parzen window of a tenth of the samples. The fit's own error adds J·P·Jᵀ: the error
+    of a parameter leaves a part of the signal in the residual.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def correlation(
         Of the simulated output by each parameter in its sigmas, (samples, parameters), and those parameters'
         correlation matrix.
     first_judged
-        Lowest lag that can tell a wrong model; −lags for all.
+        Lowest lag that can detect a wrong model; −lags for all.
     """
     count = len(residual)
     scale = np.sqrt(np.dot(residual, residual) * np.dot(x, x))
@@ -151,7 +151,7 @@ def _chance(residual: Floats, x: Floats, lags: int) -> Floats:
 
 
 def _following(own: Floats, with_x: Floats, spread: Floats) -> tuple[float, float]:
-    """Norm of the part that follows x, by least squares, and the norm that a spread of the sums `with_x` makes."""
+    """Norm of the part that follows x, by least squares, and the norm due to a spread of the sums `with_x`."""
     size, turned = np.linalg.eigh(own)
     kept = size > _RANK * size[-1]
     turned, size = turned[:, kept], size[kept]

@@ -1,4 +1,4 @@
-"""A fitted model driven by a recording: what it says of the output, and how that moves with its parameters."""
+"""A fitted model driven by a recording: simulated output, and its slopes by the parameters."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Floats = NDArray[np.float64]
 
 _STEP = 1e-3  # of a parameter's sigma
 _RINGS_OUT = 1e-12
-_AT_REST = 1e-5  # of a pole times the recording's length: slower ones are integrators to it
+_AT_REST = 1e-5  # of a pole times the recording's length: slower ones act as integrators
 
 
 class Simulated(NamedTuple):
-    """What a model makes of a recording.
+    """Result of the simulation of a recording.
 
     Attributes
     ----------
     known
-        The samples whose input is in the recording; a delay takes some off its start, a negative one off its end.
+        The samples whose input is in the recording; a delay excludes some at its start, a negative one at its end.
     output, residual
         Of the model, with start, offset and drift as fitted, and measured less that, (known samples,).
     slopes
@@ -49,18 +49,17 @@ class Simulated(NamedTuple):
 def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
     """The model driven by u, against y.
 
-    What a recording does not say of the model's state is fitted by least squares: the free motion of each pole, and a
-    polynomial of as high a degree as the plant has integrators, which is what a constant load (dry friction in one
-    direction, gravity) does to it. A handful of columns against thousands of samples, they take nothing that could tell
-    a wrong model. They are taken off measured and simulated output alike, and unlike differencing or a high-pass they
-    leave a white residual white.
+    The unknown state of the model is fitted by least squares: the free motion of each pole, and a polynomial whose
+    degree is the plant's number of integrators, which is the effect of a constant load (dry friction in one direction,
+    gravity). These are a few columns for thousands of samples, so they hide no error of the model. They are subtracted
+    from the measured and the simulated output, and unlike differencing or a high-pass they keep a white residual white.
 
     Raises
     ------
     FitError
         If the fit failed.
     SignalError
-        If there are fewer samples than ten times what is to be found.
+        If there are fewer samples than ten times the number of unknowns.
     """
     if fit.status != "ok":
         raise FitError(
@@ -78,7 +77,7 @@ def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
             samples=len(own),
             samples_min=10 * own.shape[1],
         )
-    # A constant input makes only motions that are fitted anyway, and its mean makes the largest numbers.
+    # The effect of a constant input is fitted anyway, and its mean would give the largest numbers.
     u = u - np.mean(u)
     forced = _forced(fit, values, u)[known]
     slopes = np.zeros((len(forced), len(values)))
@@ -100,7 +99,7 @@ def _forced(fit: Fit, values: Floats, u: Floats) -> Floats:
 
 
 def _unforced(fit: Fit, values: Floats, samples: int) -> Floats:
-    """The motions of the model that no input makes, and a constant load's, shape (samples, motions)."""
+    """The free motions of the model, and that of a constant load, shape (samples, motions)."""
     transfer, _ = _parts(fit, values)
     place = np.linspace(-1.0, 1.0, samples)
     poles = transfer.poles()

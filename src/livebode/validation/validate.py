@@ -1,4 +1,4 @@
-"""A fitted model judged on fresh data."""
+"""Validation of a fitted model on independent data."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from livebode.validation.simulate import Simulated, simulate
 Floats = NDArray[np.float64]
 Verdict = Literal["passes", "small error", "fails", "cannot be judged"]
 
-_ALPHA = 0.03  # the other side of 97 %
+_ALPHA = 0.03  # complement of 97 %
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """What fresh data say of one model.
+    """Result of the validation of one model.
 
     Attributes
     ----------
     model
         Its name.
     samples
-        L, how many samples were used.
+        L, the number of samples used.
     fit_percent
         100·(1 − |ε|/|y|), norms over the samples, without start, offset and drift in either.
     residual_sigma
@@ -38,7 +38,7 @@ class Validation:
     correlations
         With u, ŷ and, where the excitation is known, w.
     judged_by
-        Names of the correlations that count for the verdict.
+        Names of the correlations that decide the verdict.
     simulated, measured, rate_hz, output
         For the picture; `output` is the channel's name with its unit.
     """
@@ -57,12 +57,12 @@ class Validation:
 
     @property
     def verdict(self) -> Verdict:
-        """What the correlations, their size and the fit come to.
+        """The verdict from the correlations, their size and the fit.
 
-        "passes": no correlation that chance would not make; "small error": one, but the model misses less than a tenth
-        of what follows the driving signal; "fails": it misses more, and more than chance or the rest of the residual
-        make; "cannot be judged": neither, or the residual is as large as the output, or an error as large as what
-        follows the driving signal would not have shown.
+        "passes": no significant correlation; "small error": a significant one, but the model misses less than a tenth
+        of the output due to the driving signal; "fails": it misses more, and more than chance or the rest of the
+        residual explain; "cannot be judged": neither, or the residual is as large as the output, or an error as large
+        as the output due to the driving signal would not have been detected.
         """
         counted, by = self._counted, self.driven_by
         found = any(c.p < _ALPHA / len(counted) for c in counted)
@@ -75,19 +75,19 @@ class Validation:
 
     @property
     def sentence(self) -> str:
-        """The verdict for people."""
+        """The verdict as text."""
         by = self.driven_by
         rest = {
-            "passes": "nothing of what is left follows the signals, and missing "
-            f"{_percent(by.resolution)} of what follows {by.name} would have shown",
+            "passes": "the residual does not follow the signals, and missing "
+            f"{_percent(by.resolution)} of what follows {by.name} would have been detected",
             "small error": f"the model misses {_percent(by.missed)} of what follows {by.name}, less than a tenth",
-            "fails": f"the model misses {_percent(by.missed)} of what follows {by.name}: it lacks something or is of "
-            "another machine",
+            "fails": f"the model misses {_percent(by.missed)} of what follows {by.name}: it is incomplete or belongs "
+            "to another machine",
             "cannot be judged": self._why_not,
         }[self.verdict]
         found = f"{self.model} {self.verdict}: {rest} (fit {self.fit_percent:.1f} %)"
         if self.doubtful and self.verdict in ("small error", "fails"):
-            found += "; in a loop the colour of the noise alone may do that: name the excitation to be sure"
+            found += "; in a loop, coloured noise alone can cause this: specify the excitation to be sure"
         return found
 
     @property
@@ -99,18 +99,19 @@ class Validation:
     def _why_not(self) -> str:
         if self.fit_percent <= 0:
             return (
-                "the residual is no smaller than the output, so friction, drift, motion or noise rules this recording "
-                "and not what the model describes; hold the machine still or excite it more"
+                "the residual is not smaller than the output, so friction, drift, motion or noise dominates this "
+                "recording, not the modelled response; keep the machine at standstill or increase the excitation"
             )
         by = self.driven_by
         return (
-            f"in this noise, or with parameters this uncertain, only missing {_percent(by.resolution)} of what follows "
-            f"{by.name} would show, and {_percent(by.missed)} is missed; excite more, record longer or fit a longer run"
+            f"with this noise, or parameters this uncertain, only missing {_percent(by.resolution)} of what follows "
+            f"{by.name} can be detected, and {_percent(by.missed)} is missed; increase the excitation, record longer "
+            "or fit a longer run"
         )
 
     @property
     def doubtful(self) -> bool:
-        """Whether u and ŷ had to judge a residual that is not white: in a loop they may then fail a true model."""
+        """Whether a residual that is not white was judged by u and ŷ: in a loop these may then reject a true model."""
         return self.whiteness < _ALPHA and "w" not in self.judged_by
 
     @property
@@ -160,16 +161,16 @@ def validate(
     loop: Loop | None = None,
     lags: int = 40,
 ) -> Validation:
-    """Judge a fit by samples that it was not made from.
+    """Validate a fit with samples that it was not fitted to.
 
     The model is driven by the recorded u; the residual ε = y − ŷ is correlated with u, with ŷ and, where it is known,
-    with the excitation w. In a loop u and ŷ carry the noise of before: they are correlated with ε at lags at which ε
-    comes first, in every healthy loop, and where ε is not white at the others too. So with u and ŷ only lags from 1 on
-    are judged; the excitation knows nothing of the noise, and all its lags are.
+    with the excitation w. In a loop u and ŷ contain earlier noise: they are correlated with ε at lags at which ε is
+    earlier, in every healthy loop, and if ε is not white at the others too. So for u and ŷ only lags from 1 on are
+    judged; the excitation is independent of the noise, so all its lags are judged.
 
     A white residual is judged by u, ŷ and w, one that is not by w alone where it is known.
 
-    Bias: parameters of a machine that moves or changes during `block` are no constants, and the verdict is then of
+    Bias: parameters of a machine that moves or changes during `block` are not constant, and the verdict is then of
     their mean.
 
     Parameters
@@ -177,13 +178,13 @@ def validate(
     fit
         Of other data; its covariance widens the limits.
     block
-        Fresh samples, without gaps and numbers that are not finite.
+        Independent samples, without gaps and non-finite numbers.
     input, output, excitation
         Names of its channels.
     loop
-        For the ticks between the signals' logging; the normal record by default.
+        Gives the ticks between the logging of the signals; the normal record by default.
     lags
-        How far, on both sides.
+        Largest lag on both sides.
 
     Raises
     ------
@@ -237,21 +238,21 @@ def _percent(share: float) -> str:
 
 
 def _aligned(signals: dict[str, Floats], loop: Loop) -> dict[str, Floats]:
-    """So that all samples with one index speak of one tick."""
+    """Align the signals, so that all samples with one index refer to the same tick."""
     ahead = {role: loop.advance_ticks(role) for role in signals}  # type: ignore[arg-type]
     least, most = min(ahead.values()), max(ahead.values())
     return {role: x[ahead[role] - least : len(x) - (most - ahead[role])] for role, x in signals.items()}
 
 
 def _correlated(fit: Fit) -> Floats:
-    """Correlation matrix of the fit's parameters, nought for those that were held."""
+    """Correlation matrix of the fit's parameters, zero for fixed ones."""
     sigma = fit.parameters.sigma[0]
     unit = np.where(sigma > 0, sigma, 1.0)
     return np.asarray(fit.parameters.covariance[0] / np.outer(unit, unit))
 
 
 def _check(signals: dict[str, Floats], names: dict[str, str], count: int, lags: int) -> None:
-    """SignalError for signals that no model can be validated with."""
+    """Raise SignalError for signals that cannot validate a model."""
     if count < 10 * lags:
         raise SignalError(
             "too-short",
@@ -273,7 +274,7 @@ def _check(signals: dict[str, Floats], names: dict[str, str], count: int, lags: 
         if np.ptp(x) == 0:
             raise SignalError(
                 "channel-constant",
-                f"channel {names[role]!r} is constant, which validates no model",
+                f"channel {names[role]!r} is constant, so it cannot validate a model",
                 "record it while the excitation is on",
                 channel=names[role],
                 role=role,
