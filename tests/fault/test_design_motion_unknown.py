@@ -40,7 +40,7 @@ def test_a_limit_on_what_nobody_knows_of_the_motion_is_refused_and_without_it_th
     others = {key: value for other in known for key, value in LIMIT[other].items()}
     design = choose(WISH, machine(known), Bearable(**others))
     (row,) = [choice for choice in design.choices if choice.what == f"peak {name}"]
-    assert "what the motion alone has is not given" in row.why
+    assert "the peak of the motion alone is not specified" in row.why
     assert design.plain()["predicted"][name]["motion_alone"] is None
     whole = choose(WISH, machine(MOTION), Bearable(**LIMIT[name]))
     excited = design.plain()["predicted"][name]

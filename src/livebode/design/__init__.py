@@ -1,4 +1,4 @@
-"""Experiments: an excitation for a machine, within its limits, with what it will tell."""
+"""Experiments: an excitation for a machine, within its limits, with the predicted accuracy."""
 
 from livebode.design.accuracy import Accuracy, accuracy_of
 from livebode.design.axis_file import axis_text

@@ -1,4 +1,4 @@
-"""How accurate each line becomes, and how long that takes."""
+"""Accuracy of each line, and the recording time that it needs."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from livebode.design.waveform import Waveform
 Floats = NDArray[np.float64]
 
 HOLDING_95 = sqrt(log(20))
-"""Sigmas of a bound that holds 95 % of complex errors: 1 − exp(−c²) = 0.95."""
+"""Sigmas of a bound that covers 95 % of complex errors: 1 − exp(−c²) = 0.95."""
 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """What noise leaves at each line of one window; shapes (lines,).
+    """Standard deviation due to noise at each line of one window; shapes (lines,).
 
     Attributes
     ----------
     sigma
-        Of the plant's response, E|Ĝ − G|² = sigma², at the place where it is largest against |G|.
+        Of the plant's response, E|Ĝ − G|² = sigma², at the place where it is largest relative to |G|.
     relative
         That sigma over |G| there.
     """
@@ -39,18 +39,18 @@ class Accuracy:
             raise UsageError(
                 "out-of-range",
                 f"{accuracy=} is not a number above 0",
-                "give it as a fraction of |G|, such as 0.05 for 5 %",
+                "specify it as a fraction of |G|, such as 0.05 for 5 %",
                 argument="accuracy",
                 value=accuracy,
             )
         return max(1, ceil((HOLDING_95 * float(self.relative.max()) / accuracy) ** 2 - 1e-9))
 
     def reached(self, windows: int) -> Floats:
-        """The 95 % bound of each line after so many windows, as a share of |G|."""
+        """The 95 % bound of each line after this number of windows, as a share of |G|."""
         return np.asarray(HOLDING_95 * self.relative / sqrt(windows))
 
     def factor_for(self, accuracy: float) -> float:
-        """By what factor the excitation must grow for that in one window; 0 without noise."""
+        """Factor on the excitation that reaches this accuracy in one window; 0 without noise."""
         return HOLDING_95 * float(self.relative.max()) / accuracy
 
 
@@ -58,8 +58,8 @@ def accuracy_of(waveform: Waveform, machine: Machine) -> Accuracy:
     """Sigma of one window of the joint or indirect estimate, sigma² = N·σ²/|U_k|², worst over the places.
 
     For white noise of standard deviation σ on the output, to first order in noise over signal, in the periodic state.
-    Near a lightly damped resonance it comes out up to 1.4 times larger in windows of a tenth of a second; what motion
-    changes within a window is not in it.
+    Near a lightly damped resonance the real value is up to 1.4 times larger in windows of a tenth of a second; the
+    effect of motion within a window is not included.
     """
     f = waveform.lines.frequency_hz
     seen = waveform.amplitude * waveform.lines.window / 2

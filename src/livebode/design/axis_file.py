@@ -25,7 +25,7 @@ def axis_text(
     Parameters
     ----------
     design
-        Gives lines, window, hop, and how responses and bounds are to be made.
+        Gives lines, window, hop, and the options for responses and bounds.
     signals
         Names of the recording's channels by role: excitation, input, output, schedule.
     log
@@ -35,7 +35,7 @@ def axis_text(
     motion
         The table [motion].
     tracking
-        What goes into [tracking] besides.
+        Further keys of [tracking].
     """
     lines, moves = design.waveform.lines, design.machine.stroke_s is not None
     averaged = design.windows > 1 and not moves
@@ -56,7 +56,7 @@ def axis_text(
         tables[f"loop.{name}" if isinstance(value, Mapping) else "loop"] = (
             value if isinstance(value, Mapping) else {**tables.get("loop", {}), name: value}
         )
-    head = f"# Made by `livebode design`; record {design.recording_s:.4g} s or more.\n"
+    head = f"# Written by `livebode design`; record {design.recording_s:.4g} s or more.\n"
     return head + "".join(f"\n[{name}]\n{_pairs(table)}" for name, table in tables.items())
 
 
@@ -77,7 +77,7 @@ def lines_text(lines: Lines) -> str:
 
 
 def _runs(bins: list[int]) -> list[list[int]]:
-    """Stretches of bins a constant step apart, each as start, stop and step, or alone."""
+    """Ranges of bins with a constant step, each as start, stop and step, or single bins."""
     runs: list[list[int]] = []
     at = 0
     while at < len(bins):
@@ -99,7 +99,7 @@ def _pairs(table: Mapping[str, Any]) -> str:
 
 
 def _value(value: Any) -> str:
-    """As TOML: JSON's strings, booleans and numbers are TOML's, but for infinity."""
+    """As TOML: JSON's strings, booleans and numbers are valid TOML, except infinity."""
     if isinstance(value, float):
         return repr(value)
     return json.dumps(value, ensure_ascii=False)

@@ -13,16 +13,16 @@ from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 Floats = NDArray[np.float64]
 
 _PLACES = 9
-_STANDING_S = 2.0  # of the simulation that finds what the noise alone does
-_DRY = "dry friction is left out: an axis that stands is moved less than predicted, and its responses are biased"
+_STANDING_S = 2.0  # of the simulation that finds the effect of the noise alone
+_DRY = "dry friction is not included: at standstill the axis moves less than predicted, and its responses are biased"
 
 
 def belt_machine(axis: BeltAxis) -> Machine:
     """The Machine that `axis` is, with its friction, noise and motion but without its own excitation.
 
-    Nine places along the motion's way, or the one where it stands. The motion's own peaks are those of a cycle behind
-    another one, simulated without excitation: the first begins at rest, and ends in smaller ones. Left out: how dry
-    friction answers the excitation, and the images that the slower loops throw (1e-6).
+    Nine places along the motion's travel, or the one of the standstill. The motion's own peaks are those of a second
+    cycle, simulated without excitation, because the first one begins at rest and has smaller peaks. Not included: the
+    effect of the excitation on dry friction, and the images due to the slower loops (1e-6).
     """
     check_noise(axis.sensor.noise_rad_per_s)
     quiet = replace(axis, excitation_n_m=np.zeros(0), faults=(), run_in_s=0.0)
@@ -53,7 +53,9 @@ def belt_machine(axis: BeltAxis) -> Machine:
 
 
 def _extremes(observed: dict[Quantity, Floats], here: NDArray[np.bool_], at_m: float) -> Extremes:
-    if not here.any():  # a place that the cart never reached by half the distance to the next: as if it stood there
+    if (
+        not here.any()
+    ):  # a place that the cart never approached within half the distance to the next: as at standstill there
         return STANDING | {"travel": (at_m, at_m)}
     return {name: (float(x[here].min()), float(x[here].max())) for name, x in observed.items()}
 

@@ -1,4 +1,4 @@
-"""From a wish, a machine and its limits to an experiment, with the reasons."""
+"""From a specification, a machine and its limits to an experiment, with the reasons."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ from livebode.design.waveform import Waveform
 from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
 
-# Of the room that the limits leave: what the prediction may err by.
+# Of the room that the limits leave: reserve for errors of the prediction.
 _RESERVE = 0.1
-_WITHOUT_NOISE = 0.1  # of the room, where nothing says how much is needed
-# From rest the position drifts further than in the periodic state; brought in so slowly, by 3 % (studies/design.py).
+_WITHOUT_NOISE = 0.1  # of the room, where the required amplitude is not known
+# From rest the position drifts further than in the periodic state; with this ramp, by 3 % (studies/design.py).
 _RAMP_S = 0.5
-_STROKES_MIN = 2  # there and back
+_STROKES_MIN = 2  # forward and return
 _LONG_S = 3600.0
 _TRIES = 100  # to find an amplitude that passes when rounded to the drive's steps
-_WINDOWS_MIN = 10  # sigma is learned from the scatter between periods, and needs some
+_WINDOWS_MIN = 10  # sigma is estimated from the scatter between periods, which needs several
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """An experiment: the excitation, what it does, and what it will tell.
+    """An experiment: the excitation, its effect on the machine, and the predicted accuracy.
 
     Attributes
     ----------
     waveform
-        The excitation as it is to be played.
+        The excitation as the drive plays it.
     amplitude_n_m
         Of each line, chirp, step or bit; of shaped lines their rms, of listed ones the list.
     limits, peaks
-        What is borne, and what is predicted at each place.
+        Limits of the machine, and the predicted peaks at each place.
     accuracy, windows
-        What one window tells, and how many bring every line's 95 % bound within `wish.accuracy`.
+        Accuracy of one window, and the number of windows that brings every line's 95 % bound within `wish.accuracy`.
     recording_s
-        How long to record for that.
+        Recording time for that.
     hop
         Samples between responses.
     choices
@@ -68,7 +68,7 @@ class Design:
 
     @property
     def ramp_s(self) -> float:
-        """In how long to bring the excitation in, whole periods: the peaks are those of the periodic state."""
+        """Duration of the ramp of the excitation, whole periods: the peaks are those of the periodic state."""
         return self.waveform.ramp_periods * self.waveform.lines.window / self.waveform.lines.rate_hz
 
     @property
@@ -106,19 +106,19 @@ class Design:
 
 
 def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Design:
-    """The experiment for a wish: lines and window by the resolution, amplitude by accuracy and limits, then the rest.
+    """The experiment for a specification: lines and window by the resolution, amplitude by accuracy and limits.
 
     Raises
     ------
     LivebodeError
-        If a limit would be broken (with the largest amplitude that passes), the grid has no such lines, a crest factor
-        is not reached, or nothing is left of the excitation in the drive's steps.
+        If a limit would be exceeded (with the largest amplitude that passes), the grid has no such lines, a crest
+        factor is not reached, or the excitation vanishes in the drive's steps.
     """
     limits = limits or Bearable()
     check_known(machine, limits)
     found = grid(wish, machine.rate_hz)
     unit = unit_waveform(wish, found, machine)
-    of_unit = peaks(unit, machine)  # refused where it has power beyond what is known of the machine
+    of_unit = peaks(unit, machine)  # rejected where it has power outside of the known band of the machine
     factor, why = _factor(wish, unit, of_unit, machine, limits)
     waveform = _played(wish, unit, factor)
     predicted = peaks(waveform, machine)
@@ -169,10 +169,10 @@ def _played(wish: Wish, unit: Waveform, factor: float) -> Waveform:
 
 
 def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: Machine, limits: Bearable) -> float:
-    """A factor near the largest whose excitation keeps to the limits, in four digits; 0 where there is none.
+    """A factor near the largest whose excitation is within the limits, in four digits; 0 where there is none.
 
-    `share` is the room at the factor that does not. Rounding to the drive's steps is not linear: what the peaks at one
-    factor promise may fail at another.
+    `share` is the room at the factor that is not. Rounding to the drive's steps is not linear: a factor predicted from
+    the peaks at another one may fail.
     """
     for _ in range(_TRIES):
         if share <= 0:
@@ -190,7 +190,7 @@ def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: M
 def _factor(
     wish: Wish, unit: Waveform, of_unit: tuple[Peak, ...], machine: Machine, limits: Bearable
 ) -> tuple[float, str]:
-    """What the unit waveform is to be multiplied by, and why."""
+    """Factor of the unit waveform, and the reason."""
     if wish.amplitude_n_m is not None:
         return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
     largest, first = room(of_unit, limits)
@@ -203,23 +203,23 @@ def _factor(
             raise DesignError(
                 "amplitude-undetermined",
                 "neither noise nor limits are known, so no amplitude can be chosen",
-                "give the amplitude, the noise, or a limit",
+                "specify the amplitude, the noise, or a limit",
                 argument="amplitude_n_m",
             )
-        return largest * _WITHOUT_NOISE, "a tenth of what the limits leave; nothing says how much noise there is"
+        return largest * _WITHOUT_NOISE, "a tenth of the room within the limits, because the noise is not known"
     if needed <= allowed:
         rounded = "" if wish.resolution_n_m is None else ", before rounding"
-        return needed, f"the least for {100 * wish.accuracy:g} % at every line in one window{rounded}"
+        return needed, f"the smallest for {100 * wish.accuracy:g} % at every line in one window{rounded}"
     assert first is not None
-    return allowed, f"the most that the {first.quantity} bears, less {100 * _RESERVE:g} %"
+    return allowed, f"the largest within the {first.quantity} limit, less {100 * _RESERVE:g} %"
 
 
 def _recording(waveform: Waveform, machine: Machine, windows: int) -> tuple[float, str]:
-    """How long, and why."""
+    """Recording time, and the reason."""
     if machine.stroke_s is not None:
         strokes = max(windows, _STROKES_MIN)
         return strokes * machine.stroke_s, f"{strokes} strokes: each passes every place once"
     many = max(windows, _WINDOWS_MIN)
-    why = "averaged" if windows > _WINDOWS_MIN else "to learn sigma from"
+    why = "averaged" if windows > _WINDOWS_MIN else "to estimate sigma"
     seconds = (many + 1) * waveform.lines.window / waveform.lines.rate_hz
     return seconds, f"{many} windows, {why}, and one before the first is whole"

@@ -1,4 +1,4 @@
-"""How far each line moves the motor, in counts of its encoder."""
+"""Amplitude of each line at the motor, in counts of its encoder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def encoder_counts(waveform: Waveform, machine: Machine) -> Floats | None:
 
     None where the encoder's step is not known. Of the linear machine in the periodic state. The rounding of an axis
     that moves over many counts within a window is noise, which averaging reduces; that of an axis at standstill
-    repeats with the excitation, and no average shows it.
+    repeats with the excitation, and averaging does not reduce it.
     """
     if machine.encoder_step_m == 0:
         return None
@@ -29,7 +29,7 @@ def encoder_counts(waveform: Waveform, machine: Machine) -> Floats | None:
 
 
 def encoder_words(counts: Floats, frequency_hz: Floats, *, moves: bool) -> tuple[str, str]:
-    """The weakest line in counts, and what that means, for the table of a design."""
+    """The weakest line in counts, and its verdict, for the table of a design."""
     weakest, small = int(np.argmin(counts)), int(np.count_nonzero(counts < COUNTS_MIN))
     value = f"{counts[weakest]:.2g} counts at {frequency_hz[weakest]:g} Hz"
     if not small:

@@ -1,4 +1,4 @@
-"""The table that explains a design: what was chosen, and why."""
+"""The table that explains a design: chosen values and reasons."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Choice:
 
 
 def explained(design: Design, found: Grid, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
-    """The table: what was chosen, and why."""
+    """The table: chosen values and reasons."""
     waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
     f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
     spacing = f"{np.diff(f).min():g} Hz apart or more" if len(f) > 1 else "alone"
@@ -85,13 +85,13 @@ def _amplitude(design: Design) -> str:
 
 
 def _limit_row(peak: Peak, limits: Bearable) -> Choice:
-    """The peak beside its limit, and what of it the motion alone has."""
+    """The peak with its limit, and the peak of the motion alone."""
     low, high = limits.of(peak.quantity)
     borne = "no limit"
     if limits.limited(peak.quantity):
         borne = f"limits {low:g} … {high:g}" if peak.quantity == "travel" else f"limit {high:g}"
     if peak.own is None:
-        why = f"of the excitation; {borne}; what the motion alone has is not given"
+        why = f"of the excitation; {borne}; the peak of the motion alone is not specified"
     else:
         why = f"{borne}; the motion alone {_size(peak.quantity, *peak.own)}"
     where = f", {peak.place}" if peak.place else ""

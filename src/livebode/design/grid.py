@@ -1,4 +1,4 @@
-"""Which lines, on which grid."""
+"""Choice of the lines and the grid."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
-_GROUP = 4  # odd bins of which one is not excited
+_GROUP = 4  # odd bins in a group of which one is not excited
 _BITS_PER_PERIOD = 2.5  # of the band's upper end: a PRBS has lost 2.4 dB there, and its first zero is well above
 _HOP_NEAR = 1.25  # times a twentieth of the window, or that part of it
-_LONGER_MAX = 1.05  # than the resolution asks for, to find a window that a hop divides
-_LINES_MAX = 5000  # each has so small a share of what the limits bear that more tell nothing
-_WORTH_FACTORS = 1000  # a window named by lines typed with many digits is no one's wish beyond this many times the rate
+_LONGER_MAX = 1.05  # than the resolution requires, to find a window that a hop divides
+_LINES_MAX = 5000  # with more lines, the share of each within the limits is too small
+_WORTH_FACTORS = 1000  # a longer window, due to lines typed with many digits, is not intended (times the rate)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Lines with their window, why they are these, and for a PRBS how it is made."""
+    """Lines with their window, the reason for them, and the parameters of a PRBS."""
 
     lines: Lines
     window_why: str
@@ -37,17 +37,17 @@ class Grid:
     held_ticks: int = 1
     base: Lines | None = None  # of a stepped sine: the grid of one step
     periods: int = 0  # of each step
-    mains: tuple[int, ...] = ()  # bins of the band that were left out for the mains
+    mains: tuple[int, ...] = ()  # bins of the band that are not used because of the mains
 
 
 def grid(wish: Wish, rate_hz: float) -> Grid:
-    """The lines and the window that a wish asks for.
+    """The lines and the window of a specification.
 
     Raises
     ------
     GridError
         If the band is not below the Nyquist frequency, the lines are closer than any window resolves or more than
-        5,000, or given lines are off the grid of a given window; the sentence has the nearest choice.
+        5,000, or given lines are off the grid of a given window; the message has the nearest choice.
     """
     found = _found(wish, rate_hz)
     if len(found.lines) > _LINES_MAX:
@@ -56,7 +56,7 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
 
 
 def _too_many(wish: Wish, lines: Lines) -> GridError:
-    """With the order, or the resolution, that leaves few enough."""
+    """The error with the order, or the resolution, that gives few enough lines."""
     f, many = lines.frequency_hz, len(lines)
     facts: dict[str, float] = {}
     if wish.order is not None:
@@ -100,7 +100,7 @@ def _found(wish: Wish, rate_hz: float) -> Grid:
 
 
 def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: str) -> Grid:
-    """Odd bins: with every second one only even the excitation would repeat after half the window."""
+    """Odd bins: with even bins only, the excitation would repeat after half the window."""
     all_odd = odd_bins(low, high, rate_hz, window).tolist()
     if not all_odd:
         raise _no_line(low, high, _QUIET_BETWEEN, window, rate_hz)
@@ -116,14 +116,14 @@ def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: 
 
 
 def _without_mains(wish: Wish, bins: list[int], resolution_hz: float) -> tuple[list[int], tuple[int, ...]]:
-    """The bins away from the mains, and those left out for it; all of them where more than half would go."""
+    """The bins away from the mains, and the excluded ones; all bins where more than half would be excluded."""
     met = meets_mains(bins, resolution_hz, wish.mains_hz)
     left = [k for k, near in zip(bins, met) if not near]
     return (left, tuple(k for k, near in zip(bins, met) if near)) if 2 * len(left) >= len(bins) else (bins, ())
 
 
 def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -> GridError:
-    """Why the band holds none of these lines (every bin, or the odd ones), and what would."""
+    """Why the band has none of these lines (every bin, or the odd ones), and a band that has."""
     bin_hz, odd = rate_hz / window, apart - 1
     below = apart * floor((low / bin_hz - odd) / apart) + odd
     near = [k * bin_hz for k in (below, below + apart) if 0 < 2 * k < window]
@@ -188,7 +188,7 @@ def _of_text(wish: Wish, text: str, rate_hz: float) -> Grid:
         raise GridError(
             "window-missing",
             f"lines {text!r} count in bins, which need a window",
-            "give the window",
+            "specify the window",
             argument="window",
             lines=text,
         )
@@ -201,7 +201,7 @@ def _smallest_window(text: str, rate_hz: float) -> int:
     wanted = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
     unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in wanted)) if wanted else 1
     if not wanted or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
-        # Lines.parse says what cannot be read, or which line is off this grid and what would be near.
+        # Lines.parse reports what cannot be read, or which line is off this grid, with the nearest ones.
         return max(3, round(2 * rate_hz))
     bins = sorted({int(f * unit / Fraction(rate_hz)) for f in wanted})
     apart = min(np.diff(bins), default=_QUIET_BETWEEN)
@@ -209,7 +209,7 @@ def _smallest_window(text: str, rate_hz: float) -> int:
 
 
 def _numbers(item: str) -> list[str]:
-    """Start and step of a range, or a lone frequency; nothing that is not a number."""
+    """Start and step of a range, or a single frequency; empty for what is not a number."""
     parts = [part.strip() for part in item.split(":")]
     try:
         [Fraction(part) for part in parts]

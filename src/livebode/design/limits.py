@@ -1,4 +1,4 @@
-"""Limits come first: what the machine bears, and the largest excitation that keeps to it."""
+"""Limits of the machine, and the largest excitation within them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from livebode.design.peaks import Peak
 
 @dataclass(frozen=True, kw_only=True)
 class Bearable:
-    """What motor, mechanics and drive bear; what is left out is not limited.
+    """Limits of motor, mechanics and drive; an omitted quantity is not limited.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Bearable:
             )
 
     def of(self, quantity: Quantity) -> tuple[float, float]:
-        """Lowest and highest value that is borne."""
+        """Lowest and highest permitted value."""
         if quantity == "travel":
             return self.position_m_min, self.position_m_max
         most = {
@@ -71,7 +71,7 @@ class Bearable:
 
 
 def check_known(machine: Machine, limits: Bearable) -> None:
-    """DesignError where a quantity is limited of which nobody says what the motion alone does with it."""
+    """Raise DesignError for a limited quantity whose range in the motion alone is not specified."""
     for name in QUANTITIES:
         if limits.limited(name) and not all(name in place.motion for place in machine.places):
             raise DesignError(
@@ -84,9 +84,9 @@ def check_known(machine: Machine, limits: Bearable) -> None:
 
 
 def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]:
-    """By what factor the excitation may grow until the first limit is met, and which peak meets it.
+    """Factor on the excitation that reaches the first limit, and the peak that reaches it.
 
-    0 or less where the motion alone leaves no room; infinite, with None, where nothing is limited.
+    0 or less where the motion alone leaves no room; infinite, with None, without limits.
     """
     largest, first = inf, None
     for peak in found:
@@ -102,10 +102,10 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
 
 
 def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, passing: float) -> DesignError:
-    """Why a peak that leaves only this share of the excitation is rejected, and what would pass.
+    """Why a peak that leaves only this share of the excitation is rejected, and the remedy.
 
-    That is `passing`, an amplitude within the limits, 0 where there is none. Without an amplitude the lines have one
-    each, and it is what to multiply them by.
+    `passing` is an amplitude within the limits, 0 where there is none. Without an amplitude the lines have one each,
+    and it is their permitted factor.
     """
     low, high = limits.of(peak.quantity)
     unit, name = UNITS[peak.quantity], peak.quantity
@@ -127,7 +127,7 @@ def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, 
     else:
         what, remedy = f"an amplitude of {amplitude:.4g} N m gives", f"take at most {passing:.4g} N m"
     if passing <= 0:
-        remedy = "take finer steps of the drive: no smaller amplitude is left in these"
+        remedy = "take finer steps of the drive: no smaller amplitude is possible in these"
     return DesignError(
         "limit-exceeded",
         f"{what} a {name} of {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}",

@@ -1,4 +1,4 @@
-"""Machine: what an excitation does to an axis in its loop, place by place."""
+"""Machine: the effect of an excitation on an axis in its loop, at each place."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ MOTION_KEYS: Mapping[Quantity, str] = {
     "travel": "position_m",
     "following error": "following_error_m",
 }
-"""Under which key a file has the extremes of each in the motion alone."""
+"""Key of a file with the extremes of each quantity in the motion alone."""
 Extremes = dict[Quantity, tuple[float, float]]
 """Lowest and highest value of each quantity."""
 STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
-"""What an axis does that stands, nobody says where."""
+"""Motion of an axis at standstill at an unknown position."""
 
 _EDGE = 1e-9  # of a frequency: a line at the end of the band is inside
-_NOISE_MIN, _NOISE_MAX = 1e-15, 1e9  # beyond them is a slip of the pen
+_NOISE_MIN, _NOISE_MAX = 1e-15, 1e9  # values outside are typing errors
 
 
 def within(frequency_hz: ArrayLike, band_hz: tuple[float, float]) -> NDArray[np.bool_]:
-    """Which frequencies lie in a band, its ends included."""
+    """Frequencies within a band, ends included."""
     f = np.asarray(frequency_hz)
     return np.asarray((f >= band_hz[0] * (1 - _EDGE)) & (f <= band_hz[1] * (1 + _EDGE)))
 
 
 def check_noise(noise: float) -> None:
-    """UsageError where no output has noise of this standard deviation."""
+    """Raise UsageError for a standard deviation that no output has."""
     if not (noise == 0 or _NOISE_MIN <= noise <= _NOISE_MAX):
         raise UsageError(
             "out-of-range",
             f"noise={noise} is not 0 or from {_NOISE_MIN:g} to {_NOISE_MAX:g}",
-            "give its standard deviation",
+            "specify its standard deviation",
             argument="noise",
             value=noise,
         )
@@ -52,7 +52,7 @@ def check_noise(noise: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """The linear machine at one place of its way, sampled behind the hold of its drive.
+    """The linear machine at one place of its travel, sampled behind the hold of its drive.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Place:
     speed, travel, angle
         From torque to the belt's speed at the motor, m/s, the load's position, m, and the motor's position, m.
     motion
-        What the motion alone does near this place; a quantity that is left out is not known.
+        Ranges in the motion alone near this place; an omitted quantity is not known.
     name
         In words.
     """
@@ -76,12 +76,12 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """An axis in its loop, as far as an experiment has to know it.
+    """The description of an axis in its loop that an experiment needs.
 
     Parameters
     ----------
     places
-        One for an axis that stands, several along the way of one that moves.
+        One for an axis at standstill, several along the travel of a moving one.
     loop
         u = E·w − F·y.
     rate_hz
@@ -89,13 +89,13 @@ class Machine:
     noise
         Standard deviation of white noise on the measured output, in its unit; 0 where it is not known.
     stroke_s
-        Seconds in which the motion passes each place once; None for an axis that stands.
+        Seconds in which the motion passes each place once; None for an axis at standstill.
     notes
-        What the prediction leaves out, in sentences.
+        Effects that the prediction does not include, as sentences.
     band_hz
-        Where the responses are known; None everywhere.
+        Band in which the responses are known; None: everywhere.
     encoder_step_m
-        Way of the motor from one count of its encoder to the next; 0 where it is not known.
+        Travel of the motor per count of its encoder; 0 where it is not known.
     """
 
     places: tuple[Place, ...]
@@ -110,13 +110,13 @@ class Machine:
     def __post_init__(self) -> None:
         if not self.places:
             raise UsageError(
-                "missing", "the machine has no place", "describe it at one place at least", argument="places"
+                "missing", "the machine has no place", "describe it at one or more places", argument="places"
             )
         if not (np.isfinite(self.encoder_step_m) and self.encoder_step_m >= 0):
             raise UsageError(
                 "out-of-range",
                 f"encoder_step_m={self.encoder_step_m} is not a finite number of at least 0",
-                "give metres, 0 for no encoder",
+                "specify metres, 0 for no encoder",
                 argument="encoder_step_m",
                 value=self.encoder_step_m,
             )

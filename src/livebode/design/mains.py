@@ -1,4 +1,4 @@
-"""Lines that the mains reaches: harmonics of 50 and 60 Hz, which repeat as an excitation does."""
+"""Lines affected by the mains: harmonics of 50 and 60 Hz, which repeat as an excitation does."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NEAR_BINS = 0.5  # from a harmonic: a window sees at most 40 % of its power far
 
 
 def meets_mains(bins: Sequence[int], resolution_hz: float, mains_hz: Sequence[float]) -> NDArray[np.bool_]:
-    """Which bins lie within half a bin of a harmonic, shape (bins,).
+    """Which bins are within half a bin of a harmonic, shape (bins,).
 
     >>> meets_mains([3, 5, 6, 7], 10.0, (50.0, 60.0)).tolist()
     [False, True, True, False]
@@ -28,7 +28,7 @@ def meets_mains(bins: Sequence[int], resolution_hz: float, mains_hz: Sequence[fl
 
 
 def mains_words(lines: Lines, mains_hz: Sequence[float], avoided: Sequence[int]) -> str:
-    """What the lines have to do with the mains, for the table of a design; a warning where one meets a harmonic."""
+    """Effect of the mains on the lines, for the table of a design; a warning where a line meets a harmonic."""
     left_out = ", ".join(f"{k * lines.resolution_hz:g}" for k in avoided)
     words = f"no line at {left_out} Hz" if avoided else ""
     met = lines.frequency_hz[meets_mains(lines.bins, lines.resolution_hz, mains_hz)]

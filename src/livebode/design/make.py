@@ -1,4 +1,4 @@
-"""A wish and its grid become a Waveform of amplitude one."""
+"""Converts a specification and its grid to a Waveform of amplitude one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ REACHED = 1e-9
 
 
 def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
-    """The excitation with an amplitude of 1 N m (of a list: with those), before limits and accuracy are looked at."""
+    """The excitation with an amplitude of 1 N m (of a list: with those), before limits and accuracy are applied."""
     lines = found.lines
     about: dict[str, Any] = {"kind": wish.kind, "seed": wish.seed}
     if wish.kind == "prbs":
@@ -41,7 +41,7 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
             phases: Phases = wish.phases or "low crest"
             about |= {"phases": phases}
             samples = multisine(lines, each, phases, seed=wish.seed)
-    # A mean moves a loop at its start, far more than the lines do, and tells nothing; a PRBS and a chirp have one.
+    # A mean moves a loop at its start, far more than the lines do, without information; a PRBS and a chirp have one.
     made = Waveform(lines, samples - np.mean(samples), about)
     if wish.crest_factor_max is not None and made.crest_factor > wish.crest_factor_max * (1 + REACHED):
         raise DesignError(
@@ -76,6 +76,6 @@ def amplitudes(wish: Wish, lines: Lines, machine: Machine) -> Floats:
     if wish.shape == "flat":
         return np.ones(len(lines))
     f = lines.frequency_hz
-    # A machine that moves is heard least where its response is smallest, relative to what is to be known.
+    # For a moving machine, the worst case is the place of the smallest response, relative to the required accuracy.
     heard = [np.abs(machine.torque(p, f) * p.plant.response(f)) for p in machine.places]
     return equal_snr(np.min(heard, axis=0))

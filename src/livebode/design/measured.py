@@ -1,4 +1,4 @@
-"""The Machine of a plant that was measured, or that a model describes."""
+"""The Machine of a measured plant or of a plant model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Output = Literal["velocity", "position"]
 class MeasuredResponse(Algebra):
     """A measured response as a Model: exact at its lines, between them interpolated in log-magnitude and phase.
 
-    Beyond its first and last line nothing is known, and it says so.
+    Beyond its first and last line it raises an error.
 
     >>> plant = MeasuredResponse(np.array([10.0, 40.0]), np.array([4.0 + 0j, 1.0 + 0j]))
     >>> float(abs(plant.response(20.0)).round(6))
@@ -34,12 +34,12 @@ class MeasuredResponse(Algebra):
 
     @classmethod
     def of(cls, responses: Responses) -> MeasuredResponse:
-        """Of one response, at the lines where it is valid; SignalError where fewer than two are."""
+        """From one response, at its valid lines; SignalError where fewer than two are valid."""
         if responses.quantity != "plant":
             raise SignalError(
                 "wrong-quantity",
                 f"these are responses of the {responses.quantity}",
-                "give those of the plant",
+                "use those of the plant",
                 quantity=responses.quantity,
                 allowed=["plant"],
             )
@@ -71,7 +71,7 @@ class MeasuredResponse(Algebra):
                 frequency_hz=float(f[outside].flat[0]),
                 band_hz=list(self.band_hz),
             )
-        # Over ln f a straight stretch of the Bode plot is met exactly.
+        # Over ln f a straight part of the Bode plot is interpolated exactly.
         at, known = np.log(f), np.log(self.frequency_hz)
         logarithm = np.log(np.abs(self.value)) + 1j * np.unwrap(np.angle(self.value))
         return np.asarray(np.exp(np.interp(at, known, logarithm)), dtype=np.complex128)
@@ -111,7 +111,7 @@ def measured_machine(
     notes: tuple[str, ...] = (),
     encoder_counts_per_turn: int = 0,
 ) -> Machine:
-    """The Machine around a plant of which only the response is known, at one place.
+    """The Machine around a plant with a known response, at one place.
 
     Parameters
     ----------
@@ -124,30 +124,30 @@ def measured_machine(
     output
         Whether the output is the motor's velocity, rad/s, or position, rad.
     radius_m
-        Metres of way per radian; leave it out for a rotary axis, whose metres are then radians.
+        Metres of travel per radian; omit it for a rotary axis, whose metres are then radians.
     noise
         Standard deviation of white noise on the output, in its unit.
     motion
-        Lowest and highest value of each quantity in the motion alone. What is left out is not known, and bears no
-        limit; but an axis that stands has no speed and no following error, and takes no torque unless one is given.
+        Lowest and highest value of each quantity in the motion alone. An omitted quantity is not known and cannot be
+        limited; but an axis at standstill has no speed and no following error, and its default torque is zero.
     stroke_s
-        Seconds in which the motion passes each place once; None for an axis that stands.
+        Seconds in which the motion passes each place once; None for an axis at standstill.
     notes
         For `Machine.notes`.
     encoder_counts_per_turn
         Of the motor's encoder; 0 where it is not known.
 
-    The load is taken to go with the motor: above the first antiresonance its travel differs.
+    The load is assumed to follow the motor: above the first antiresonance its travel differs.
 
     Raises
     ------
     LivebodeError
-        If the plant has no response, the loop no feedback, the output is not known, a quantity of the motion is not in
-        order, or an axis without stroke_s moves.
+        If the plant has no response, the loop no feedback, the output is not supported, a range of the motion is
+        invalid, or an axis without stroke_s moves.
     """
     given = as_model(plant)
     if loop.feedback is None:
-        raise DesignError("feedback-unknown", "the loop's feedback is not known", "describe its controllers")
+        raise DesignError("feedback-unknown", "the loop's feedback is missing", "describe its controllers")
     if output not in ("velocity", "position"):
         raise UsageError(
             "not-one-of",
@@ -178,13 +178,13 @@ def measured_machine(
 
 
 def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
-    """What the motion does, completed where the axis stands."""
+    """Ranges of the motion, completed for an axis at standstill."""
     for name, (low, high) in given.items():
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
             raise UsageError(
                 "out-of-range",
                 f"the {name} of the motion, [{low}, {high}], is not a lowest and a highest value",
-                "give two finite numbers, the lower one first",
+                "specify two finite numbers, the lower one first",
                 argument="motion",
                 quantity=name,
                 value=[low, high],
@@ -204,7 +204,7 @@ def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
         raise UsageError(
             "missing",
             f"the motion has a speed of {low:g} … {high:g} m/s, but no stroke_s",
-            "give the seconds in which it passes each place once",
+            "specify the seconds in which it passes each place once",
             argument="stroke_s",
             speed_m_per_s=[low, high],
         )

@@ -22,7 +22,7 @@ class Peak:
     Attributes
     ----------
     quantity, place
-        Of what, and where.
+        The quantity and its place.
     excited
         Lowest and highest value that the excitation adds.
     own
@@ -36,7 +36,7 @@ class Peak:
 
     @property
     def low(self) -> float:
-        """Both together, at the worst of all alignments; the excitation's alone where the motion is not known."""
+        """Sum of both at the worst alignment; the excitation's alone where the motion is not known."""
         return self.excited[0] + (self.own[0] if self.own else 0.0)
 
     @property
@@ -52,10 +52,10 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
     """Every quantity at every place.
 
     The excitation's part is the sum of its bins times their closed-loop responses, over one period: exact for a linear
-    machine that has been excited for long. From rest it takes the loop some seconds to get there, and the position may
-    drift further meanwhile: bring the excitation in slowly. Excitation and motion are not synchronous, so their
-    extremes at each place are added. Of a quantised excitation the lines that rounding puts where the machine is not
-    known are left out.
+    machine in the periodic state. From rest the loop reaches this state in some seconds, and the position may drift
+    further meanwhile: ramp the excitation up slowly. Excitation and motion are not synchronous, so their extremes at
+    each place are added. Lines that the rounding of a quantised excitation adds outside of the machine's known band are
+    not included.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
     """
     window, rate_hz = waveform.lines.window, waveform.lines.rate_hz
     spectrum = np.fft.rfft(waveform.samples)
-    # The integrators of the loop leave nothing of a constant.
+    # The integrators of the loop remove a constant.
     excited = np.flatnonzero(np.abs(spectrum) > _POWERLESS * np.max(np.abs(spectrum)))
     excited = excited[excited > 0]
     if machine.band_hz is not None and "resolution_n_m" in waveform.about:
@@ -91,7 +91,7 @@ def _peak(
 
 
 def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
-    """Of each quantity its two ends, wherever they are; its place is that of the larger one, of the travel none."""
+    """Both extremes of each quantity over all places; its place is that of the larger one, the travel has none."""
     return {name: _ends([p for p in found if p.quantity == name]) for name in QUANTITIES}
 
 

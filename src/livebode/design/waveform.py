@@ -1,4 +1,4 @@
-"""Waveform: one period of an excitation with the lines that it is made for."""
+"""Waveform: one period of an excitation with its lines."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from livebode.excitation import quantised
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_CHANGED_MAX = 0.5  # of a line's amplitude by rounding: beyond it the line is more the drive's than ours
+_CHANGED_MAX = 0.5  # of a line's amplitude: beyond it, rounding dominates the line
 
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """One period of an excitation, N m, and what it came from.
+    """One period of an excitation, N m, and its parameters.
 
     Parameters
     ----------
     lines
-        Where the response is to be measured; the period is their window.
+        Lines of the measurement; the period is their window.
     samples
         One period, shape (window,).
     about
-        What reproduces it: kind, seed, amplitude and so on, as plain data.
+        Parameters that reproduce it: kind, seed, amplitude and so on, as plain data.
 
     Raises
     ------
     LivebodeError
-        If the samples are not one finite period of the window, or a line carries no power.
+        If the samples are not one finite period of the window, or a line has no power.
     """
 
     lines: Lines
@@ -59,7 +59,7 @@ class Waveform:
             raise DesignError(
                 "line-without-power",
                 f"the excitation has no power at {self.lines.frequency_hz[weakest]:g} Hz",
-                "leave out that line, or give it an amplitude above 0",
+                "leave out that line, or specify an amplitude above 0",
                 frequency_hz=float(self.lines.frequency_hz[weakest]),
             )
 
@@ -70,7 +70,7 @@ class Waveform:
 
     @property
     def amplitude(self) -> Floats:
-        """Of each line, shape (lines,)."""
+        """Amplitude of each line, shape (lines,)."""
         return np.abs(self.spectrum[list(self.lines.bins)])
 
     @property
@@ -83,25 +83,25 @@ class Waveform:
 
     @property
     def crest_factor(self) -> float:
-        """Peak over rms of the samples as the drive holds them."""
+        """Peak over rms of the samples with the hold of the drive."""
         return self.peak / self.rms
 
     @property
     def ramp_periods(self) -> int:
-        """In how many periods to bring it in: as `about` says in ramp_s, else one."""
+        """Periods of the ramp: those of ramp_s in `about`, by default one."""
         return max(1, round(float(self.about.get("ramp_s", 0.0)) * self.lines.rate_hz / self.lines.window))
 
     def scaled(self, factor: float) -> Waveform:
-        """The same excitation `factor` times as large."""
+        """The same excitation multiplied by `factor`."""
         return replace(self, samples=self.samples * factor)
 
     def quantised(self, step: float) -> Waveform:
-        """In steps of the drive; see `livebode.excitation.quantised`.
+        """The excitation in steps of the drive; see `livebode.excitation.quantised`.
 
         Raises
         ------
         DesignError
-            Also where a line is left that the rounding changes by more than half; the sentence has a step that does.
+            Also where rounding changes a line by more than half; the message has a step that does not.
         """
         stepped = replace(self, samples=quantised(self.samples, step), about={**self.about, "resolution_n_m": step})
         changed = self._changed_by(stepped)
@@ -126,6 +126,6 @@ class Waveform:
         return stepped
 
     def _changed_by(self, other: Waveform) -> Floats:
-        """How far each line lies from that of another one, as a share of it, shape (lines,)."""
+        """Distance of each line from that of another waveform, as a share of it, shape (lines,)."""
         own, its = self.spectrum[list(self.lines.bins)], other.spectrum[list(self.lines.bins)]
         return np.asarray(np.abs(its - own) / np.abs(own))

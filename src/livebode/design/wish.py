@@ -1,4 +1,4 @@
-"""Wish: what a person wants to know of a machine, before anything is chosen."""
+"""Wish: the specification of an experiment, before anything is chosen."""
 
 from __future__ import annotations
 
@@ -20,45 +20,45 @@ Shape = Literal["flat", "equal snr"]
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """An experiment as it is asked for; what is None is chosen.
+    """Specification of an experiment; values that are None are chosen automatically.
 
     Parameters
     ----------
     band_hz, resolution_hz
-        From where to where, and how far apart the lines may be; or `lines` instead.
+        Band, and largest distance of the lines; or `lines` instead.
     lines, window
         Lines as in `Lines.parse`, and the period in samples.
     kind
-        "odd", which is chosen for a band: odd bins, one in four of them left quiet at random, to tell distortion from
-        noise; "multisine", which is chosen for `lines`; "prbs", "chirp", "stepped": one line after the other.
+        "odd", the default for a band: odd bins, one in four of them not excited at random, to separate distortion from
+        noise; "multisine", the default for `lines`; "prbs", "chirp", "stepped": one line after the other.
     phases
-        Of lines that are excited together: "low crest", which is chosen, "schroeder" or "random".
+        Of lines that are excited together: "low crest" (default), "schroeder" or "random".
     shape
         Amplitudes of the lines: "flat", or for an "equal snr" at the output of the machine.
     amplitude_n_m
         Of each line of a multisine (of a shaped one: their rms), of the chirp, of the steps or of the PRBS; a list has
-        one for each line. None: as small as the accuracy allows, and within the limits.
+        one for each line. None: the smallest for the accuracy, within the limits.
     accuracy
-        Wanted 95 % bound of each line as a share of |G|, 1e-6 … 1.
+        Required 95 % bound of each line as a share of |G|, 1e-6 … 1.
     crest_factor_max
-        A crest factor that must be reached; None asks for none.
+        A crest factor that must be reached; None: no requirement.
     resolution_n_m
-        Step of the drive, to round to.
+        Step of the drive, for rounding.
     order, held_ticks
-        Of the PRBS: length of its register, instead of a resolution, and ticks that a bit stands.
+        Of the PRBS: length of its register, instead of a resolution, and ticks per bit.
     sweep
-        Of the chirp: "linear", which is chosen, or "logarithmic".
+        Of the chirp: "linear" (default) or "logarithmic".
     periods
-        Windows that each step of a stepped sine takes; 4 are chosen.
+        Windows of each step of a stepped sine; default: 4.
     seed
-        Of all that is random: the same seed, the same excitation.
+        Of all random choices: the same seed gives the same excitation.
     mains_hz
         Mains whose harmonics the lines of a band avoid, by half a bin, where the grid allows; empty: none.
 
     Raises
     ------
     UsageError
-        If something is missing, cannot be, is of another kind, or is said twice.
+        If a value is missing, invalid, of another kind, or specified twice.
     """
 
     band_hz: tuple[float, float] | None = None
@@ -91,7 +91,7 @@ class Wish:
             if (word := getattr(self, name)) not in known:
                 raise UsageError(
                     "not-one-of",
-                    f"{name}={word!r} is not known",
+                    f"{name}={word!r} is not supported",
                     f"choose {', '.join(map(repr, filter(None, known)))}",
                     argument=name,
                     value=word,
@@ -101,6 +101,6 @@ class Wish:
 
     @property
     def listed(self) -> list[float]:
-        """The amplitudes that are given one for each line; empty where they are not."""
+        """The amplitudes if they are given one for each line; otherwise empty."""
         given = self.amplitude_n_m
         return [] if given is None or np.ndim(given) == 0 else np.asarray(given, dtype=float).tolist()

@@ -1,4 +1,4 @@
-"""What a wish may not ask for: numbers out of range, and settings that exclude each other."""
+"""Checks of a specification: numbers out of range, and settings that exclude each other."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _WHOSE = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "s
 _RESOLUTION_MIN_HZ = 1e-6
 _STEP_MIN = 1e-12
 _MAINS_MIN_HZ = 1.0
-_ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
+_ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # values outside are typing errors
 
 
 def check(wish: Wish) -> None:
-    """UsageError where something is missing, out of range, of another kind, or given twice."""
+    """Raise UsageError for a value that is missing, out of range, of another kind, or given twice."""
     _check_numbers(wish)
     _check_amplitude(wish)
     for error in (*_of_another_kind(wish), *_amplitudes_twice(wish)):
@@ -113,7 +113,7 @@ def _check_band(wish: Wish) -> None:
 
 
 def _check_distance(wish: Wish) -> None:
-    """That one setting alone determines how far apart the lines are."""
+    """Check that exactly one setting determines the distance of the lines."""
     if wish.kind == "prbs" and wish.window is not None:
         message = f"a PRBS has 2^order - 1 bits, not a window of {wish.window}"
         raise _conflict(wish, "window", message, "give order or resolution_hz instead")

@@ -1,4 +1,4 @@
-"""An excitation as a file that a drive, a PLC or another program takes."""
+"""An excitation as a file for a drive, a PLC or another program."""
 
 from livebode.design.files.formats import FORMATS, write
 

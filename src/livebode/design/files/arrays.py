@@ -12,7 +12,7 @@ from livebode.design.files.c_names import identifier
 from livebode.design.files.facts import facts
 from livebode.design.waveform import Waveform
 
-_TEXT_BYTES = 116  # at the head of a v5 file, free but for its first four bytes
+_TEXT_BYTES = 116  # header text of a v5 file, free except for its first four bytes
 
 
 def _arrays(waveform: Waveform) -> dict[str, Any]:
@@ -41,5 +41,5 @@ def write_mat(path: Path, waveform: Waveform, name: str) -> None:
     columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
     struct = columns | {"Ts": 1 / waveform.lines.rate_hz}
     savemat(path, {identifier(name, "MATLAB"): struct}, appendmat=False)
-    with path.open("r+b") as file:  # instead of the time of day: the same design, the same file
+    with path.open("r+b") as file:  # instead of the time of day, so that the same design gives the same file
         file.write(b"MATLAB 5.0 MAT-file, written by livebode".ljust(_TEXT_BYTES))

@@ -1,4 +1,4 @@
-"""A C99 header: the period as a constant table, with the lines for the kernel beside it."""
+"""A C99 header: the period as a constant table, and the lines for the kernel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
     word = identifier(name)
     big = word.upper()
     lines = waveform.lines
-    # A comment ends where the facts hold its end.
+    # Facts may contain the end of a comment.
     said = "\n".join(f" * {line}".replace("*/", "* /") for line in as_lines(facts(waveform)))
     values = [float(value).hex() for value in waveform.samples]
     text = f"""/* One period of an excitation, N m.

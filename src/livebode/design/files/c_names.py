@@ -1,4 +1,4 @@
-"""Names that C and MATLAB take."""
+"""Names that are valid in C and MATLAB."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 
 from livebode.core import DesignError
 
-LETTERS_MAX = {"C": 63, "MATLAB": 31}  # that C99 tells apart; that a MATLAB v5 file holds of a struct's name
+LETTERS_MAX = {"C": 63, "MATLAB": 31}  # significant in C99; in a struct's name of a MATLAB v5 file
 _C = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register
 restrict return short signed sizeof static struct switch typedef union unsigned void volatile while alignas alignof
@@ -25,12 +25,12 @@ KEYWORDS = {"C": frozenset(_C.split()), "MATLAB": frozenset(_MATLAB.split())}
 
 
 def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
-    """The name, if the language takes it as that of a variable; for C that of a header which C++ may include, too.
+    """The name, if it is a valid variable name; for C, also in a header that C++ includes.
 
     Raises
     ------
     DesignError
-        If it does not; the sentence has the nearest one that it takes.
+        If it is not valid; the message has the nearest valid one.
 
     >>> identifier("w_1")
     'w_1'

@@ -1,4 +1,4 @@
-"""CSV: one row for each sample, below comments that say what it is."""
+"""CSV: one row for each sample, below comments that describe it."""
 
 from __future__ import annotations
 

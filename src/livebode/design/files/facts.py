@@ -1,4 +1,4 @@
-"""What every file says of its excitation, so that it can be made again."""
+"""Facts in every file about its excitation, so that it can be reproduced."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from livebode.design.waveform import Waveform
 
 
 def facts(waveform: Waveform) -> dict[str, Any]:
-    """Plain data: who made it, rate, window, lines in bins, peak, and what it came from with its seed."""
+    """Plain data: program, rate, window, lines in bins, peak, and the parameters with the seed."""
     from importlib.metadata import version
 
     lines = waveform.lines

@@ -20,7 +20,7 @@ FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
     ".h": write_c_header,
     ".st": write_st,
 }
-"""What writes an excitation under a name, by the suffix of the file. A further format is a function and a row here."""
+"""Writers of an excitation, by the suffix of the file. A further format is a function and a row here."""
 
 
 def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation") -> None:
@@ -29,7 +29,7 @@ def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation
     Raises
     ------
     UsageError
-        If the suffix is not known.
+        If the suffix is not supported.
     DesignError
         If the format forbids the name.
     """
@@ -37,7 +37,7 @@ def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation
     if place.suffix not in FORMATS:
         raise UsageError(
             "not-one-of",
-            f"{place.name!r} does not end in a known suffix",
+            f"{place.name!r} does not end in a supported suffix",
             f"choose {', '.join(FORMATS)}",
             argument="out",
             value=place.suffix,

@@ -10,7 +10,7 @@ from livebode.structured_text import check_name, multisine
 
 
 def write_st(path: Path, waveform: Waveform, name: str) -> None:
-    """``FB_name``, limited to the period's own peak where the program gives no other w_max; exactly the doubles."""
+    """``FB_name``, limited to the period's own peak by default (w_max); the values are exactly the doubles."""
     check_name(name, "excitation")
     note = "\n".join(as_lines(facts(waveform)))
     text = multisine(
