@@ -57,7 +57,7 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     if (counts := design.encoder_counts) is not None:
         rows.append(Choice("encoder", *encoder_words(counts, f, moves=machine.stroke_s is not None)))
     rows.append(Choice("recording", _duration(design.recording_s), recording_why))
-    rows.append(Choice("bring in", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
+    rows.append(Choice("ramp up", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
     even = lines.window % design.hop == 0
     hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
     rows.append(Choice("hop", f"{design.hop} samples", hop_why))

@@ -1,4 +1,4 @@
-"""Excitations: to recognise one in a recording, and to make one."""
+"""Excitations: detection in a recording, and generation."""
 
 from livebode.excitation.chirp import chirp, chirp_lines
 from livebode.excitation.low_crest import crest_between_samples, low_crest_phases

@@ -13,9 +13,9 @@ Complex = NDArray[np.complex128]
 def cut(x: Floats, period: int) -> Floats:
     """Whole periods without their drift, shape (periods, period), unit of `x`.
 
-    The drift is the broken line through the levels of the periods, so an offset and a constant slope vanish, whatever
-    their size, and what is periodic stays as it is. A period's level is the median of its difference to the median
-    period: a spike moves neither. Biased where the drift bends within a period: what remains of the bend is seen as
+    The drift is the piecewise linear curve through the levels of the periods, so an offset and a constant slope of any
+    size vanish, and periodic components are unchanged. A period's level is the median of its difference to the median
+    period: a spike affects neither. Biased where the drift bends within a period: the rest of the bend appears as
     noise, mostly in the lowest bins.
     """
     count = x.size // period
@@ -38,7 +38,7 @@ def spectra(blocks: Floats) -> Complex:
 
 
 def grouped(periods: Complex, most: int = 16) -> Complex:
-    """Means of neighbouring periods, shape (≤ most, bins): noise that outlives a period no longer links them."""
+    """Means of neighbouring periods, shape (≤ most, bins), which noise longer than a period no longer correlates."""
     count = min(len(periods), most)
     edges = np.linspace(0, len(periods), count + 1).astype(int)
     return np.asarray(np.add.reduceat(periods, edges[:-1], axis=0) / np.diff(edges)[:, np.newaxis])

@@ -27,9 +27,9 @@ def chirp(
     """One period of amplitude·sin φ(n), whose frequency goes from low to high within it, shape (window,).
 
     The angle over a whole period is a whole number of turns, so that the next period begins where this one ends: low
-    and high frequency are brought to bins for a linear sweep (to a sum that is even), and scaled by at most half
-    a turn in all for a logarithmic one. The frequency leaps back at the border, the signal does not. Crest factor √2;
-    lines at all bins of the band, of much the same size in a linear sweep, falling by 3 dB an octave in a logarithmic
+    and high frequency are rounded to bins for a linear sweep (with an even sum), and scaled by at most half
+    a turn in total for a logarithmic one. The frequency jumps back at the border, the signal does not. Crest factor √2;
+    lines at all bins of the band, of nearly equal size in a linear sweep, falling by 3 dB an octave in a logarithmic
     one, and at half their size at the ends.
 
     Raises
@@ -37,7 +37,7 @@ def chirp(
     GridError
         If the band is not between 0 and the Nyquist frequency, or is not wider than two bins.
     UsageError
-        If the sweep is not known.
+        If the sweep is not supported.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def chirp(
     if sweep not in ("linear", "logarithmic"):
         raise UsageError(
             "not-one-of",
-            f"{sweep=} is not known",
+            f"{sweep=} is not supported",
             "choose 'linear' or 'logarithmic'",
             argument="sweep",
             value=sweep,

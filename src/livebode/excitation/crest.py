@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 def peak_and_rms(period: NDArray[np.float64]) -> tuple[float, float]:
     """Largest magnitude and rms of the AC part of one period, shape (samples,); their quotient is the crest factor.
 
-    The offset does not count: it neither excites nor can be told from that of the sensor. Between samples the signal
-    may peak higher (for lines far below the Nyquist frequency, by nothing to speak of).
+    The offset is ignored: it neither excites nor can be separated from that of the sensor. Between samples the signal
+    may have higher peaks (negligible for lines far below the Nyquist frequency).
 
     >>> peak_and_rms(np.array([4.0, 2.0, 4.0, 2.0]))
     (1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Descent of a multisine's L_2p norm over its phases, p rising, until the norm is the peak."""
+"""Minimisation of a multisine's L_2p norm over its phases, with p rising until the norm is the peak."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Bins = NDArray[np.int64]
 
-# p, each from where the one before ended, and samples for one period of the highest line: the low norms find the
-# valley, and see it with few samples; the high ones find the peak, which must not hide between samples.
+# p, each started from the previous result, and samples for one period of the highest line: the low norms find the
+# valley, with few samples; the high ones find the peak, which must not be between samples.
 VALLEY, PEAK = ((2, 8), (8, 8), (32, 12)), ((128, 24), (512, 24))
 Stages = tuple[tuple[int, int], ...]
 _STEPS, _STEPS_WITHOUT_HESSIAN = 40, 200  # for each exponent
@@ -30,12 +30,12 @@ def period(bins: Bins, complexes: Complex, samples: int) -> Floats:
 
 
 def samples_for(highest: int, oversampled: int) -> int:
-    """How many samples of a period are looked at; fewer where a lone line is very high, but above its Nyquist rate."""
+    """Number of samples of a period; fewer where a single line is very high, but above its Nyquist rate."""
     return int(scipy.fft.next_fast_len(min(oversampled * highest, max(_SAMPLES_MAX, 3 * highest)), real=True))
 
 
 def _power(x: Floats, exponent: int) -> Floats:
-    """x^exponent by squaring, a tenth of what NumPy's pow takes.
+    """x^exponent by squaring, in a tenth of the time of NumPy's pow.
 
     >>> _power(np.array([2.0, -3.0]), 5).tolist()
     [32.0, -243.0]
@@ -54,7 +54,7 @@ def descend_together(phases: Floats, bins: Bins, amplitude: Floats, stages: Stag
     """Gauss–Newton with damping from many starts at once, shape (starts, lines).
 
     Guillaume, Schoukens, Pintelon, Kollár, IEEE Trans. Instrum. Meas. 40(6), 1991: the norm is a sum of squares of
-    x^p. JᵀJ of all pairs of lines is made of sums and differences of their bins in one spectrum, that of the
+    x^p. JᵀJ of all pairs of lines is computed from sums and differences of their bins in one spectrum, that of the
     weights x^(2p − 2), so no Jacobian is formed.
     """
     for p, oversampled in stages:
@@ -76,7 +76,7 @@ def descend_together(phases: Floats, bins: Bins, amplitude: Floats, stages: Stag
 
 
 class _Norm:
-    """ln of the L_2p norm of many periods, and the step that brings it down."""
+    """ln of the L_2p norm of many periods, and the step that reduces it."""
 
     def __init__(self, bins: Bins, amplitude: Floats, p: int, samples: int) -> None:
         self._bins, self._amplitude, self._p, self._samples = bins, amplitude, p, samples

@@ -1,4 +1,4 @@
-"""Is it periodic, or does it only look so?"""
+"""Test whether a recording is periodic or only appears to be."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from livebode.excitation.blocks import cut, grouped, spectra
 
 Floats = NDArray[np.float64]
 
-# A resonance or a slow trajectory agrees with itself from one period to the next, but not from one end of the recording
-# to the other. So neighbouring periods are averaged to at most this many stretches, which are then compared.
+# A resonance or a slow trajectory is similar from one period to the next, but not from one end of the recording to the
+# other. So neighbouring periods are averaged to at most this many stretches, which are then compared.
 _STRETCHES_MAX = 16
 
 
@@ -19,9 +19,9 @@ def log_chance(x: Floats, period: int) -> float:
 
     In each bin k of the period, with X_gk the spectra of G stretches, C = |Σ_g X_gk|²/(G·Σ_g|X_gk|²) is the share of
     power that repeats. Noise of any spectrum has P(C > c) = (1 − c)^(G − 1), whatever the power in the bin. The bins
-    are taken in order of their power, which tells nothing about C, the 1, 2, 4, … strongest together; −ln of their
-    probabilities add to a gamma distribution, whose tail Chernoff's inequality bounds. The least of these times their
-    number is the answer (Bonferroni).
+    are ordered by their power, which is independent of C, and the 1, 2, 4, … strongest are combined; −ln of their
+    probabilities add to a gamma distribution, whose tail Chernoff's inequality bounds. The result is the least of these
+    times their number (Bonferroni).
     """
     groups = grouped(spectra(cut(x, period)), _STRETCHES_MAX)[:, 1:]
     count, bins = groups.shape
@@ -29,7 +29,7 @@ def log_chance(x: Floats, period: int) -> float:
         return 0.0
     total = np.sum(np.abs(groups) ** 2, axis=0)
     share = np.abs(groups.sum(axis=0)) ** 2 / (count * np.maximum(total, np.finfo(np.float64).tiny))
-    # Rounding leaves a bin that repeats exactly at 1 − C = 1e-16 or, by luck, at 0.
+    # With rounding, a bin that repeats exactly has 1 − C = 1e-16 or 0.
     missing = np.clip(1 - share, np.finfo(np.float64).eps, 1.0)
     evidence = np.where(total > 0, -(count - 1) * np.log(missing), 0.0)
     sizes = 2 ** np.arange(int(np.log2(bins)) + 1)

@@ -1,4 +1,4 @@
-"""Where in the recording the excitation runs."""
+"""The part of the recording in which the excitation runs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from livebode.excitation.blocks import cut
 
 Floats = NDArray[np.float64]
 
-# Cutting a start-up off costs a whole period at the other end, so a shorter one (as a share of the period) stays in,
-# and its period shows as transient.
+# Cutting off a start-up loses a whole period at the other end, so a shorter one (as a share of the period) remains, and
+# its period is marked as transient.
 _SHORTEST = 0.05
 
 
@@ -18,9 +18,9 @@ def extent(x: Floats, period: int) -> tuple[int, int]:
     """First sample of the periodic part and the sample after its last.
 
     Each period is compared with the typical one, the median of those that agree with their neighbours. Where the
-    projection on it is below one half, the excitation does not run. The border inside a period lies where the
-    sum of squares of "nothing but a level" before it and of "the typical period" after it is least.
-    The whole recording where less than two periods would be left. Silence in the middle is not cut out: its
+    projection on it is below one half, the excitation does not run. The border inside a period is where the
+    sum of squares of "only a level" before it and of "the typical period" after it is least.
+    The whole recording where less than two periods would remain. Silence in the middle is not cut out: its
     periods are outlying.
     """
     blocks = cut(x, period)
@@ -42,7 +42,7 @@ def extent(x: Floats, period: int) -> tuple[int, int]:
 
 
 def _border(x: Floats, typical: Floats, silent: int) -> int:
-    # `silent` periods lead; the border lies in the last of them or in the one after.
+    # `silent` periods lead; the border is in the last of them or in the one after.
     period = typical.size
     first, last = max(silent - 1, 0) * period, min((silent + 1) * period, x.size)
     part = x[first:last]

@@ -1,4 +1,4 @@
-"""Phases that keep the peak of a multisine low."""
+"""Phases that give a multisine a low peak."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STARTS_TIMES_LINES = 4848  # 48 starts for 101 lines: some seconds
 _STARTS_TIMES_SAMPLES = 1 << 18  # where periods are long, each start takes them
 _TOGETHER = 1 << 19  # starts·lines² in one step: 8 MB in each array
 _SHAKEN_RAD = 0.5
-_PROMISING = 4  # one in so many is brought on to the peak
+_PROMISING = 4  # one in this many is optimised further to the peak
 
 
 def low_crest_phases(
@@ -28,11 +28,11 @@ def low_crest_phases(
 ) -> Floats:
     """Phases of Σ A_i·sin(2πk_i·t + φ_i) for a low peak, radians, shape (lines,).
 
-    The L_2p norm of the period is brought down over the phases with p rising to 512, after Guillaume, Schoukens,
-    Pintelon, Kollár (IEEE Trans. Instrum. Meas. 40(6), 1991). A descent ends in the valley that it began in, so there
-    are many: the first start is Schroeder's phases, half are those shaken, half are random. A quarter of them go on to
-    the highest p, and the lowest crest factor is taken. The same seed gives the same phases. docs/excitation.md has
-    what is reached, and beside what.
+    The L_2p norm of the period is minimised over the phases with p rising to 512, after Guillaume, Schoukens,
+    Pintelon, Kollár (IEEE Trans. Instrum. Meas. 40(6), 1991). A descent ends in the local minimum of its start, so
+    there are many starts: the first has Schroeder's phases, half are perturbations of these, half are random. A quarter
+    continue to the highest p, and the lowest crest factor is selected. The same seed gives the same phases.
+    docs/excitation.md compares the results with other methods.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def low_crest_phases(
     seed
         Of the starts.
     starts
-        How many; None for as many as take some seconds: 230 for 21 lines, 48 for 101, 8 for 600, one for 5,000.
+        Number of starts; None for some seconds of search: 230 for 21 lines, 48 for 101, 8 for 600, one for 5,000.
 
     Raises
     ------
@@ -62,13 +62,13 @@ def low_crest_phases(
         raise UsageError(
             "out-of-range", f"{starts=} is below 1", "give at least one start", argument="starts", value=starts, low=1
         )
-    # Threads of products as small as these wait for each other, on a busy machine for several times the search.
+    # Threads for such small products wait for each other; on a busy machine the search takes several times longer.
     with threadpool_limits(1, user_api="blas"):
         return np.asarray((_searched(k, size, seed, count) + np.pi / 2) % (2 * np.pi))  # of sines, found as cosines
 
 
 def _searched(k: Bins, size: Floats, seed: int, count: int) -> Floats:
-    """The phases of cosines where the best of so many starts ends."""
+    """The phases of cosines at the end of the best start."""
     generator = np.random.default_rng(seed)
     at_once = max(1, _TOGETHER // k.size**2) if k.size <= _LINES_WITH_HESSIAN else 1
     promising: list[tuple[float, Floats]] = []
@@ -92,7 +92,7 @@ def _first(found: tuple[float, Floats]) -> float:
 
 
 def _descended(begun: Floats, k: Bins, size: Floats, stages: Stages) -> list[tuple[float, Floats]]:
-    """Crest factor and phases where each start leads."""
+    """Crest factor and phases at the end of each start."""
     if k.size <= _LINES_WITH_HESSIAN:
         ended = descend_together(begun, k, size, stages)
     else:
@@ -111,7 +111,7 @@ def crest_between_samples(bins: ArrayLike, amplitude: ArrayLike, phases: ArrayLi
 
 
 def _starts(numbers: NDArray[np.int64], amplitude: Floats, generator: np.random.Generator) -> Floats:
-    """Schroeder's phases as they are (number 0) and shaken (even), and random ones (odd)."""
+    """Schroeder's phases (number 0), these with perturbations (even), and random ones (odd)."""
     shape = (numbers.size, amplitude.size)
     shaken = _schroeder(amplitude) + generator.normal(0, _SHAKEN_RAD, shape) * (numbers > 0)[:, np.newaxis]
     anywhere = generator.uniform(0, 2 * np.pi, shape)
@@ -141,7 +141,7 @@ def _reduced(bins: ArrayLike, amplitude: ArrayLike) -> tuple[Bins, Floats]:
         raise UsageError(
             "out-of-range",
             f"bins={k.tolist()} are not whole numbers above 0",
-            "name at least one line",
+            "specify at least one line",
             argument="bins",
             value=k.tolist(),
             low=1,
@@ -150,7 +150,7 @@ def _reduced(bins: ArrayLike, amplitude: ArrayLike) -> tuple[Bins, Floats]:
         raise UsageError(
             "not-finite",
             "the amplitudes are not finite, or all zero",
-            "give each line one above 0",
+            "specify one above 0 for each line",
             argument="amplitude",
         )
     return k // np.gcd.reduce(k), np.broadcast_to(size, k.shape)

@@ -35,8 +35,8 @@ def multisine(
 ) -> Floats:
     """One period of Σ A_k·sin(2πkn/N + φ_k), n = 0 … N − 1, shape (lines.window,), unit of `amplitude`.
 
-    Nevaranta 2016, eq. (6). The angle is reduced as an integer, kn mod N, before it becomes a float, so that
-    sample n + N of an endless excitation has the bits of sample n, and no line drifts off its bin.
+    Nevaranta 2016, eq. (6). The angle is reduced as an integer, kn mod N, before the conversion to float, so that
+    sample n + N of an endless excitation has the bits of sample n, and no line drifts from its bin.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def multisine(
     amplitude
         One for all lines, or one for each.
     phases
-        ``"schroeder"``, eq. (7); ``"random"``, uniform, for telling distortion; ``"low crest"``, searched for seconds
+        ``"schroeder"``, eq. (7); ``"random"``, uniform, for detecting distortion; ``"low crest"``, searched for seconds
         (`low_crest_phases`); or radians for each line.
     seed
         Of random and low-crest phases.
@@ -81,7 +81,7 @@ def _named(phases: str, lines: Lines, amplitude: Floats, seed: int) -> Floats:
         return low_crest_phases(lines.bins, amplitude, seed=seed)
     raise UsageError(
         "not-one-of",
-        f"{phases=} is not known",
+        f"{phases=} is not supported",
         "choose 'schroeder', 'random', 'low crest', or give radians for each line",
         argument="phases",
         value=str(phases),

@@ -1,4 +1,4 @@
-"""Odd lines with quiet ones among them, which tell distortion from noise."""
+"""Odd lines with detection lines between them, which separate distortion from noise."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def odd_lines(
     seed: int = 0,
     without: Collection[int] = (),
 ) -> Lines:
-    """The odd bins of a band; one in every `group` neighbours, drawn at random, stays quiet, but neither end.
+    """The odd bins of a band; one in every `group` neighbours, drawn at random, is not excited, but neither end.
 
-    With such lines and random phases, what appears at the even bins is even distortion of the machine, and what appears
-    at the odd bins that were left quiet is odd distortion, each beside the noise (Pintelon, Schoukens, System
-    Identification, 2nd ed., 2012, ch. 4: random odd multisine with a random harmonic grid). The cost: half the
-    resolution of a grid of all bins.
+    With such lines and random phases, the even bins show even distortion of the machine, and the odd bins without
+    excitation show odd distortion, each in addition to the noise (Pintelon, Schoukens, System Identification, 2nd ed.,
+    2012, ch. 4: random odd multisine with a random harmonic grid). The price is half the resolution of a grid of all
+    bins.
 
     Parameters
     ----------
@@ -39,16 +39,16 @@ def odd_lines(
     rate_hz, window
         The tracker's grid.
     group
-        Odd bins of which one stays quiet.
+        Odd bins of which one is not excited.
     seed
-        Of the draw: the same seed, the same lines.
+        Of the draw: the same seed gives the same lines.
     without
-        Bins that stay quiet in any case, such as those of the mains; the groups are formed of the others.
+        Bins that are never excited, such as those of the mains; the groups are formed from the others.
 
     Raises
     ------
     GridError
-        If the band does not lie between 0 and the Nyquist frequency, or holds fewer odd bins than one group.
+        If the band is not between 0 and the Nyquist frequency, or has fewer odd bins than one group.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def odd_lines(
     for _ in range(_DRAWS):
         silent = [generator.choice(g) for g in inner]
         bins = odd[~np.isin(odd, silent)].tolist()
-        # With a factor in common they would repeat within the window, on a grid without quiet bins.
+        # With a common factor they would repeat within the window, on a grid without detection lines.
         if gcd(window, *bins) == 1:
             break
     return Lines.of_bins(bins, window, rate_hz)
@@ -99,12 +99,12 @@ def odd_bins(low_hz: float, high_hz: float, rate_hz: float, window: int) -> NDAr
 
 
 def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:
-    """GridError where a band is none, or leaves what the rate can carry."""
+    """Raise GridError for an invalid band, or one that the rate does not permit."""
     if not 0 < low_hz <= high_hz:
         raise GridError(
             "band-invalid",
             f"{low_hz:g} … {high_hz:g} Hz is not a band",
-            "give two frequencies above 0, the lower one first",
+            "specify two frequencies above 0, the lower one first",
             argument="band_hz",
             low_hz=low_hz,
             high_hz=high_hz,
@@ -121,7 +121,7 @@ def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:
 
 
 def wider(band_hz: float, bins: int, window: int, rate_hz: float) -> str:
-    """The remedy where a band is narrower than so many bins: a longer window where one is enough, or a wider band."""
+    """The remedy for a band narrower than this number of bins: a longer window if that is enough, or a wider band."""
     if band_hz * WINDOW_MAX < bins * rate_hz:
         return "a wider band"
     return f"a window of {max(int(np.ceil(bins * rate_hz / band_hz)), window + 1)} samples, or a wider band"

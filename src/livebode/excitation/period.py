@@ -17,13 +17,13 @@ from livebode.excitation.significance import FALSE_ALARM, find_lines
 
 Floats = NDArray[np.float64]
 
-# Neighbouring lags that are tried at most, either side. The autocorrelation of a slow signal is flat over more samples
-# only where noise leaves the period uncertain anyway.
+# Largest number of neighbouring lags on either side that are tried. The autocorrelation of a slow signal is flat over
+# more samples only where noise makes the period uncertain anyway.
 _NEIGHBOURS_MAX = 16
-# What changes from period to period at the lines, beyond the noise: more than a tenth of their power is no period.
+# Change from period to period at the lines, beyond the noise: more than a tenth of their power is not a period.
 _LEFT_OVER_MAX = 0.1
-# Of the recording, or of what stands out of its background, at least a third must repeat (an SNR of −3 dB); else it is
-# the accident of one tone that fits some lag.
+# Of the recording, or of the part above its background, at least a third must repeat (an SNR of −3 dB); otherwise one
+# tone fits some lag by chance.
 _DIFFERENT_MAX = 2 / 3
 _SIGMAS = 4.0  # one in 3e4 by chance, and the lags near the best are few
 _PART = 2**19  # samples; two minutes at 4 kHz
@@ -32,24 +32,24 @@ _PART = 2**19  # samples; two minutes at 4 kHz
 def find_period(x: Floats) -> tuple[int, int, int]:
     """Period in samples, first sample of the periodic part and the sample after its last.
 
-    1. Look at the recording as it is, and whitened, so that neither a trajectory nor few periods spoil it. 2. The
-    shortest lag at which each differs least from itself. 3. Among its neighbours, the one whose periods add up to
-    the most power. 4. The view with the stronger evidence decides; refuse it if a recording without a period would
-    do as well with a probability above 1e-3 for all lags and both views together. 5. Divide by what all excited bins
-    have in common; multiply by 2 or 3 where that finds lines in between. 6. Refuse it if more changes at the lines than
-    noise explains, or if the recording repeats better after more than its half.
+    1. Use the recording unchanged, and whitened, for robustness against a trajectory and few periods. 2. For each, find
+    the shortest lag with the least difference. 3. Among its neighbours, select the one whose periods add up to the most
+    power. 4. The version with the stronger evidence decides; reject it if a recording without a period would reach this
+    with a probability above 1e-3 for all lags and both versions together. 5. Divide by the common factor of all excited
+    bins; multiply by 2 or 3 where that finds lines in between. 6. Reject it if the lines change more than noise
+    explains, or if the recording repeats better after more than its half.
 
     Notes
     -----
-    Some recordings look periodic and are not: a tone or an oscillation that decays more slowly than the recording
-    lasts has the period of its best lag; a random drift resembles itself, about once in forty recordings, after
-    nearly half of its length. In noise of 0 dB, two or three periods may give a refusal or a
-    period one sample off.
+    Some recordings appear periodic but are not: a tone or an oscillation that decays more slowly than the recording
+    lasts has the period of its best lag; a random drift is similar to itself, about once in forty recordings, after
+    nearly half of its length. In noise of 0 dB, two or three periods may be rejected or give a period with an error of
+    one sample.
 
     Raises
     ------
     SignalError
-        If nothing repeats, or what repeats is there less than twice.
+        If nothing repeats, or the recording has fewer than two periods.
     """
     if x.size < 2 * LAG_MIN:
         raise SignalError(
@@ -66,7 +66,7 @@ def find_period(x: Floats) -> tuple[int, int, int]:
 
 
 def _fundamental_of(calm: Floats) -> int:
-    # Most periods are short against a long recording, and a part in its middle tells them as well in less time.
+    # Most periods are short compared with a long recording; a part in its middle finds them as well in less time.
     if calm.size > _PART:
         middle = calm[calm.size // 2 - _PART // 2 :][:_PART]
         try:
@@ -79,7 +79,7 @@ def _fundamental_of(calm: Floats) -> int:
     views = [_judged(calm, d), _judged(flat, standing_out)]
     needed = np.log(FALSE_ALARM) - np.log(calm.size)  # two views of half as many lags
     evidence, period, view = min(views, key=lambda v: v[0])
-    # A shorter lag has more periods to show for itself; the other counts where the recording repeats twice as well.
+    # A shorter lag has more periods as evidence; the other is used where the recording repeats twice as well.
     if views[0][0] <= needed and 2 * d[views[0][1]] + ROUNDING < d[period]:
         evidence, period, view = views[0]
     fundamental = 0
@@ -106,7 +106,7 @@ def _fundamental_of(calm: Floats) -> int:
 
 def _judged(view: Floats, d: Floats) -> tuple[float, int, Floats]:
     lag, width = best_lag(d, view.size // 2)
-    # What each sample differs from the one a lag before it is the slope of a drift, free of all that is periodic.
+    # The difference of samples one lag apart is the slope of a drift, without the periodic part.
     slope = float(np.mean(view[lag:] - view[:-lag])) / lag
     level = view - slope * (np.arange(view.size) - view.size / 2)
     period = _sharpened(level, lag, width)
@@ -114,7 +114,7 @@ def _judged(view: Floats, d: Floats) -> tuple[float, int, Floats]:
 
 
 def _sharpened(flat: Floats, lag: int, width: int) -> int:
-    """Of the neighbours of a lag, the one whose periods add up to the most power at the excited bins."""
+    """The neighbour of a lag whose periods add up to the most power at the excited bins."""
     reach = min(max(width, 2), _NEIGHBOURS_MAX)
     lines = _lines(flat, lag) or None
     tried = [p for p in range(lag - reach, lag + reach + 1) if LAG_MIN <= p <= flat.size // 2]
@@ -139,7 +139,7 @@ def _lines(flat: Floats, period: int) -> list[int]:
 def _fundamental(flat: Floats, period: int, differences: tuple[Floats, ...]) -> int:
     lines = _lines(flat, period)
     common = gcd(period, *lines) if lines else 1
-    # Two periods may be too few to see the one line that the others have nothing in common with; then the shorter lag
+    # Two periods may be too few to detect the one line that has no common factor with the others; then the shorter lag
     # differs more, by that line. Up to twice is allowed: it has other samples of a transient and of the noise.
     if any(d[period // common] <= 2 * max(d[period], 0.0) + ROUNDING for d in differences):
         period //= common
@@ -152,11 +152,11 @@ def _fundamental(flat: Floats, period: int, differences: tuple[Floats, ...]) -> 
 
 
 def _steady_at_lines(view: Floats, period: int) -> bool:
-    """Whether noise explains what changes at the lines from one period to the next.
+    """Whether noise explains the change at the lines from one period to the next.
 
-    Tones without a common period nearly agree at some lag, and noise cannot explain what is left at them. The change
-    is the median over pairs of neighbouring periods, which a transient or a pause does not move; the noise is that of
-    the bin in the middle, with what chance may add to a sum over so many lines and pairs.
+    Tones without a common period nearly agree at some lag, and noise cannot explain the rest at them. The change
+    is the median over pairs of neighbouring periods, which a transient or a pause does not affect; the noise is that of
+    the bin in the middle, with the effect of chance on a sum over this number of lines and pairs.
     """
     periods = spectra(cut(view, period))
     lines = find_lines(periods).excited
@@ -171,15 +171,18 @@ def _steady_at_lines(view: Floats, period: int) -> bool:
 
 def _too_short(flat: Floats, d: Floats, period: int) -> SignalError | None:
     """For a recording that repeats after more than its half, better than with the period; else None."""
-    half, longest = flat.size // 2, flat.size - max(flat.size // 10, LAG_MIN)  # a tenth must come back, or it is chance
+    half, longest = (
+        flat.size // 2,
+        flat.size - max(flat.size // 10, LAG_MIN),
+    )  # a tenth must repeat, otherwise it is chance
     if longest <= half + 1:
         return None
     lag = half + 1 + int(np.argmin(d[half + 1 : longest]))
     rest = flat.size - lag
-    # As far below the best shorter lag as noise in the shorter overlap cannot take it: F with (rest, rest) degrees.
+    # Further below the best shorter lag than noise in the shorter overlap explains: F with (rest, rest) degrees.
     if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(rest)) > (d[period] if period else 1.0) or d[lag] > 0.5:
         return None
-    # A multiple of the period, each counted half a sample wrong, is no news.
+    # A multiple of the period, with an error of half a sample each, is not new.
     if period and abs(lag - period * round(lag / period)) <= min(1 + lag // (2 * period), period // 4):
         return None
     pair = np.concatenate((flat[:rest], flat[lag:]))

@@ -22,9 +22,9 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
     """One period of a maximal-length sequence of ±amplitude, shape ((2^order − 1)·held_ticks,), unit of `amplitude`.
 
     From a shift register of `order` bits with linear feedback. Its periodic autocorrelation over the N = 2^order − 1
-    bits is exactly N at 0 and −1 elsewhere (for amplitude 1), so every line of the bits has the same power N + 1, but
-    the mean, 1/N of the amplitude. Holding each bit for some ticks moves the power down: the lines are then those of
-    sin(πf·h/rate)/(πf·h/rate), with zeros at multiples of rate/h.
+    bits is exactly N at 0 and −1 elsewhere (for amplitude 1), so every line of the bits has the same power N + 1,
+    except the mean, 1/N of the amplitude. Holding each bit for some ticks moves the power down: the lines are then
+    those of sin(πf·h/rate)/(πf·h/rate), with zeros at multiples of rate/h.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
     bits = np.ones(count, dtype=np.int8)
     lags = (order, *(order - tap for tap in _TAPS[order]))
     done, shortest = order, min(lags)
-    while done < count:  # as many at once as do not depend on each other
+    while done < count:  # as many at once as are independent of each other
         stop = min(done + shortest, count)
         bits[done:stop] = np.bitwise_xor.reduce([bits[done - lag : stop - lag] for lag in lags])
         done = stop
@@ -59,7 +59,7 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
 
 
 def check_order(order: int) -> None:
-    """UsageError for an order that no register here has."""
+    """Raise UsageError for an order without a register in this module."""
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or not ORDER_MIN <= order <= ORDER_MAX:
         number = float(order) if isinstance(order, (int, float)) else ORDER_MIN
         near = int(np.clip(np.nan_to_num(np.floor(number)), ORDER_MIN, ORDER_MAX))

@@ -1,4 +1,4 @@
-"""What is done to a recording before its period is looked for."""
+"""Preparation of a recording before the search for its period."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Floats = NDArray[np.float64]
 # A spike is clipped where it passes four times what 99.5 % of the samples stay below. Periodic excitations have crest
 # factors up to about 5, so their own peaks stay whole, and 0.5 % is more samples than a few spikes make.
 _CLIP_QUANTILE, _CLIP_FACTOR = 0.995, 4.0
-# Bands of a sixth of an octave follow the slope of a trajectory's spectrum; below four bins a median says nothing.
+# Bands of a sixth of an octave follow the slope of a trajectory's spectrum; below four bins a median is meaningless.
 _BAND_RATIO, _BAND_BINS = 2 ** (1 / 6), 4
-# What lies 60 dB below the mean power of the spectrum is rounding; raising it to the level of the lines would let
-# rounding decide. In power.
+# Content 60 dB below the mean power of the spectrum is rounding; amplified to the level of the lines, it would
+# dominate the result. In power.
 _WHITEN_FLOOR = 1e-6
 # Noise passes ten times its median power in one bin of a thousand (exponential distribution: 2^-10).
 _STANDS_OUT = 10.0
-_STRAIGHT = 1e-12  # of the largest sample: what double precision leaves of a ramp
+_STRAIGHT = 1e-12  # of the largest sample: the rounding of a ramp in double precision
 
 
 def checked(samples: ArrayLike, name: str) -> Floats:
@@ -68,7 +68,7 @@ def checked(samples: ArrayLike, name: str) -> Floats:
             role=name,
             value=float(known[0]),
         )
-    # A time column is a ramp but for rounding, and rounding repeats.
+    # A time column is a ramp except for rounding, and rounding repeats.
     n = np.flatnonzero(np.isfinite(x))
     rest = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))
     if np.ptp(rest) <= _STRAIGHT * np.max(np.abs(known)):
@@ -97,13 +97,13 @@ def clipped(x: Floats) -> Floats:
 
 
 def whitened(x: Floats) -> tuple[Floats, Floats]:
-    """The signal filtered so that its background has a flat spectrum, and only what stands out of it.
+    """The signal filtered so that its background has a flat spectrum, and only the part above the background.
 
     Both have shape (samples,). A trajectory and its drift are far larger than the excitation at low frequencies and
-    would rule every comparison of one period with the next. The background is the median of the periodogram (Hann
-    window) in bands of a sixth of an octave, so lines narrower than their band keep standing out of it: with four
-    periods or more, that is. The filter is the same at all times: what is periodic stays periodic. The ends of the
-    recording are joined by taking off the line between them, since the filter works on a circle.
+    would dominate every comparison of one period with the next. The background is the median of the periodogram (Hann
+    window) in bands of a sixth of an octave, so lines narrower than their band remain above it, with four periods or
+    more. The filter is time-invariant: periodic components remain periodic. The ends of the recording are joined by
+    subtracting the line between them, because the filter is circular.
     """
     level = _joined(x)
     size = scipy.fft.next_fast_len(x.size, real=True)

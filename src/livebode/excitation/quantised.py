@@ -13,14 +13,14 @@ Floats = NDArray[np.float64]
 def quantised(period: Floats, step: float) -> Floats:
     """Multiples of `step` next to each sample, shape of `period`; still periodic, with the rounding's own small lines.
 
-    They are the nearest but for the few that go to the other side so that the mean stays, to half a step over the whole
-    period: a loop answers a mean that rounding made with a motion far larger than that of the lines.
+    They are the nearest ones, except a few that are rounded to the other side to preserve the mean, to half a step over
+    the whole period: a loop responds to a mean caused by rounding with a motion far larger than that of the lines.
 
     Raises
     ------
     LivebodeError
-        If the step is not positive, or so coarse that nothing but zero is left: the sentence has the smallest peak
-        that would be left, and the largest step that would leave this one.
+        If the step is not positive, or so coarse that only zero remains: the message has the smallest peak that would
+        remain, and the largest step for this one.
 
     Examples
     --------
@@ -31,7 +31,7 @@ def quantised(period: Floats, step: float) -> Floats:
         raise UsageError(
             "out-of-range",
             f"the resolution {step:g} is not a finite number above 0",
-            "give the drive's step",
+            "specify the drive's step",
             argument="step",
             value=step,
         )
@@ -40,7 +40,7 @@ def quantised(period: Floats, step: float) -> Floats:
         peak = float(np.max(np.abs(period)))
         raise DesignError(
             "rounded-away",
-            f"an excitation with a peak of {peak:g} is nothing in steps of {step:g}",
+            f"an excitation with a peak of {peak:g} vanishes in steps of {step:g}",
             f"raise its peak above {step / 2:g}, or take steps below {2 * peak:g}",
             peak=peak,
             step=step,

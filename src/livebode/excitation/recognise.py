@@ -1,4 +1,4 @@
-"""What excitation a recording holds."""
+"""Detection of the excitation in a recording."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """A periodic excitation as a recording shows it.
+    """A periodic excitation found in a recording.
 
     Attributes
     ----------
     lines
-        Excited bins of one period; `quiet` are the bins between the first and the last that carry neither the
-        excitation nor its distortion.
+        Excited bins of one period; `quiet` are the bins between the first and the last without excitation and
+        distortion.
     amplitude
         Of each line, shape (lines,), unit of the excitation: |X| of a sine of this amplitude.
     distortion
@@ -46,10 +46,10 @@ class Excitation:
     outlying
         Numbers of the other periods that differ: spikes, pauses.
     snr_db
-        Per line at the output, power of the line against the noise of one period, shape (lines,); None without one.
+        Per line at the output, power of the line over the noise of one period, shape (lines,); None without output.
     slips
-        Leaps of the phase: samples that were dropped or repeated without a gap. All else is that of the realigned
-        excitation, whose numbers count what is missing.
+        Phase jumps: samples that were dropped or repeated without a gap. All other attributes are those of the
+        realigned excitation, whose sample numbers include the missing ones.
     """
 
     lines: Lines
@@ -67,7 +67,7 @@ class Excitation:
 
     @property
     def period(self) -> int:
-        """Samples after which the excitation repeats, the shortest; also the window to choose."""
+        """Shortest number of samples after which the excitation repeats; also the recommended window."""
         return self.lines.window
 
     @property
@@ -102,14 +102,14 @@ def recognise(
     output
         Signal to measure the SNR and the transient at, shape (samples,), the same samples.
     floor_db, gap_db
-        How far below the strongest line a bin is quiet, and how high a step in the amplitudes parts the lines from
-        their distortion; see `find_lines`.
+        Level below the strongest line at which a bin counts as not excited, and step in the amplitudes that separates
+        the lines from their distortion; see `find_lines`.
 
     Raises
     ------
     LivebodeError
         If a channel is empty, constant, not finite or of the wrong length, nothing repeats, less than two periods were
-        recorded, or no line stands out of the noise.
+        recorded, or no line exceeds the noise.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def recognise(
         x = filled(given)
         period, start, stop = find_period(x)
     view = slice(start, stop)
-    # Spikes are clipped where lines are first looked for, not where the periods with spikes are.
+    # Spikes are clipped for the first search of lines, but not for the search of periods with spikes.
     roughly = find_lines(spectra(cut(clipped(x[view]), period)), floor_db, gap_db).excited
     roughly[1:] |= not roughly.any()
     blocks, strange = _periods(given[view], period, roughly)
@@ -172,7 +172,7 @@ def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike |
         raise UsageError(
             "out-of-range",
             f"{rate_hz=} is not a positive number of samples per second",
-            "give the samples per second",
+            "specify the samples per second",
             argument="rate_hz",
             value=rate_hz,
         )
@@ -183,7 +183,7 @@ def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike |
         raise UsageError(
             "wrong-shape",
             f"the output has {answer.size} samples and the excitation {given.size}",
-            "give the same stretch of both",
+            "use the same part of both",
             argument="output",
             samples=int(answer.size),
             excitation_samples=int(given.size),
@@ -192,11 +192,11 @@ def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike |
 
 
 def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]:
-    """The periods without drift, and which of them are unlike the others or miss samples."""
+    """The periods without drift, and which of them differ from the others or have missing samples."""
     blocks = cut(filled(samples), period)
     missing = np.isnan(samples[: blocks.size].reshape(blocks.shape)).any(axis=1)
     strange: Flags = np.array(missing)
-    # What was bridged is not compared, so that it cannot pass for the usual.
+    # Bridged samples are not compared, so that they do not count as usual.
     whole = blocks[~missing]
     strange[~missing] = unlike(whole, spectra(whole), lines)
     return blocks, strange

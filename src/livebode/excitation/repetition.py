@@ -1,4 +1,4 @@
-"""How far a recording differs from itself one lag later, for every lag."""
+"""Difference of a recording from itself one lag later, for every lag."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ LAG_MIN = 3  # samples: the shortest period with a line below the Nyquist freque
 def difference(x: Floats) -> Floats:
     """var(x(n) − x(n − l)) / (var x(n) + var x(n − l)) over the samples that overlap, shape (samples,), by lag l.
 
-    0 where the recording repeats exactly, noise/(noise + signal) where it repeats with noise, 1 where it has nothing to
-    do with itself. Variances about their means, so that an offset and a constant slope do not count. From the
+    0 where the recording repeats exactly, noise/(noise + signal) where it repeats with noise, 1 where it is
+    uncorrelated. Variances about their means, so that an offset and a constant slope have no effect. From the
     autocorrelation by FFT (Wiener–Khinchin) and running sums: O(n log n), and without the bias of an autocorrelation
     that divides by the full length. Cf. de Cheveigné, Kawahara 2002 (YIN), eq. (7).
     """
@@ -30,7 +30,7 @@ def difference(x: Floats) -> Floats:
     overlap = np.arange(x.size, 0, -1)
     both = head2 + tail2 - (head**2 + tail**2) / overlap
     unlike = both - 2 * (product - head * tail / overlap)
-    # Where a part is constant its variance is rounding, and says nothing.
+    # Where a part is constant its variance is rounding, without information.
     clear = both > ROUNDING * max(float(both[0]), 0.0)
     return np.where(clear, unlike / np.where(clear, both, 1.0), 1.0)
 
@@ -42,10 +42,10 @@ def _running(x: Floats) -> tuple[Floats, Floats]:
 
 
 def best_lag(d: Floats, lag_max: int) -> tuple[int, int]:
-    """The shortest lag that repeats as well as any up to `lag_max`, and how many samples wide its valley is.
+    """The shortest lag that repeats as well as any up to `lag_max`, and the width of its valley in samples.
 
-    Lags before the recording first stops resembling itself (halfway from its best to its worst) do not count: every
-    slow signal resembles itself a few samples later. Two lags repeat equally well where their differences are
+    Lags before the first dissimilarity (halfway from best to worst) are ignored: every slow signal is similar to itself
+    a few samples later. Two lags repeat equally well where their differences are
     within what noise does to such a sum: a relative standard deviation of √(2/n) each (χ² with n samples), taken three
     times. Where the signal is smooth, a whole stretch of lags does; its deepest point is the candidate.
     """

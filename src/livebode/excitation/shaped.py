@@ -1,4 +1,4 @@
-"""Amplitudes that make every line as clear as the others."""
+"""Amplitudes that give all lines the same signal-to-noise ratio."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
     Raises
     ------
     UsageError
-        If a response is zero or not finite: no amplitude would make such a line clear.
+        If a response is zero or not finite: no amplitude reaches the ratio at such a line.
 
     Examples
     --------

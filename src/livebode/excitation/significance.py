@@ -1,4 +1,4 @@
-"""Which bins of the period carry the excitation."""
+"""Detection of the excited bins of a period."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
-FALSE_ALARM = 1e-3  # probability that any bin of a recording is called a line by chance, all bins together
+FALSE_ALARM = 1e-3  # probability that any bin of a recording is classified as a line by chance, all bins together
 FLOOR_DB = 60.0  # below the strongest line: a converter's rounding and the harmonics of a good drive
-# A step this high in the sorted amplitudes parts lines from distortion. Square waves, PRBS and chirps have no
+# A step this high in the sorted amplitudes separates lines from distortion. Square waves, PRBS and chirps have no
 # such step (the largest, from the first to the third harmonic of a square wave, is 9.5 dB).
 GAP_DB = 12.0
-# Distortion is the smaller part: with more than a tenth of the power no frequency response would describe the drive.
+# Distortion is the smaller part: above a tenth of the power, a frequency response would not describe the drive.
 _DISTORTION_SHARE = 0.1
-# No converter reaches 138 dB, the resolution of float32: what repeats better is a reference, which has no distortion.
+# No converter reaches 138 dB, the resolution of float32: a signal that repeats better is an undistorted reference.
 _REFERENCE_NOISE = float(np.finfo(np.float32).eps) ** 2
-# Complex degrees of freedom that the noise of a bin is estimated from. With 20 the F-test asks for at most three times
-# the power that known noise would ask for (1e-3 in 1,000 bins), with 1 it would ask for 70,000 times.
+# Complex degrees of freedom that the noise of a bin is estimated from. With 20 the F-test requires at most three times
+# the power that known noise would require (1e-3 in 1,000 bins), with 1 it would require 70,000 times.
 _NOISE_DOF = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Bins by what they carry; the shape of each is (bins,), bin 0 first.
+    """Classification of the bins; the shape of each is (bins,), bin 0 first.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class Found:
 
 
 def significant(periods: Complex, false_alarm: float = FALSE_ALARM) -> Flags:
-    """Bins whose mean stands out of the scatter between periods, shape (bins,).
+    """Bins whose mean exceeds the scatter between periods, shape (bins,).
 
     F-test of G|mean|² against the scatter of G groups of neighbouring periods: F ~ F(2, 2d) without a line, so its
     probability is (1 + F/d)^−d. Few periods leave d = G − 1 too small to tell anything, so the scatter is averaged over
-    neighbouring bins until d reaches 20; where the bin's own scatter is larger (interference on one line), that counts.
+    neighbouring bins until d reaches 20; where the bin's own scatter is larger (interference on one line), it is used.
     `false_alarm` is for all bins together (Bonferroni). Never bin 0.
     """
     groups = grouped(periods)
@@ -89,10 +89,10 @@ def find_lines(periods: Complex, floor_db: float = FLOOR_DB, gap_db: float = GAP
     periods
         Spectra of the steady periods, shape (periods, bins).
     floor_db
-        Bins this far below the strongest are rounding, and count as quiet.
+        Bins this far below the strongest are rounding, and count as not excited.
     gap_db
         In a measured signal (not in a reference, which repeats without noise), the lines below a step of this height in
-        the sorted amplitudes are distortion if they hold less than a tenth of the power. ``inf`` switches it off.
+        the sorted amplitudes are distortion if they have less than a tenth of the power. ``inf`` switches it off.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Where a periodic excitation leaps in phase: samples that were dropped, or recorded twice, without a gap."""
+"""Phase jumps of a periodic excitation: samples that were dropped, or recorded twice, without a gap."""
 
 from __future__ import annotations
 
@@ -11,25 +11,27 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _PERIODS_MIN = 6
-_REMEMBERED = 16  # periods behind the expected one: a clock that drifts is followed, not taken for leaps
-# The energy by which a leap changes a period, over the noise of a sample: chance takes it for one once in 1e4 periods.
+_REMEMBERED = 16  # periods in the expected one: a drifting clock is followed and does not count as jumps
+# Energy by which a jump changes a period, over the noise of a sample: exceeded by chance once in 1e4 periods.
 _CLEAR = 16.0**2
-_CONFIRMED = 2  # periods in a row with the same leap
+_CONFIRMED = 2  # consecutive periods with the same jump
 _ROUNDING = 1e-6  # of a period's energy
 _STRANGE, _STRANGE_MAX = 4.0, 3  # times the noise, and periods in a row
-_AGREES = 1 / 8  # of that energy: how well the period before fits its own phase, and those after the new one
+_AGREES = (
+    1 / 8
+)  # of that energy: fit of the previous period with its own phase, and of the following ones with the new phase
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A leap of the phase.
+    """A jump of the phase.
 
     Attributes
     ----------
     sample
-        Number of the first sample behind it, as recorded.
+        Number of the first sample after it, as recorded.
     missing
-        Samples that are missing before it; negative where so many came twice.
+        Samples that are missing before it; negative for samples recorded twice.
     """
 
     sample: int
@@ -37,12 +39,12 @@ class Slip:
 
 
 def find_slips(x: Floats, period: int) -> tuple[Slip, ...]:
-    """The leaps of a signal with this period, all finite; what leaps by more than half a period counts backwards.
+    """The phase jumps of a signal with this period, all finite; a jump by more than half a period counts backwards.
 
-    Each period is shifted to where it agrees best with the mean of the last 16. A shift counts where it explains more
-    than half of what such a shift does to the signal, far above the noise, in two periods in a row, and where the
-    period before fits well without it: a spike, a transient or a slow drift of the phase is none. Two leaps within
-    three periods are found as one, at one place.
+    Each period is shifted to the best agreement with the mean of the last 16. A shift is a jump if it explains more
+    than half of the change that such a shift causes, far above the noise, in two consecutive periods, and if the
+    previous period fits well without it: a spike, a transient or a slow drift of the phase is not a jump. Two jumps
+    within three periods are found as one, at one place.
 
     Examples
     --------
@@ -63,7 +65,7 @@ class _Search:
         self._spectra = np.fft.rfft(blocks, axis=1)
         self._energy = np.sum(blocks**2, axis=1)
         change = np.sum(np.diff(blocks, axis=0) ** 2, axis=1)
-        self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: leaps are in fewer than three of four pairs
+        self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: jumps are in fewer than three of four pairs
 
     def slips(self) -> list[Slip]:
         found: list[Slip] = []
@@ -75,7 +77,7 @@ class _Search:
                 found.append(Slip(self._place(at, expected, shift, shift + leap), leap))
                 shift += leap
             here = np.roll(self._blocks[at], shift)
-            # A period with a leap in it says little of the next ones; one after the other says that the signal changed.
+            # A period with a jump is a poor reference for the next ones; several in sequence show a changed signal.
             usual = _STRANGE * self._noise + _ROUNDING * self._energy[at]
             strange = strange + 1 if np.sum((here - expected) ** 2) > usual else 0
             if strange in (0, _STRANGE_MAX):
@@ -84,7 +86,7 @@ class _Search:
         return found
 
     def _leap(self, at: int, expected: Floats, shift: int) -> int:
-        """By how many samples the phase leaps in this period or the one before; 0 where it does not."""
+        """Phase jump in samples in this period or the previous one; 0 without a jump."""
         if at + _CONFIRMED > len(self._blocks):
             return 0
         template = np.fft.rfft(expected)
@@ -105,13 +107,13 @@ class _Search:
         return leap if self._fitted(at, expected, shift, float(energy)) else 0
 
     def _fitted(self, at: int, expected: Floats, shift: int, energy: float) -> bool:
-        """Whether one of the two periods before still fits the old phase: the leap may lie in the nearer one."""
+        """Whether one of the two previous periods still fits the old phase: the jump may be in the nearer one."""
         before = [np.roll(self._blocks[m], shift) for m in range(max(at - 2, 0), at)]
         rests = [float(np.sum((block - expected) ** 2)) for block in before]
         return min(rests) <= self._noise * 2 + _AGREES * energy
 
     def _place(self, at: int, expected: Floats, shift: int, leapt: int) -> int:
-        """The first sample behind the leap: where the old phase before and the new one behind leave least."""
+        """The first sample after the jump: the least residual of the old phase before and the new phase after."""
         first, last = max(at - 1, 0) * self._period, (at + 1) * self._period
         n, part = np.arange(first, last), self._x[first:last]
         old = (part - expected[(n + shift) % self._period]) ** 2
@@ -125,7 +127,7 @@ def _folded(shift: int, period: int) -> int:
 
 
 def realigned(x: Floats, slips: Sequence[Slip]) -> Floats:
-    """The signal with NaN for what is missing, and without what came twice, on one grid of periods."""
+    """The signal with NaN for missing samples, and without repeated ones, on one grid of periods."""
     parts, done = [], 0
     for slip in slips:
         parts += [x[done : slip.sample], np.full(max(slip.missing, 0), np.nan)]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def snr_db(periods: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Power of each line against the noise of one period, 10·log10(|mean Y|²/var Y) in dB, shape (lines,).
+    """Power of each line over the noise of one period, 10·log10(|mean Y|²/var Y) in dB, shape (lines,).
 
     Parameters
     ----------
@@ -16,7 +16,7 @@ def snr_db(periods: NDArray[np.complex128]) -> NDArray[np.float64]:
 
     Notes
     -----
-    The variance is that between periods, Σ|Y_m − Ȳ|²/(M − 1). What the mean keeps of the noise biases the power
+    The variance is that between periods, Σ|Y_m − Ȳ|²/(M − 1). The remaining noise of the mean biases the power
     upwards: a line without signal shows −10·log10(M) dB on average. NaN with one period; inf where nothing varies.
     """
     count = len(periods)

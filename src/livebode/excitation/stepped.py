@@ -15,10 +15,10 @@ Floats = NDArray[np.float64]
 def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) -> Floats:
     """Every line alone for `periods` windows, one after the other, shape (lines·periods·window,).
 
-    A step is a whole number of periods that begins and ends at zero, so the signal has no leap. The sequence as a whole
-    repeats too: over the long window of `stepped_lines` each line is on the grid, with 1/lines of its amplitude. All
-    the power stands in one line at a time, at a crest factor of √2 within a step; a machine that changes meanwhile is
-    seen by each line at another moment.
+    A step is a whole number of periods that begins and ends at zero, so the signal has no jump. The sequence as a whole
+    also repeats: over the long window of `stepped_lines` each line is on the grid, with 1/lines of its amplitude. All
+    the power is in one line at a time, at a crest factor of √2 within a step; a changing machine is measured by each
+    line at another time.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which periods are not like the steady ones."""
+"""Detection of periods that differ from the steady ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 
-FALSE_ALARM = 1e-3  # that any period of a recording is called unlike by chance
-# With fewer periods no majority says what is steady.
+FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
+# With fewer periods there is no majority of steady ones.
 _PERIODS_MIN = 3
-# Two periods differ by rounding when below this share of their size, whichever of the two is unlike.
+# Two periods differ only by rounding below this share of their size.
 _ROUNDING = 1e-9
-# A period counts as unlike only from three times the usual distance: noise of a machine is seldom stationary, and a
-# period with twice the usual noise still serves.
+# A period is marked only from three times the usual distance: noise of a machine is seldom stationary, and a period
+# with twice the usual noise is still useful.
 _FACTOR_MIN = 3.0
 
 
@@ -38,7 +38,7 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
     finds a transient at a weak line below the noise of a strong one; and the largest difference of a sample, which
     finds a spike. Each is compared, in logarithms, with its median over the periods and their spread (median absolute
     deviation, a scale that less than half of the periods cannot move). Biased where more than half of the
-    recording is transient: then the transient is taken for the usual.
+    recording is transient: then the transient counts as usual.
     """
     count = len(blocks)
     if count < _PERIODS_MIN:
@@ -55,7 +55,7 @@ def unlike(blocks: Floats, spectra: Complex, excited: Flags) -> Flags:
 
 
 def leading(flags: Flags) -> int:
-    """How many periods from the start are unlike without a break."""
+    """Number of consecutive marked periods from the start."""
     return int(np.argmin(flags)) if not flags.all() else 0
 
 
