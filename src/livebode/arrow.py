@@ -1,7 +1,7 @@
 """NumPy arrays as Arrow arrays and back, by their buffers.
 
-Arrow's own `pa.array` and `to_numpy` ask first whether a value is one of pandas, and import that where it is installed:
-0.4 s at the start of every run, for nothing.
+Arrow's own `pa.array` and `to_numpy` first check for values of pandas, and import it where it is installed, which
+costs 0.4 s at the start of every run without a benefit.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def text(words: Sequence[str], at: NDArray[np.integer[Any]]) -> pa.Array[Any]:
 def to_numpy(array: pa.Array[Any]) -> NDArray[Any]:
     """Values of an Arrow array of numbers or truth values; numbers without nulls are not copied.
 
-    A null becomes NaN, and integers beside it doubles; among truth values it is False.
+    A null becomes NaN, and integers in the same array doubles; among truth values it is False.
 
     >>> to_numpy(pa.array([1, None], pa.int64()))
     array([ 1., nan])

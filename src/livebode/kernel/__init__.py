@@ -1,4 +1,4 @@
-"""Floor 0: the sliding DFT in C, and its NumPy twin (`livebode.kernel.twin`), the readable definition."""
+"""The sliding DFT in C, and its NumPy twin (`livebode.kernel.twin`), the readable definition."""
 
 from livebode.kernel._instructions import instruction_set, instruction_sets
 from livebode.kernel._sliding import SlidingDFT

@@ -1,4 +1,4 @@
-"""What a SlidingDFT takes, in words: the checks and conversions that the fast way in C leaves to Python."""
+"""Checks and conversions of the arguments of a SlidingDFT that the fast path in C leaves to Python."""
 
 import operator
 from collections.abc import Iterable
@@ -51,7 +51,7 @@ def as_bins(bins: object, window: int) -> npt.NDArray[np.int64]:
             raise ValueError(f"bin {given!r} is not an integer from 0 to {window - 1}, as {window=} has")
     if len(set(values)) != len(values):
         twice = next(k for i, k in enumerate(values) if k in values[:i])
-        raise ValueError(f"bin {twice} is given twice: give each bin once")
+        raise ValueError(f"bin {twice} is duplicated: give each bin once")
     result = np.array(values, np.int64)
     result.flags.writeable = False
     return result

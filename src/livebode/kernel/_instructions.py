@@ -1,4 +1,4 @@
-"""Which instruction set the kernel uses."""
+"""The instruction set of the kernel."""
 
 import os
 from typing import Final
@@ -11,7 +11,7 @@ NAMES: Final = ("best", "baseline", "avx2", "avx512")
 
 
 def chosen() -> int:
-    """The number of the set that a new SlidingDFT uses: the environment's, else the best."""
+    """The number of the set that a new SlidingDFT uses: that of the environment, by default the best."""
     name = os.environ.get(VARIABLE, "best")
     if name not in NAMES:
         raise ValueError(f"{VARIABLE}={name!r} is not one of {', '.join(NAMES)}")
@@ -21,7 +21,7 @@ def chosen() -> int:
 def instruction_set() -> str:
     """The instruction set that a new SlidingDFT uses on this machine.
 
-    The widest that the machine has, unless the environment variable LIVEBODE_INSTRUCTION_SET names another. The
+    By default the widest that the machine has; the environment variable LIVEBODE_INSTRUCTION_SET names another. The
     results are the same to the bit with each.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The sliding DFT: a validated constructor over the class in C, which does all else."""
+"""The sliding DFT: a constructor that validates its arguments for the class in C."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ from livebode.kernel import _arguments, _instructions, _native
 
 
 class SlidingDFT(_native.Engine):
-    """Spectra of the last N samples at chosen bins, brought up to date sample by sample.
+    """Spectra of the last N samples at chosen bins, updated sample by sample.
 
-    The modulated sliding DFT (Nevaranta 2016, Fig. 4, after Duda, IEEE SPM 27(6), 2010), its modulator taken from a
-    table and its sums renewed every N samples: the error stays below 5e-15 (float64) or 1e-6 (float32) of √N·‖x‖₂
-    of the window for ever, and a sample that is not finite is forgotten in less than 2N samples. Samples before the
-    first are zeros. Any way of cutting the same samples into pushes and blocks gives the same bits, on any machine.
+    The modulated sliding DFT (Nevaranta 2016, Fig. 4, after Duda, IEEE SPM 27(6), 2010), with the modulator from a
+    table and sums that are renewed every N samples: the error is permanently below 5e-15 (float64) or 1e-6 (float32) of
+    √N·‖x‖₂ of the window, and a non-finite sample has no effect after less than 2N samples. Samples before the first
+    are zeros. The results have the same bits for any division of the samples into pushes and blocks, on any machine.
 
     Args:
         window: N, samples; 1 … 2^24.
@@ -24,10 +24,10 @@ class SlidingDFT(_native.Engine):
         variant: "modulated". To compare with: "plain" (eq. (4); drifts), "damped" (biased by about N·(1 − damping)),
             and the windows "hann", "hamming" (three-bin taps) and "blackman" (five-bin taps), each exactly the DFT
             of the samples under the periodic window of that name.
-        damping: pole radius of variant "damped"; 0.9999 if left out.
+        damping: pole radius of variant "damped"; default: 0.9999.
 
     Raises:
-        ValueError: an argument is out of its range; the sentence names it, its value and what would do.
+        ValueError: an argument is out of its range; the message names it, its value and the permitted values.
 
     >>> dft = SlidingDFT(window=8, bins=[1, 2])
     >>> dft.process([1.0, 2.0, 3.0, 4.0], hop=2).shape
@@ -76,12 +76,12 @@ class SlidingDFT(_native.Engine):
 
     @property
     def variant(self) -> str:
-        """Which of the named variants this is."""
+        """Name of the variant."""
         return self._variant
 
     @property
     def instruction_set(self) -> str:
-        """What runs: "baseline", "avx2" or "avx512"."""
+        """Instruction set in use: "baseline", "avx2" or "avx512"."""
         return _instructions.NAMES[self._instruction_set()]
 
     def __repr__(self) -> str:

@@ -1,10 +1,10 @@
-"""The NumPy twin: the definition of what the C kernel computes, one sample at a time, for reading.
+"""The NumPy twin: the readable definition of what the C kernel computes, one sample at a time.
 
-The same additions and multiplications in the same order, so the kernel must agree with it to the bit (but for the
-sign of zeros, where a half period is walked backwards). S_k is the sum
+The same additions and multiplications in the same order, so the kernel must agree with it to the bit (except for the
+sign of zeros, where a half period is processed backwards). S_k is the sum
 over the last N samples of x·e^(−j2πkj/N), where j is a sample's place in its period of N (Nevaranta 2016, Fig. 4,
 after Duda, IEEE SPM 27(6), 2010). F_k is the same sum over the current period alone, and replaces S_k at its end:
-that is why errors never pile up.
+therefore errors do not accumulate.
 """
 
 from typing import Any, Final
@@ -16,7 +16,7 @@ Real = npt.NDArray[np.floating[Any]]
 
 # a0, a1/2, a2/2 of w(n) = a0 − a1·cos(2πn/N) + a2·cos(4πn/N).
 TAPS: Final = {"hann": (0.5, 0.25, 0.0), "hamming": (0.54, 0.23, 0.0), "blackman": (0.42, 0.25, 0.04)}
-# The neighbours that taps need, after the bin itself: k−1, k+1, k−2, k+2.
+# The neighbours for the taps, after the bin itself: k−1, k+1, k−2, k+2.
 OFFSETS: Final = (0, -1, 1, -2, 2)
 
 

@@ -1,4 +1,4 @@
-"""The axis on the bench: a simulated tooth-belt drive whose truth is known (Nevaranta 2016)."""
+"""Simulated tooth-belt axis with known truth (Nevaranta 2016)."""
 
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.configuration import BeltAxis

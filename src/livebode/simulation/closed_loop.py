@@ -20,7 +20,7 @@ Complex = NDArray[np.complex128]
 class ClosedLoop:
     """A linear plant (with motor angle and velocity as its first two states) under a Drive, without limit and rounding.
 
-    The loop is periodic: it repeats after as many ticks as one position output stands.
+    The loop is periodic: its period is the number of ticks for which one position output is held.
 
     Examples
     --------
@@ -46,10 +46,10 @@ class ClosedLoop:
         return float(np.max(np.abs(np.linalg.eigvals(whole))))
 
     def responses(self, frequency_hz: ArrayLike) -> tuple[Complex, Complex]:
-        """Y/W and U/W, each the shape of `frequency_hz`: what a DFT over whole repetitions sees at a line.
+        """Y/W and U/W, each the shape of `frequency_hz`: the result of a DFT over whole repetitions at a line.
 
-        The shares that the slower loops throw from a line to its images (at multiples of their rates from it) are left
-        out, as they are from the DFT at the line.
+        The images of a line due to the slower loops (at multiples of their rates from it) are not included, as in the
+        DFT at the line.
         """
         f = np.asarray(frequency_hz, dtype=np.float64)
         found = np.array([self._at(z) for z in np.exp(2j * np.pi * f.ravel() / self.drive.rate_hz)])

@@ -49,7 +49,7 @@ _UNSTABLE = 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BeltAxis:
-    """A tooth-belt axis, its drive, its motion and what goes wrong with it.
+    """A tooth-belt axis, its drive, its motion and its faults.
 
     Parameters
     ----------
@@ -60,23 +60,23 @@ class BeltAxis:
     excitation_n_m
         One period of the excitation w, N m, repeated from the first tick on; empty for none.
     faults
-        Any number, all at work together.
+        Any number, all active together.
     seconds
         Length of the run; infinite by default.
     run_in_s
-        How long the axis stands at the motion's start, under excitation and noise, before sample 0. From rest the loop
-        of Table I is 2 % off its periodic state in the first window, 4e-5 after 2 s, 1e-8 after 10 s. Faults are those
-        of time 0 meanwhile.
+        Time at standstill at the motion's start, under excitation and noise, before sample 0. From rest the loop of
+        Table I differs by 2 % from its periodic state in the first window, by 4e-5 after 2 s, 1e-8 after 10 s. Faults
+        are those of time 0 during this time.
     seed
-        Of the sensor's noise: the same seed, the same samples.
+        Of the sensor's noise: the same seed gives the same samples.
     substeps
         Integration steps in a tick; None chooses them from the fastest mode.
 
     Raises
     ------
     LivebodeError
-        If the motion leaves the limits, a rate does not divide, or the loop is unstable at an end or the middle of the
-        motion's way, at a soft spot on it, or at any fault's beginning or end.
+        If the motion exceeds the limits, a rate does not divide, or the loop is unstable at an end or the middle of the
+        motion's range, at a soft spot in it, or at any fault's beginning or end.
 
     Examples
     --------
@@ -124,7 +124,7 @@ class BeltAxis:
             raise UsageError(
                 "wrong-shape",
                 f"excitation_n_m has shape {self.excitation_n_m.shape} or is not finite",
-                "give one period of finite numbers, N m",
+                "specify one period of finite numbers, N m",
                 argument="excitation_n_m",
                 shape=list(self.excitation_n_m.shape),
             )
@@ -141,7 +141,7 @@ class BeltAxis:
             raise UsageError(
                 "out-of-range",
                 f"run_in_s={self.run_in_s} is above {RUN_IN_S_MAX:g}",
-                "take less: 10 s settle the loop of Table I",
+                "specify less: the loop of Table I settles in 10 s",
                 argument="run_in_s",
                 value=self.run_in_s,
                 high=RUN_IN_S_MAX,
@@ -174,7 +174,7 @@ class BeltAxis:
             if (least := float(np.min(getattr(condition, name)))) <= 0:
                 raise SimulationError(
                     "parameters-impossible",
-                    f"the faults together bring {name} to {least:g}, which must remain above 0",
+                    f"the faults together reduce {name} to {least:g}, but it must remain above 0",
                     "make them smaller",
                     parameter=name,
                     value=least,
@@ -201,7 +201,7 @@ class BeltAxis:
 
     @property
     def _places_m(self) -> list[float]:
-        """Ends and middle of the motion, and the soft spots on its way."""
+        """Ends and middle of the motion, and the soft spots in its range."""
         position, _ = self.motion.cycle(self.drive.rate_hz)
         low, high = float(position.min()), float(position.max())
         inside = {spot.position_m for spot in self.spots if low <= spot.position_m <= high}
@@ -228,7 +228,7 @@ class BeltAxis:
         )
         smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)
         backlash = bool(np.any(self.condition(self._moments_s).gap_m))
-        # A sign smoothed over less speed bends within less time (measured: 5e-8 of a stroke at worst, docs/axis.md).
+        # A sign smoothed over less speed changes within less time (measured: 5e-8 of a stroke at worst, docs/axis.md).
         dry = 2 * ceil(sqrt(0.005 / self.friction.smoothing_m_per_s)) if self.friction.dry else 1
         return max(smooth, dry, 16 if backlash else 1)
 
@@ -258,7 +258,7 @@ class BeltAxis:
 
 
 def controller_settings(drive: Drive, sensor: Sensor) -> dict[str, Any]:
-    """What reading and control take, in C and in the twin."""
+    """Parameters of sensor and control, for the C code and the twin."""
     return {name: getattr(drive, name) for name in _OF_DRIVE} | {
         "integral_step": 1.0 / (drive.velocity_rate_hz * drive.integral_time_s),
         "encoder_step_rad": sensor.encoder_step_rad,
@@ -267,7 +267,7 @@ def controller_settings(drive: Drive, sensor: Sensor) -> dict[str, Any]:
 
 
 def engine_settings(axis: BeltAxis) -> dict[str, Any]:
-    """What the C simulation and its twin take."""
+    """Parameters of the C simulation and its twin."""
     m, f, d = axis.mechanics, axis.friction, axis.drive
     same = {name: getattr(f, name) for name in f.__dataclass_fields__}
     same |= {name: getattr(m, name) for name in _OF_MECHANICS}

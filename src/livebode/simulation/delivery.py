@@ -1,4 +1,4 @@
-"""What simulated sources share: channels, the excitation, and Blocks as asked for, at their time if need be."""
+"""Common parts of simulated sources: channels, the excitation, and delivery of Blocks, in real time if required."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BLOCK_SAMPLES_MAX = 1 << 24
 
 
 def checked_block_samples(block_samples: int) -> None:
-    """UsageError unless it is a whole number from 1 to 2²⁴."""
+    """Raise UsageError if it is not a whole number from 1 to 2²⁴."""
     whole = isinstance(block_samples, int) and not isinstance(block_samples, bool)
     if not (whole and 1 <= block_samples <= BLOCK_SAMPLES_MAX):
         raise UsageError(
@@ -47,7 +47,7 @@ def delivered(
     clock: Callable[[], float],
     sleep: Callable[[float], object],
 ) -> Iterator[Block]:
-    """Blocks with these channels alone; with `real_time` none before its last sample would have been measured."""
+    """Blocks with only these channels; with `real_time` none before its last sample would have been measured."""
     names = [channel.name for channel in CHANNELS]
     for name in channels or ():
         if name not in names:
@@ -59,7 +59,7 @@ def delivered(
 
 
 def paced(blocks: Iterable[Block], clock: Callable[[], float], sleep: Callable[[float], object]) -> Iterator[Block]:
-    """The same Blocks, each at its time after the first was asked for; a late one is not waited for."""
+    """The same Blocks, each at its time after the first request; a late one is delivered at once."""
     began = clock()
     for block in blocks:
         if (wait := began + block.stop / block.rate_hz - clock()) > 0:

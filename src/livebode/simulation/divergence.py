@@ -1,4 +1,4 @@
-"""The end of a simulation whose state left all bounds."""
+"""The error of a simulation whose state diverges."""
 
 from __future__ import annotations
 

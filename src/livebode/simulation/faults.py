@@ -1,4 +1,4 @@
-"""What goes wrong with a machine: over time as a step or a ramp, or at a place of the belt. Any number together."""
+"""Faults of a machine: over time as a step or a ramp, or at a place of the belt. Any number together."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class Condition:
-    """The machine's parameters at some moments, each an array: factors on stiffness, damping
+    """The machine's parameters at some times, each an array: factors on stiffness, damping
     and friction, load, play."""
 
     stiffness: Floats
@@ -31,11 +31,11 @@ class Condition:
 
 
 class Fault(Protocol):
-    """To add a fault over time, write a class with these two; simulation, truth and checks take it from there."""
+    """Protocol of a fault over time: a class with these two methods works in simulation, truth and checks."""
 
     @property
     def moments_s(self) -> tuple[float, ...]:
-        """When it begins and when it has come to its end: the stability of the loop is checked there."""
+        """Beginning and end of the change: the stability of the loop is checked at these times."""
         ...
 
     def act(self, time_s: Floats, condition: Condition) -> None:
@@ -45,7 +45,7 @@ class Fault(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class OverTime:
-    """Begins at `start_s` and grows evenly for `ramp_s`; 0 is a step."""
+    """Begins at `start_s` and increases linearly during `ramp_s`; 0 is a step."""
 
     start_s: float = 0.0
     ramp_s: float = 0.0
@@ -58,7 +58,7 @@ class OverTime:
         return self.start_s, self.start_s + self.ramp_s
 
     def share(self, time_s: Floats) -> Floats:
-        """How much of it there is, 0 … 1.
+        """Share of the change, 0 … 1.
 
         >>> OverTime(start_s=1.0, ramp_s=2.0).share(np.array([0.5, 1.0, 2.0, 9.0]))
         array([0. , 0. , 0.5, 1. ])
@@ -70,7 +70,7 @@ class OverTime:
 
 @dataclass(frozen=True, kw_only=True)
 class TensionLoss(OverTime):
-    """The belt loses this share of its stiffness, in every span; its damping stays."""
+    """The belt loses this share of its stiffness, in every span; its damping is unchanged."""
 
     loss: float
 
@@ -84,7 +84,7 @@ class TensionLoss(OverTime):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadChange(OverTime):
-    """The cart's mass changes by `load_kg`, at the speed that it has."""
+    """The cart's mass changes by `load_kg`, at constant speed."""
 
     load_kg: float
 
@@ -94,7 +94,7 @@ class LoadChange(OverTime):
 
 @dataclass(frozen=True, kw_only=True)
 class DampingGrowth(OverTime):
-    """The damping of every span grows to `factor` times what it was."""
+    """The damping of every span increases to `factor` times its value."""
 
     factor: float
 
@@ -108,7 +108,7 @@ class DampingGrowth(OverTime):
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionChange(OverTime):
-    """All friction, of motor and cart, grows or falls to `factor` times what it was."""
+    """All friction, of motor and cart, changes to `factor` times its value."""
 
     factor: float
 
@@ -122,7 +122,7 @@ class FrictionChange(OverTime):
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(OverTime):
-    """Play of `gap_m` in all between belt and cart, which is free within it; corners rounded over a twentieth of it."""
+    """Play of `gap_m` in total between belt and cart; its corners are rounded over a twentieth of it."""
 
     gap_m: float
 
@@ -151,10 +151,10 @@ class SoftSpot:
         return ()
 
     def act(self, time_s: Floats, condition: Condition) -> None:
-        """Nothing over time."""
+        """No change over time."""
 
     def factor(self, position_m: Floats) -> Floats:
-        """What is left of the stiffness with the cart at these positions.
+        """Remaining share of the stiffness with the cart at these positions.
 
         >>> SoftSpot(position_m=1.0, width_m=0.1, loss=0.2).factor(np.array([0.0, 1.0, 1.1])).round(4)
         array([1.  , 0.8 , 0.95])

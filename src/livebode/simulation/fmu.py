@@ -29,11 +29,11 @@ _NO_FAULT = (1.0, 1.0, 1.0, 0.0, 1.0, 0.0)  # the FMU has its own
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FmuAxis:
-    """Drive and motion as in a BeltAxis around a plant of one's own; needs the extra ``fmu`` (fmpy).
+    """Drive and motion as in a BeltAxis around the user's own plant; needs the extra ``fmu`` (fmpy).
 
     At every tick the FMU's angle and velocity are read, the controllers updated, the torque set, and one step of a
-    tick made. The FMU starts with its own start values, and the motion goes from there. There is no truth beside, and
-    stability is not judged beforehand; a value that is not finite stops the run with a DivergenceError.
+    tick computed. The FMU starts with its own start values, and the motion begins there. There is no truth, and
+    stability is not checked in advance; a value that is not finite stops the run with a DivergenceError.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ class FmuAxis:
     Raises
     ------
     LivebodeError
-        If fmpy is missing, the file is no such FMU, a name is none of its variables, or the motion leaves its limits.
+        If fmpy is missing, the file is not such an FMU, a name is not one of its variables, or the motion exceeds its
+        limits.
     """
 
     path: Path | str
@@ -83,7 +84,7 @@ class FmuAxis:
             raise UsageError(
                 "wrong-shape",
                 "excitation_n_m is not one period of finite numbers, N m",
-                "give one period, shape (samples,)",
+                "specify one period, shape (samples,)",
                 argument="excitation_n_m",
                 shape=list(self.excitation_n_m.shape),
             )

@@ -1,4 +1,4 @@
-"""Linear models of the belt drive, continuous and sampled: the truths that estimates are held against."""
+"""Linear models of the belt drive, continuous and sampled: the truth that estimates are compared with."""
 
 from __future__ import annotations
 

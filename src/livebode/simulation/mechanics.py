@@ -42,10 +42,10 @@ class Mechanics:
     stiffness_n_per_m, damping_n_s_per_m
         Keff and bs with the cart at `nominal_position_m`.
     frozen_position_m
-        The spans stay those of the cart at this position, wherever it is: a linear machine. None: they follow the cart.
+        The spans are always those of the cart at this position: a linear machine. None: they follow the cart.
     eccentricity
-        The motor's pulley has the radius r·(1 + eccentricity·sin φ), so that the cart leaves r·φ by that much.
-        Linearisations leave it out.
+        The motor's pulley has the radius r·(1 + eccentricity·sin φ), so that the cart deviates from r·φ accordingly.
+        Linearisations do not include it.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class Mechanics:
         if self.masses not in (2, 3):
             raise UsageError(
                 "not-one-of",
-                f"masses={self.masses} is not known",
+                f"masses={self.masses} is not supported",
                 "choose 2 or 3",
                 argument="masses",
                 value=self.masses,
@@ -90,7 +90,7 @@ class Mechanics:
             raise UsageError(
                 "out-of-range",
                 f"eccentricity={self.eccentricity} is not below 1",
-                "give a fraction, such as 0.01 for a pulley out of centre by 1 %",
+                "specify a fraction, such as 0.01 for a pulley out of centre by 1 %",
                 argument="eccentricity",
                 value=self.eccentricity,
                 high=1,
@@ -119,7 +119,7 @@ class Mechanics:
 
     @property
     def motor_inertia_kg_m2(self) -> float:
-        """What turns with the motor: Js with two masses, Jm + Jp = Js − Jp with three."""
+        """Inertia that turns with the motor: Js with two masses, Jm + Jp = Js − Jp with three."""
         return self.inertia_kg_m2 - (self.pulley_inertia_kg_m2 if self.masses == 3 else 0.0)
 
     @property
@@ -168,7 +168,7 @@ class Spans:
     def of(
         cls, mechanics: Mechanics, position_m: float, stiffness_factor: float = 1.0, damping_factor: float = 1.0
     ) -> Spans:
-        """The spans with the cart at `position_m`, all weakened and damped by the same factors."""
+        """The spans with the cart at `position_m`, all with the same factors on stiffness and damping."""
         at = float(mechanics.effective(position_m))
         lengths = at, mechanics.pulley_distance_m - at, mechanics.pulley_distance_m
         shape = 1 / at + 1 / (lengths[1] + lengths[2])

@@ -25,7 +25,7 @@ class Motion(Protocol):
         ...
 
     def check(self, limits: Limits) -> None:
-        """UsageError where it leaves the limits."""
+        """Raise UsageError if it exceeds the limits."""
         ...
 
 
@@ -48,17 +48,17 @@ class Standstill:
 
 @dataclass(frozen=True, kw_only=True)
 class Strokes:
-    """Back and forth between two positions, with a dwell before each stroke.
+    """Forward and return strokes between two positions, with a dwell before each stroke.
 
     The speed is a trapezoid, or with a finite jerk an S-curve; a stroke too short for the speed reaches less. Dwells
-    are made longer by less than a tick, so that a cycle is whole ticks and every cycle has the same samples.
+    are extended by less than a tick, so that a cycle is whole ticks and every cycle has the same samples.
 
     Parameters
     ----------
     start_m, end_m
-        Where the cart dwells first, and where it turns.
+        Position of the first dwell, and turning point.
     speed_m_per_s, acceleration_m_per_s2, jerk_m_per_s3
-        What the reference keeps to; an infinite jerk makes trapezoids.
+        Limits of the reference; an infinite jerk gives trapezoids.
     dwell_s
         Rest before each stroke.
 
@@ -97,7 +97,7 @@ class Strokes:
             raise UsageError(
                 "conflict",
                 f"start_m and end_m are both {self.start_m}",
-                "take Standstill to hold the cart",
+                "use Standstill to hold the cart",
                 argument="end_m",
                 value=self.start_m,
             )
@@ -145,10 +145,10 @@ def within(name: str, position_m: float, limits: Limits) -> None:
 
 @dataclass(frozen=True)
 class _Stroke:
-    """One way from rest to rest as pieces of constant jerk."""
+    """One stroke from rest to rest as pieces of constant jerk."""
 
     times_s: Floats  # start of each piece, and the end of the last
-    starts: Floats  # way, speed, acceleration at the start of each piece, shape (pieces, 3)
+    starts: Floats  # distance, speed, acceleration at the start of each piece, shape (pieces, 3)
     jerks: Floats  # of each piece
     way_m: float
 
@@ -177,7 +177,7 @@ class _Stroke:
         return cls(np.array(times), np.array(starts), np.array(jerks), way_m)
 
     def at(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Way and speed at these times; at rest before and after."""
+        """Distance and speed at these times; at rest before and after."""
         t = np.clip(time_s, 0.0, self.duration_s)
         i = np.clip(np.searchsorted(self.times_s, t, side="right") - 1, 0, len(self.jerks) - 1)
         start = self.starts[i]

@@ -1,4 +1,4 @@
-"""Friction, drive, sensor and limits: plain frozen settings; what is off is zero or infinite."""
+"""Friction, drive, sensor and limits: plain frozen settings; a disabled effect is zero or infinite."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Friction:
 
     @property
     def dry(self) -> bool:
-        """Whether anything but viscous friction is on."""
+        """Whether any other friction than the viscous one is on."""
         return any((self.motor_coulomb_n_m, self.motor_stribeck_n_m, self.load_coulomb_n, self.load_stribeck_n))
 
 
@@ -43,7 +43,7 @@ class Friction:
 class Drive:
     """The cascade of Nevaranta 2016, Fig. 7, with its rates and holds, and the motor's torque.
 
-    A tick reads the angle and the velocity y, updates what is due of the position and the velocity loop, adds the
+    A tick reads the angle and the velocity y, updates the position and the velocity loop if due, adds the
     excitation w and applies the torque u until the next tick; y is logged as read, u and w as applied.
 
     Parameters
@@ -51,19 +51,19 @@ class Drive:
     rate_hz
         Ticks per second: the rate of the record.
     velocity_rate_hz, position_rate_hz
-        Rates of the two controllers; each divides the one above it, and its output stands in between.
+        Rates of the two controllers; each divides the one above it, and its output is held in between.
     velocity_gain_n_m_s, integral_time_s
         Kvc and Ti of the PI velocity controller, backward integrator.
     position_gain_per_s, velocity_feedforward
-        Kpc of the P position controller, and what share of the reference velocity it adds.
+        Kpc of the P position controller, and the share of the reference velocity that it adds.
     delay_ticks
         Ticks between reading and the velocity controller's output acting; the excitation is added after it.
     torque_n_m_max
-        The torque u is limited to ±this, and while it is the integrator stands still; infinite by default.
+        The torque u is limited to ±this value, and the integrator stops meanwhile; infinite by default.
     torque_ripple_n_m, torque_ripple_per_turn
-        Amplitude·sin(periods·φ) added to the torque behind the logged u.
+        Amplitude·sin(periods·φ) added to the torque after the logged u.
     torque_noise_n_m
-        Standard deviation of a white Gaussian torque behind the logged u, constant over a tick.
+        Standard deviation of a white Gaussian torque added after the logged u, constant over a tick.
     """
 
     rate_hz: float = 4000.0
@@ -97,16 +97,16 @@ class Drive:
 
     @property
     def velocity_ticks(self) -> int:
-        """Ticks during which one output of the velocity controller stands."""
+        """Ticks during which one output of the velocity controller is held."""
         return round(self.rate_hz / self.velocity_rate_hz)
 
     @property
     def position_ticks(self) -> int:
-        """Ticks during which one output of the position controller stands."""
+        """Ticks during which one output of the position controller is held."""
         return round(self.rate_hz / self.position_rate_hz)
 
     def loop(self) -> Loop:
-        """What an estimator has to know about this drive.
+        """The description of this drive for an estimator.
 
         >>> Drive().loop().feedback_at(100.0).round(4)
         np.complex128(0.2309-0.0022j)
@@ -140,14 +140,14 @@ def _divides(slow_name: str, slow_hz: float, fast_name: str, fast_hz: float) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """How angle and velocity are read; exact by default.
+    """Sensor of angle and velocity; exact by default.
 
     Parameters
     ----------
     noise_rad_per_s
         Standard deviation of white Gaussian noise on the read velocity.
     encoder_counts_per_turn
-        The angle is rounded to these; the velocity carries the rounding's differences times the rate. 0: exact.
+        The angle is rounded to these; the velocity contains the rounding's differences times the rate. 0: exact.
     velocity_differenced
         The velocity is the difference of the last two angles times the rate, with its lag of half a tick; else the
         velocity at the tick itself.
@@ -168,9 +168,9 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What the machine bears: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor.
+    """Limits of the machine: a stroke of 1.6 m between the pulleys, 3000 rpm and 14.5 N m of Nevaranta's motor.
 
-    The motion keeps to them whole; the cart itself may overrun the stroke by `overrun_m` before the run is stopped.
+    The reference is always within them; the cart itself may overrun the stroke by `overrun_m` before the run stops.
     """
 
     position_m_min: float = 0.2
@@ -194,5 +194,5 @@ class Limits:
 
     @property
     def stops_m(self) -> tuple[float, float]:
-        """Where the run is stopped."""
+        """Positions at which the run stops."""
         return self.position_m_min - self.overrun_m, self.position_m_max + self.overrun_m

@@ -1,4 +1,4 @@
-"""SimulatedAxis: a BeltAxis as a source of Blocks, with its truth beside."""
+"""SimulatedAxis: a BeltAxis as a source of Blocks, with its truth."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SimulatedAxis:
-    """A machine on the bench. Every iteration starts it anew at the motion's start, at rest or run in (`run_in_s`).
+    """A simulated machine. Every iteration starts it again at the motion's start, at rest or run in (`run_in_s`).
 
     Channels: w and u (N m, as applied), velocity and position of the motor as the drive reads them, the cart's
-    position x, and the references of the motor. How the samples are cut into Blocks changes none of them.
+    position x, and the references of the motor. They do not depend on how the samples are cut into Blocks.
 
     Examples
     --------
@@ -62,12 +62,12 @@ class SimulatedAxis:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], object] = time.sleep,
     ) -> Iterator[Block]:
-        """The samples from the first to the last, as fast as it can, or with `real_time` none before its time.
+        """The samples from the first to the last, as fast as possible, or with `real_time` none before its time.
 
         Raises
         ------
         UsageError
-            At once for a missing channel or a block size that is no whole number of at least 1.
+            Immediately for a missing channel or a block size that is not a whole number of at least 1.
         DivergenceError
             While iterating, when the state is not finite or the cart leaves its limits.
         """
@@ -83,8 +83,8 @@ class SimulatedAxis:
         if self.samples is None:
             raise UsageError(
                 "out-of-range",
-                "seconds=inf: a run without end does not fit into one block",
-                "give seconds, or take blocks",
+                "seconds=inf: an infinite run does not fit into one block",
+                "specify seconds, or use blocks",
                 argument="seconds",
             )
         return next(self.pairs(max(1, self.samples)))
@@ -111,7 +111,7 @@ class SimulatedAxis:
 
     def _run_in(self, engine: Engine, position_reference: float) -> None:
         axis = self.axis
-        # Whole repetitions of the slowest controller, so that sample 0 is one of its ticks, as without.
+        # Whole repetitions of the slowest controller, so that sample 0 is one of its ticks, as without a run-in.
         every = axis.drive.position_ticks
         ticks = every * ceil(axis.run_in_s * self.rate_hz / every)
         if not ticks:

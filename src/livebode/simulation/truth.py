@@ -1,4 +1,4 @@
-"""Truth: what the machine really was at each sample, for tests alone."""
+"""Truth: real state and parameters of the machine at each sample, for tests only."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Truth:
     states
         Angle and speed of each pulley, then position and speed of the cart, shape (states, samples).
     condition
-        What the faults made of the machine at each sample.
+        The machine's condition under its faults at each sample.
     """
 
     axis: BeltAxis
@@ -74,7 +74,7 @@ class Truth:
         return np.full(len(self), self.axis.mechanics.inertia_kg_m2)
 
     def linear(self, sample: int) -> StateSpace:
-        """The linearisation at the machine's place and condition at one sample, torque to motor velocity."""
+        """The linearisation at the machine's position and condition at one sample, torque to motor velocity."""
         return self.axis.linear(*self._place(sample))
 
     def sampled(self, sample: int) -> Sampled:

@@ -1,6 +1,6 @@
-"""The simulated axis in plain Python: the readable definition that tests hold simulation/axis.c against, bit by bit.
+"""The simulated axis in plain Python: the readable definition that tests compare with simulation/axis.c, bit by bit.
 
-Plant and Controller take and give numbers; the plant may be another one with the same `read` and `step` (an FMU).
+Plant and Controller exchange numbers; the plant may be another one with the same `read` and `step` (an FMU).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Settings = Mapping[str, Any]
 
 
 class Now(NamedTuple):
-    """What one tick is given: references, excitation, noise, and the machine's condition."""
+    """Inputs of one tick: references, excitation, noise, and the machine's condition."""
 
     position_reference: float
     velocity_reference: float
@@ -145,7 +145,7 @@ class Plant:
         return [state[1], first, state[3], second, state[5], f1 - f2]
 
     def _held(self, now: Now, s1: float, s2: float, state: Sequence[float]) -> tuple[float, float]:
-        """The belt where it holds the cart: the cart itself, or within the play where the spans would have it."""
+        """Position of the belt at the cart: that of the cart, or within the play the equilibrium of the spans."""
         if now.gap_m == 0:
             return state[4], state[5]
         r = self.settings["radius_m"]
@@ -157,7 +157,7 @@ class Plant:
 
 
 class Controller:
-    """What the drive reads and what it makes of it (Nevaranta 2016, Fig. 7)."""
+    """Sensor and control of the drive (Nevaranta 2016, Fig. 7)."""
 
     def __init__(self, settings: Settings, angle: float) -> None:
         self.settings = settings

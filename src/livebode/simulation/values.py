@@ -1,4 +1,4 @@
-"""Checks of single settings, each with its sentence."""
+"""Checks of single settings, each with its message."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from livebode.core import UsageError
 
 
 def positive(owner: object, *names: str) -> None:
-    """UsageError unless each of these attributes is finite and above 0."""
+    """Raise UsageError if one of these attributes is not finite and above 0."""
     for name in names:
         value = getattr(owner, name)
         if not (isfinite(value) and value > 0):
@@ -22,7 +22,7 @@ def positive(owner: object, *names: str) -> None:
 
 
 def nonnegative(owner: object, *names: str) -> None:
-    """UsageError unless each of these attributes is finite and not below 0."""
+    """Raise UsageError if one of these attributes is not finite or below 0."""
     for name in names:
         value = getattr(owner, name)
         if not (isfinite(value) and value >= 0):
@@ -36,7 +36,7 @@ def nonnegative(owner: object, *names: str) -> None:
 
 
 def count(owner: object, name: str, most: int) -> None:
-    """UsageError unless the attribute is a whole number from 0 to `most`."""
+    """Raise UsageError if the attribute is not a whole number from 0 to `most`."""
     value = getattr(owner, name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
         raise UsageError(
