@@ -5,7 +5,7 @@
 
 #include "dop853.h"
 
-/* What friction and play need of one degree of freedom. */
+/* Values of one degree of freedom for friction and play. */
 typedef struct {
     double slack, rate; /* elongation beyond the play, and its time derivative */
 } lb_play;
@@ -80,7 +80,7 @@ static void three_masses(const lb_axis_config *c, const double *now, lb_belt spa
     const double r = c->radius_m, l3 = c->pulley_distance_m, k = span.k, b = span.b;
     const lb_pulley m = pulley(c, s[0], s[1]);
     const double s1 = 1.0 / at, s2 = 1.0 / (l3 - at), s3 = 1.0 / l3;
-    /* The belt where it holds the cart: the cart itself, or within the play where the spans alone would have it. */
+    /* Position of the belt at the cart: that of the cart, or within the play the equilibrium of the spans. */
     const double free = (s1 * m.travel + s2 * (r * s[2])) / (s1 + s2);
     const double free_rate = (s1 * m.speed + s2 * (r * s[3])) / (s1 + s2);
     const lb_play p = play(now[LB_AXIS_GAP], free - s[4], free_rate - s[5]);
@@ -153,7 +153,7 @@ static int alive(const lb_axis_config *c, const lb_axis_state *state) {
     return x >= c->position_m_min && x <= c->position_m_max;
 }
 
-/* What the drive reads: the angle in steps of the encoder, and the velocity with the steps' differences. */
+/* Readings of the drive: the angle in steps of the encoder, and the velocity with the steps' differences. */
 static double read_velocity(const lb_axis_config *c, lb_axis_state *state) {
     const double angle = state->plant[0], q = c->encoder_step_rad;
     const double reading = q > 0.0 ? floor(angle / q + 0.5) * q : angle;

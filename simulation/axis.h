@@ -1,6 +1,6 @@
-/* The belt drive under its cascade, tick by tick. C99; memory belongs to the caller; nothing but libm's sqrt, floor, fabs
- * and (for torque ripple and an eccentric pulley alone) sin and cos. The readable definition is src/livebode/simulation/twin.py; same order of operations,
- * same bits. */
+/* The belt drive under its cascade, tick by tick. C99; memory belongs to the caller; it uses only libm's sqrt, floor,
+ * fabs and (for torque ripple and an eccentric pulley) sin and cos. The readable definition is
+ * src/livebode/simulation/twin.py; same order of operations, same bits. */
 #ifndef LB_AXIS_H
 #define LB_AXIS_H
 
@@ -17,7 +17,7 @@ typedef struct {
     double position_m, width_m, loss;
 } lb_axis_spot;
 
-/* Everything that does not change during a run. */
+/* Constants of a run. */
 typedef struct {
     int states; /* 4: two masses (phi, omega, x, v); 6: three masses (phi1, omega1, phi2, omega2, x, v) */
     double motor_inertia_kg_m2, pulley_inertia_kg_m2, radius_m;
@@ -41,7 +41,7 @@ typedef struct {
     double position_m_min, position_m_max;
 } lb_axis_config;
 
-/* Everything that does. */
+/* State of a run. */
 typedef struct {
     double plant[LB_AXIS_STATES];
     double integral, held, control, reading, angle;
@@ -50,7 +50,7 @@ typedef struct {
     uint64_t tick;
 } lb_axis_state;
 
-/* Rows of the input: what may change from tick to tick. */
+/* Rows of the input: quantities that may change from tick to tick. */
 enum {
     LB_AXIS_POSITION_REFERENCE, /* rad */
     LB_AXIS_VELOCITY_REFERENCE, /* rad/s */
@@ -64,7 +64,8 @@ enum {
     LB_AXIS_DISTURBANCE         /* N m on the motor's shaft, not in the logged torque */
 };
 
-/* At rest with the motor at position_m / radius_m and no span elongated: the cart is at position_m, but for eccentricity. */
+/* At rest with the motor at position_m / radius_m and no span elongated: the cart is at position_m, except for
+ * eccentricity. */
 void lb_axis_rest(const lb_axis_config *config, double position_m, lb_axis_state *state);
 
 /* Time derivative of the plant's state under a torque; now[LB_AXIS_INPUTS] is one column of the input. */
@@ -73,7 +74,7 @@ void lb_axis_derivative(const lb_axis_config *config, const double *now, double 
 
 /* Advances by `ticks`. input: LB_AXIS_INPUTS rows, output: torque, velocity, position reading, then the plant's state,
  * each row `ticks` long and one after the other. Returns the ticks done: fewer than `ticks` when the state at the start
- * of the next one is not finite or the cart is outside its limits; that state is left in `state`. */
+ * of the next one is not finite or the cart is outside its limits; `state` then contains that state. */
 size_t lb_axis_advance(const lb_axis_config *config, lb_axis_state *state, size_t ticks, const double *input,
                        double *output);
 

@@ -1,6 +1,6 @@
 /* The twelve stages of Dormand and Prince's method of order 8 (Hairer, Norsett, Wanner, Solving Ordinary
  * Differential Equations I, section II.10), without the coefficients that are zero: row i is stage i + 2, the last
- * row the step. A test holds these numbers against scipy.integrate.DOP853. */
+ * row the step. A test compares these numbers with scipy.integrate.DOP853. */
 #ifndef LB_DOP853_H
 #define LB_DOP853_H
 

@@ -1,4 +1,4 @@
-/* Which inner kernel runs. With LB_DISPATCH the build holds several and the machine is asked. */
+/* Selects the inner kernel. With LB_DISPATCH the build contains several, and the machine decides. */
 #include "state.h"
 #ifndef LB_SCALAR
 

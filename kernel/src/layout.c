@@ -1,4 +1,4 @@
-/* size, init, reset: how an object lies in the caller's memory. */
+/* size, init, reset: layout of an object in the caller's memory. */
 #include "state.h"
 
 /* Of vectors; without them of double and uint64_t. */
@@ -52,7 +52,7 @@ static void *take(cursor *at, uint64_t bytes)
     return here;
 }
 
-/* The one list of what lies where: measures with base = null, lays out with a base. No product overflows: window,
+/* The only list of the memory's parts: measures with base = null, lays out with a base. No product overflows: window,
  * channels and bins are bounded (at most 2^24 · 2^24 · 2^7 bytes). */
 static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
 {

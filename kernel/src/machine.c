@@ -1,4 +1,4 @@
-/* Which instruction set this machine has. One object for both number types. */
+/* The instruction set of this machine. One object for both number types. */
 #include "livebode/sdft.h"
 
 lb_instruction_set lb_best_instruction_set(void)

@@ -2,7 +2,7 @@
 #include "one.h"
 #ifdef LB_SCALAR
 
-/* One body for each way, so that none asks within its loop. */
+/* One body for each direction, so that the loop contains no branch on it. */
 LB_RARELY void out_by_rows(const LB_DFT *t, const real *x, ptrdiff_t stride) { go_out(t, x, stride, 0); }
 LB_RARELY void out_compact(const LB_DFT *t, const real *x, ptrdiff_t stride) { go_out(t, x, stride, 1); }
 LB_RARELY void back_by_rows(const LB_DFT *t, const real *x, ptrdiff_t stride) { go_back(t, x, stride, 0, 0); }
@@ -44,7 +44,7 @@ LB_RARELY void tiny(const LB_DFT *t, const real *samples, ptrdiff_t stride)
     }
 }
 
-/* The variants to compare with that never renew their sums. */
+/* The variants for comparison that never renew their sums. */
 LB_RARELY void unrenewed(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
     real *line = t->line + t->index;
@@ -84,7 +84,7 @@ lb_status LB(push)(LB_DFT *t, const real *samples)
     return LB_OK;
 }
 
-/* Nothing is cheaper later: here nothing ever waits. */
+/* A delay has no advantage here, so no sample waits. */
 lb_status LB(queue)(LB_DFT *t, const real *samples) { return LB(push)(t, samples); }
 
 void LB(catch_up)(LB_DFT *t) { (void)t; }

@@ -1,11 +1,11 @@
-/* What one sample does to the sums, bin after bin, for machines without vectors. Private; the bits are those of the
+/* Update of the sums by one sample, bin after bin, for machines without vectors. Private; the bits are those of the
  * tiles, and tile.h explains S, F and the images. */
 #ifndef LB_ONE_H
 #define LB_ONE_H
 
 #include "state.h"
 
-/* Often: with what is known at compile time worked in. Rarely: kept out of the step, so that its registers are its own. */
+/* Often: inlined with constants of the compile time. Rarely: not inlined, so that it uses no registers of the step. */
 #if defined(__GNUC__) || defined(__clang__)
 #define LB_OFTEN static inline __attribute__((always_inline))
 #define LB_RARELY __attribute__((noinline)) static
@@ -52,7 +52,7 @@ LB_OFTEN const real *next_of(twiddles *w, const real *table, uint32_t window, in
     return w->at - 2;
 }
 
-/* First half of a period. Two channels at a time share what is loaded of the row. */
+/* First half of a period. Two channels at a time share the loaded part of the row. */
 LB_OFTEN void go_out(const LB_DFT *t, const real *samples, ptrdiff_t stride, int compact)
 {
     const twiddles row = first_of(t, t->index, compact);
@@ -91,7 +91,7 @@ typedef struct {
 LB_OFTEN brought brought_back(real *line, ptrdiff_t image, real x, const real *first)
 {
     brought b;
-    b.even = image ? x + line[image] : x; /* its own image counts once */
+    b.even = image ? x + line[image] : x; /* its own image is added once */
     b.odd = image ? x - line[image] : x;
     b.first = *first;
     b.x = taken_in(line, x);

@@ -1,4 +1,4 @@
-/* read: the spectra now, also through the taps of a window. */
+/* read: the present spectra, also with the taps of a window. */
 #include "state.h"
 
 /* a0, a1/2, a2/2 of w(n) = a0 − a1·cos(2πn/N) + a2·cos(4πn/N). */
@@ -44,7 +44,7 @@ void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
         LB(row)(t, channel, LB_PHASE_WINDOW, t->spectrum);
         apply_taps(t, out);
     } else {
-        LB(row)(t, channel, LB_PHASE_FIXED, out); /* their sums are in the window's phase as they are */
+        LB(row)(t, channel, LB_PHASE_FIXED, out); /* their sums already have the window's phase */
     }
     if (phase == LB_PHASE_FIXED) {
         turn_back(t, out);

@@ -28,14 +28,14 @@ typedef int32_t lb_lane_index;
 #define LB_BLOCK (512 / LB_BITS)
 #endif
 
-/* Samples whose sums are done in one go: long enough that loading and storing the sums is cheap. */
+/* Samples per update of the sums: enough that loading and storing the sums is cheap. */
 #if !defined(LB_TILE) && defined(LB_SCALAR)
-#define LB_TILE 0 /* none waits */
+#define LB_TILE 0 /* no sample waits */
 #elif !defined(LB_TILE)
 #define LB_TILE 128
 #endif
 
-/* The same where every sample makes a row: rows, samples and table rows stay in the first-level cache. */
+/* The same where every sample gives a row: rows, samples and table rows remain in the first-level cache. */
 #ifndef LB_DENSE_TILE
 #define LB_DENSE_TILE 64
 #endif

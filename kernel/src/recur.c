@@ -1,4 +1,4 @@
-/* The variants to compare with that never renew their sums. */
+/* The variants for comparison that never renew their sums. */
 #include "state.h"
 
 /* X_k(n) = (r·X_k(n−1) + x(n) − r^N·x(n−N))·e^(j2πk/N); r = 1 is Nevaranta 2016, eq. (4). */

@@ -27,7 +27,7 @@ static void fill_compact(LB_DFT *t)
         t->table[2u * r + 1u] = (real)sine;
     }
     for (size_t i = 0; i < (LB_TILE + 1u) * t->row_length; ++i) {
-        t->rows[i] = 0; /* the places of no bin are never gathered */
+        t->rows[i] = 0; /* places without a bin are never gathered */
     }
 }
 

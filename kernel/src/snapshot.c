@@ -1,5 +1,5 @@
-/* snapshot, restore: header, bins, delay lines, sums, and a checksum over it all. Sums lie bin by bin, so that a
- * snapshot does not depend on the width of the vectors. */
+/* snapshot, restore: header, bins, delay lines, sums, and a checksum over all of it. Sums are stored bin by bin, so
+ * that a snapshot does not depend on the width of the vectors. */
 #include "state.h"
 
 #define LB_SNAPSHOT_MAGIC 0x4642424Cu /* "LBBF" where the least byte comes first */

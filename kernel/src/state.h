@@ -1,4 +1,4 @@
-/* What an object is, inside the caller's memory. Private. */
+/* An object inside the caller's memory. Private. */
 #ifndef LB_STATE_H
 #define LB_STATE_H
 
@@ -10,16 +10,16 @@ struct LB_DFT {
     lb_variant variant;
     double damping;
     uint32_t window, channels, bin_count;
-    uint32_t inner_count; /* the bins asked for, then the neighbours that a window's taps need */
-    uint32_t half;        /* ⌈N/2⌉: from this index on the table is walked backwards */
+    uint32_t inner_count; /* the requested bins, then the neighbours that a window's taps need */
+    uint32_t half;        /* ⌈N/2⌉: from this index on the table is read backwards */
     size_t blocks;        /* of inner bins */
     size_t row_length;    /* reals per table row */
     size_t line_length;   /* reals per channel's delay line */
     real radius;          /* LB_DAMPED: r; else 1 */
     real radius_window;   /* r^N */
-    uint64_t count;       /* samples that the sums have seen */
+    uint64_t count;       /* samples that the sums contain */
     uint32_t index;       /* of the next sample in its period: count mod N */
-    uint32_t queued;      /* newer samples that wait, < LB_TILE */
+    uint32_t queued;      /* newer waiting samples, < LB_TILE */
     int compact;          /* the table is [window][2]: cos, sin of 2πr/N */
     real *table;          /* else [half + 1][blocks][2][LB_BLOCK]: cos, sin */
     real *rows;           /* compact: [LB_TILE + 1][blocks][2][LB_BLOCK], gathered from the table */
@@ -63,15 +63,15 @@ static inline const real *lb_table_row(const LB_DFT *t, uint32_t number)
     return t->compact ? LB(gathered)(t, number, 0) : t->table + (size_t)number * t->row_length;
 }
 
-/* The table row of the index, and whether it is to be conjugated. */
+/* The table row of the index, and whether it must be conjugated. */
 static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards)
 {
     *backwards = index >= t->half;
     return lb_table_row(t, *backwards ? t->window - index : index);
 }
 
-/* The row that demodulates the sums now: the next sample's, as the last one's direction finds it. It is the same row
- * as lb_row's where the directions meet, and yet another sign of its zeros. */
+/* The row that demodulates the present sums: that of the next sample in the direction of the last one. Where the
+ * directions meet it is the same row as lb_row's, but with another sign of its zeros. */
 static inline const real *lb_next_row(const LB_DFT *t, int *backwards)
 {
     const uint32_t last = (t->index ? t->index : t->window) - 1u;
@@ -84,13 +84,13 @@ static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + 
 /* The instruction set, where this machine and this build have it. */
 lb_status LB(choose)(LB_DFT *t, lb_instruction_set set);
 
-/* Where samples come from. */
+/* Source of samples. */
 typedef struct {
     const real *samples;
     ptrdiff_t channel_stride, sample_stride;
 } lb_input;
 
-/* Rows that samples are to make. */
+/* Rows that are due. */
 typedef struct {
     size_t first, hop;
     lb_phase phase;
@@ -107,7 +107,7 @@ void LB(skip)(LB_DFT *t, lb_input *in, size_t length);
 void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
 #endif
 
-/* Brings the sums up to date with the samples that wait. */
+/* Updates the sums with the waiting samples. */
 void LB(catch_up)(LB_DFT *t);
 
 /* The unrenewed variants' recursion over a tile. */

@@ -1,5 +1,5 @@
 /* Compiled once per number type and instruction set, always with -ffp-contract=off: products are rounded before
- * they are added, on every machine, so every object makes the same bits. */
+ * they are added, on every machine, so every object gives the same bits. */
 #include "tile.h"
 #ifndef LB_SCALAR
 #include "vec.h"
@@ -16,8 +16,8 @@ extern const lb_kernel LB_KERNEL_NAME;
 /* Vector v of a unit: which block of the unit, and where in it. */
 #define LB_PLACE(v, block_reals) ((v) / LB_PARTS * (block_reals) + (v) % LB_PARTS * LB_LANES)
 
-/* A unit is what is worked on at once: `n` vectors, one block or LB_ABREAST of them. n is always known where these
- * are inlined, so that all of this lies in registers. */
+/* A unit is processed at once: `n` vectors, one block or LB_ABREAST of them. n is always known where these
+ * are inlined, so that all of this is in registers. */
 typedef struct {
     vec s_re[LB_MOST], s_im[LB_MOST], f_re[LB_MOST], f_im[LB_MOST];
 } unit_sums;
@@ -68,7 +68,7 @@ LB_INLINE unit_row load_row(const real *p, int n)
     return t;
 }
 
-/* S += d·e^(−jθ) on the way out, d·e^(+jθ) on the way back. */
+/* S += d·e^(−jθ) in the forward direction, d·e^(+jθ) in the return direction. */
 LB_INLINE unit_sums step_s(unit_sums a, unit_row t, const real *delta, int backwards, int n)
 {
     for (int v = 0; v < n; ++v) {
@@ -82,7 +82,7 @@ LB_INLINE unit_sums step_s(unit_sums a, unit_row t, const real *delta, int backw
     return a;
 }
 
-/* F, on the way back only: by the even and the odd part. */
+/* F, in the return direction only: by the even and the odd part. */
 LB_INLINE unit_sums step_f(unit_sums a, unit_row t, const real *delta, int n)
 {
     for (int v = 0; v < n; ++v) {
@@ -108,7 +108,7 @@ LB_INLINE void emit(real *out, unit_sums a, unit_row next, lb_phase phase, int b
     }
 }
 
-/* Where a unit's work lies, and how it is done. */
+/* Data of a unit, and how it is processed. */
 typedef struct {
     real *sums;
     const real *row;
@@ -121,8 +121,8 @@ typedef struct {
     size_t valid; /* of the last block: reals of its rows that exist; else 0 */
 } unit;
 
-/* A row of the last block: what it writes too much, the next rows overwrite; where there are none, only what
- * exists is written. */
+/* A row of the last block: the next rows overwrite its surplus; where there are none, only existing values
+ * are written. */
 LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
 {
     if (u.out_end - u.out >= 2 * LB_BLOCK) {
@@ -147,7 +147,7 @@ LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
     return u;
 }
 
-/* F of a whole tile by itself, for processors whose registers do not hold S, F and a row at once. */
+/* F of a whole tile by itself, for processors with too few registers for S, F and a row at once. */
 LB_INLINE void renew(const lb_tile *t, unit u)
 {
     unit_sums a;
@@ -245,7 +245,7 @@ LB_INLINE void run_sparse(const lb_tile *t, unit u)
 
 LB_INLINE void run_blocks(const lb_tile *t, size_t block, int backwards, int blocks, int tail)
 {
-    /* Channels within blocks: the table's rows come from afar, and are near for the second channel. */
+    /* Channels within blocks: the table's rows are slow to load, and in the cache for the second channel. */
     for (size_t c = 0; c < t->channels; ++c) {
         unit u;
         u.sums = t->sums + (c * t->blocks + block) * 4 * LB_BLOCK;
@@ -271,7 +271,7 @@ LB_INLINE void run_blocks(const lb_tile *t, size_t block, int backwards, int blo
 
 LB_INLINE void run(const lb_tile *t, int backwards)
 {
-    /* The last block first: what it writes too much belongs to the others. */
+    /* The last block first: its surplus belongs to the others. */
     const size_t whole = t->bins / LB_BLOCK;
     size_t block = 0;
     if (whole < t->blocks) {
@@ -297,7 +297,7 @@ static void fold(const lb_tile *t, size_t channel)
         even[i] = here[i] + image[-i];
         odd[i] = here[i] - image[-i];
     }
-    if (t->middle) { /* it counts once */
+    if (t->middle) { /* added only once */
         even[0] = odd[0] = here[0];
     }
 }
@@ -333,7 +333,7 @@ static void read_row(const lb_tile *t)
 static void take_in(real *restrict delta, real *restrict line, const real *restrict samples, ptrdiff_t stride,
                     size_t length)
 {
-    if (stride == 1) { /* apart, so that it becomes vectors */
+    if (stride == 1) { /* a separate loop, so that it is vectorised */
         for (size_t i = 0; i < length; ++i) {
             delta[i] = samples[i] - line[i];
             line[i] = samples[i];

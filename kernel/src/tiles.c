@@ -1,4 +1,4 @@
-/* Samples by the tile: take them in, and let the inner kernel of the instruction set bring the sums up to date. */
+/* Samples by the tile: store them, and let the inner kernel of the instruction set update the sums. */
 #include "state.h"
 #ifndef LB_SCALAR
 
@@ -32,7 +32,7 @@ static void seed(LB_DFT *t, size_t channel)
     }
 }
 
-/* Where the table rows of the tile lie, one for each sample and the next one's after them. */
+/* Positions of the table rows of the tile, one for each sample and the next one's after them. */
 static void find_rows(const LB_DFT *t, uint32_t start, lb_tile *tile)
 {
     tile->row = lb_row(t, start, &tile->backwards);
@@ -46,7 +46,7 @@ static void find_rows(const LB_DFT *t, uint32_t start, lb_tile *tile)
     }
 }
 
-/* The sums of `length` samples from `start` on, which lie in one half of the period and whose differences begin at
+/* The sums of `length` samples from `start` on, which are in one half of the period and whose differences begin at
  * `offset`, and the rows due among them. */
 static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length, const lb_rows_due *due)
 {
@@ -88,7 +88,7 @@ static void passed(lb_rows_due *due, size_t length, size_t row_reals)
     due->first += rows * due->hop - length;
 }
 
-/* The sums of the `length` samples taken in last, which end at the index. */
+/* The sums of the last `length` stored samples, which end at the index. */
 static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 {
     const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
@@ -113,7 +113,7 @@ static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
     t->index = t->index == t->window ? 0 : t->index;
 }
 
-/* As many of the samples as make one tile within the period, at most `length`; returns their number. */
+/* Stores the samples of one tile within the period, at most `length`; returns their number. */
 static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due)
 {
     const size_t n = smaller(length, smaller(LB_TILE, t->window - t->index));
@@ -178,7 +178,7 @@ void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
     }
 }
 
-/* The way of the inner kernels' rows, and so their bits. */
+/* The same computation as the inner kernels' rows, and so the same bits. */
 void LB(row)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
     lb_tile tile;

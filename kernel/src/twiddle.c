@@ -1,6 +1,6 @@
 #include "twiddle.h"
 
-/* Taylor sums on [0, π/4]; what is cut off is below 1e-19. */
+/* Taylor sums on [0, π/4]; the truncation error is below 1e-19. */
 static double small_sin(double a)
 {
     const double z = a * a;
@@ -31,7 +31,7 @@ static double small_cos(double a)
 
 void lb_twiddle(uint32_t r, uint32_t N, double *cosine, double *sine)
 {
-    /* Reduced in integers, so that no angle is ever rounded before it is in [0, π/4]. */
+    /* Reduced in integers, so that no angle is rounded before it is in [0, π/4]. */
     const int mirrored = (uint64_t)r * 2u > N;
     const uint64_t eighths = 8u * (uint64_t)(mirrored ? N - r : r);
     const unsigned octant = (unsigned)(eighths / N); /* 0 … 4 */

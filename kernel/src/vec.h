@@ -13,7 +13,7 @@
 #define LB_LANES (128 / LB_BITS)
 #endif
 
-/* Calls where speed is no matter: with the sanitizers' checks, inlining makes objects of megabytes. */
+/* Calls where speed does not matter: with the sanitizers' checks, inlining gives objects of megabytes. */
 #ifndef LB_INLINE
 #define LB_INLINE static inline __attribute__((always_inline))
 #endif
@@ -53,7 +53,7 @@ typedef lb_lane_index lanes __attribute__((vector_size(LB_LANES * sizeof(real)))
 #endif
 
 /* re and im of LB_LANES slots as pairs: the low halves of the 128-bit lanes are bins of the block's first half,
- * the high halves of its second (lb_slot). `out` is where the first of them goes. */
+ * the high halves of its second (lb_slot). `out` is the destination of the first of them. */
 LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 {
     *(loose_vec *)(void *)out = (loose_vec)LB_SHUFFLE(re, im, LB_LOW);
@@ -74,7 +74,7 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 #define LB_MANY_REGISTERS 0
 #endif
 
-/* Blocks worked on at once: enough independent sums to hide the adder's latency, few enough for the registers. */
+/* Blocks processed at once: enough independent sums to hide the adder's latency, few enough for the registers. */
 #ifndef LB_ABREAST
 #if LB_LANES == LB_BLOCK
 #define LB_ABREAST 2

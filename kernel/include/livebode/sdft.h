@@ -1,4 +1,4 @@
-/* Modulated sliding DFT at chosen bins: the public face.
+/* Modulated sliding DFT at chosen bins: the public interface.
  *
  *   size → init → push | queue | process → read        (every call returns a status)
  *
@@ -29,10 +29,10 @@ typedef enum {
     LB_ERROR_VARIANT,         /* unknown variant */
     LB_ERROR_DAMPING,         /* damping of the damped variant is not in (0, 1) */
     LB_ERROR_INSTRUCTION_SET, /* unknown, or this machine or build does not have it */
-    LB_ERROR_SIZE,            /* the configuration needs more memory than size_t can say */
-    LB_ERROR_MEMORY,          /* the memory is smaller than size() said */
+    LB_ERROR_SIZE,            /* the configuration needs more memory than size_t can represent */
+    LB_ERROR_MEMORY,          /* the memory is smaller than size() reports */
     LB_ERROR_PHASE,           /* unknown phase */
-    LB_ERROR_ROWS,            /* the output has not exactly the rows that these samples make */
+    LB_ERROR_ROWS,            /* the output does not have exactly the rows of these samples */
     LB_ERROR_SNAPSHOT_LENGTH, /* a snapshot of another length: cut off, or of another configuration */
     LB_ERROR_SNAPSHOT_MAGIC,  /* not a snapshot, or one of another byte order or version */
     LB_ERROR_SNAPSHOT_CONFIG, /* a snapshot of another configuration */
@@ -40,12 +40,12 @@ typedef enum {
     LB_ERROR_TABLE            /* unknown table, or a compact one with window > LB_COMPACT_WINDOW_MAX */
 } lb_status;
 
-/* All but the first are there to compare with. Windows are exact taps over neighbouring bins (Jacobsen & Lyons
+/* All except the first are for comparison. Windows are exact taps over neighbouring bins (Jacobsen & Lyons
  * 2003): three for Hann and Hamming, five for Blackman. */
 typedef enum {
-    LB_MODULATED = 0, /* table-modulated, sums renewed every window: bounded error for ever */
+    LB_MODULATED = 0, /* table-modulated, sums renewed every window: permanently bounded error */
     LB_PLAIN,         /* Nevaranta 2016, eq. (4): marginally stable, drifts */
-    LB_DAMPED,        /* (4) with a pole inside the unit circle: forgets, but is biased */
+    LB_DAMPED,        /* (4) with a pole inside the unit circle: no drift, but biased */
     LB_HANN,
     LB_HAMMING,
     LB_BLACKMAN
@@ -62,7 +62,7 @@ typedef enum {
     LB_AVX512
 } lb_instruction_set;
 
-/* The twiddles in memory. ROWS: window/2 + 2 rows of bin_count each, read as they lie. COMPACT: window entries for all
+/* The twiddles in memory. ROWS: window/2 + 2 rows of bin_count each, read in place. COMPACT: window entries for all
  * bins, gathered for every sample: for machines with little memory. The bits are the same. */
 typedef enum { LB_TABLE_ROWS = 0, LB_TABLE_COMPACT } lb_table;
 
@@ -77,7 +77,7 @@ typedef struct {
     lb_table table;
 } lb_config;
 
-/* The instruction set that LB_BEST stands for on this machine. */
+/* The instruction set that LB_BEST selects on this machine. */
 lb_instruction_set lb_best_instruction_set(void);
 
 #define LB_SUFFIX 64

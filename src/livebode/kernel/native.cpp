@@ -1,5 +1,5 @@
-// The C kernel as a Python class. Argument checks with words are Python's (_arguments.py); what arrives here in
-// the usual form takes the fast way and meets none of them.
+// The C kernel as a Python class. Argument checks with messages are in Python (_arguments.py); arguments in
+// the usual form take the fast path without them.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -52,7 +52,7 @@ struct View {
     View &operator=(const View &) = delete;
 };
 
-// What the kernel takes: strides in elements.
+// Arguments of the kernel: strides in elements.
 struct Samples {
     const void *data;
     ptrdiff_t channel_stride, sample_stride;
@@ -156,7 +156,7 @@ class Engine {
     }
 
   private:
-    // Bins × samples from which on other threads may run meanwhile.
+    // Bins × samples from which other threads may run meanwhile.
     static constexpr size_t long_work = 50'000;
 
     uint32_t window_, channels_;
@@ -283,7 +283,7 @@ class Engine {
                reinterpret_cast<uintptr_t>(b.buf) % real_bytes() == 0;
     }
 
-    // Whether the output lies over the input, by the ends of both.
+    // Whether the output overlaps the input, by the ends of both.
     bool overlap(const Py_buffer &out, const Samples &in) const {
         if (in.length == 0 || out.len == 0) return false;
         const auto item = static_cast<ptrdiff_t>(real_bytes());
