@@ -1,7 +1,7 @@
 /* The inner kernel: the sums of all channels over one tile of samples. Private.
  *
  * Table row r holds, per block of LB_BLOCK bins, cos then sin of 2πkr/N. Only r = 0 … ⌈N/2⌉ are stored: row N − r
- * is the conjugate of row r, so the second half of a period reads the rows backwards with the sign of the sine inverted.
+ * is the conjugate of row r, so the second half of a period reads the rows backwards with an inverted sine.
  *
  * The same symmetry halves the work of the second sum F: sample j of the second half meets its mirror image N − j of
  * the first, and both share a row: x_j·e^(+jθ) + x_(N−j)·e^(−jθ) = (x_j + x_(N−j))·cos θ + j·(x_j − x_(N−j))·sin θ.

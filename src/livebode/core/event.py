@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Event:
-    """Something that a person should know, at one moment of the recording.
+    """Something that a person should know, at one time of the recording.
 
     `kind` is a stable word that programs may rely on (``gap``, ``non-finite``, ``spike``, ``held``), `sample` the
     number of the first sample that it concerns, `time_s` its time in the source's clock, `message` one sentence for

@@ -22,7 +22,7 @@ WINDOW_MAX = 1 << 24
 
 @dataclass(frozen=True)
 class Lines:
-    """Frequencies k·rate/N with whole k: the lines that a sliding DFT over N samples sees without leakage.
+    """Frequencies k·rate/N with whole k: the lines of a sliding DFT over N samples without leakage.
 
     Nevaranta 2016, eq. (17): a line is on the grid when k = N·Ts·f is a whole number.
 

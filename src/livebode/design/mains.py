@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from livebode.core import Lines
 
 MAINS_HZ = (50.0, 60.0)
-_NEAR_BINS = 0.5  # from a harmonic: a window sees at most 40 % of its power farther away
+_NEAR_BINS = 0.5  # from a harmonic: farther away, at most 40 % of its power is in a window's bin
 
 
 def meets_mains(bins: Sequence[int], resolution_hz: float, mains_hz: Sequence[float]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""What a Tracker and a SpectraTracker have in common: the line stage behind them, and their snapshots."""
+"""Common part of Tracker and SpectraTracker: the line stage that follows them, and their snapshots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From spectra at the lines to frequency responses with bounds: all of a Tracker that comes after the kernel."""
+"""From spectra at the lines to frequency responses with bounds: the part of a Tracker after the kernel."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Estimate:
 class LineStage:
     """Responses from spectra that were computed by the kernel here or in the drive.
 
-    Spectra are told apart by their place in the period, so that each hop has its own past of whole periods; spectra
+    Spectra are sorted by their place in the period, so that each hop has its own history of whole periods; spectra
     further apart than a window are one series.
 
     Parameters
@@ -72,7 +72,7 @@ class LineStage:
 
     @property
     def bins(self) -> NDArray[np.int64]:
-        """The bins that it needs, in the order in which it takes them."""
+        """The required bins, in the order of the input."""
         lines = self._settings.lines
         bins = self._hann.bins if self._hann else np.asarray(lines.bins)
         return np.concatenate([bins, self._detection.bins]).astype(np.int64) if self._detection else bins

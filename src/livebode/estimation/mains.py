@@ -80,7 +80,7 @@ class Mains:
 
 
 class _Neighbours:
-    """Bins at which a tone may be, and those beside each with which it is compared."""
+    """Bins at which a tone may be, and the neighbours with which each is compared."""
 
     def __init__(
         self, tones: NDArray[np.int64], distances: NDArray[np.int64], barred: NDArray[np.int64], highest: int

@@ -14,7 +14,7 @@ Complex = NDArray[np.complex128]
 
 _MEANS, _SCATTER = 10, 4
 _NOISE = 8  # of these: the power of the noise at detection lines
-_SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, but for rounding
+_SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, except for rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,7 @@ class Movement:
 
 
 def _moving(periods: Floats, times: float) -> Flags:
-    """Of the schedule in consecutive periods, (periods, places): which moments move, behind those before."""
+    """Times of motion from the schedule in consecutive periods, (periods, places), relative to the previous ones."""
     now = periods[_BEFORE:]
     bends = np.full(periods.size, np.nan)
     bends[2:] = np.abs(np.diff(periods.ravel(), 2))

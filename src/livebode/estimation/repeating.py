@@ -146,7 +146,7 @@ class RepeatingErrors:
         schedule
             Shape (samples,).
         block
-            Where the samples come from: their numbers, times and channels.
+            The Block of the samples: their numbers, times and channels.
         """
         left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes])
         known, edges, done, window = [self._now], [0], 0, self._settings.lines.window
@@ -178,7 +178,7 @@ class RepeatingErrors:
         self._at, self._whole = 0, True
 
     def _take(self, channels: Sequence[Channel]) -> NDArray[np.bool_]:
-        """The period that is complete; returns the lines whose hum is no longer there."""
+        """Process a complete period; returns the lines whose hum has disappeared."""
         signals = self._samples[:, 1:]
         if self._differenced.any():
             signals = np.where(self._differenced[:, np.newaxis], np.diff(self._samples), signals)

@@ -15,7 +15,7 @@ of 0.1 s; in two periods a damping ratio of 0.5 % cannot be separated from noise
 """
 _PERIODS_FIRST = 3  # of silence before the first excitation: thirds that a tone can decay over
 STEADY = 0.9  # of the power in the first third of the periods: in the last third a tone that does not decay has more
-_GONE = 0.25  # of the power that the hum had: below this, and without a tone, it is no longer there
+_GONE = 0.25  # of the previous power of the hum: below this, and without a tone, it has disappeared
 _GONE_PERIODS = 2  # in a row
 
 
@@ -76,7 +76,7 @@ class SilentHum:
         self._power[:] = np.nan
 
     def interrupt(self) -> None:
-        """What comes next does not follow what was before."""
+        """The next period does not follow the previous one."""
         self._counts[0] = 0
         self._power[:] = np.nan
 

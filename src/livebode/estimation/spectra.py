@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _NONE = np.zeros(0, dtype=np.intp)
-_ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which stays in cache
+_ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which fits the cache
 
 
 @dataclass(frozen=True, eq=False)

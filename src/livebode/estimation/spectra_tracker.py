@@ -136,7 +136,7 @@ def _check(settings: Settings, layout: SpectraLayout) -> None:
     if settings.dtype != "float64":
         raise UsageError(
             "conflict",
-            f"dtype={settings.dtype!r} is for samples, and spectra come as the drive computed them",
+            f"dtype={settings.dtype!r} is for samples, but the drive has already computed the spectra",
             "leave it out",
             argument="dtype",
             value=settings.dtype,

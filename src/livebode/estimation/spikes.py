@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 _COMPARED = 3  # the smallest number of periods whose median one spike cannot move
 _REMEMBERED = 9  # periods whose largest differences define the usual difference
 _FACTOR = 2.0  # a Gaussian sample of a window of 100 passes it once in 1e6 windows, and machines have heavier tails
-_ROUNDING = 1e-9  # of the signal's size: differences below come from arithmetic
+_ROUNDING = 1e-9  # of the signal's size: smaller differences are rounding
 
 
 class SpikeGate:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_WHOLE = 1e-3  # of a step: how far rounding may move a difference from a multiple of the step
+_WHOLE = 1e-3  # of a step: largest deviation of a difference from a multiple of the step by rounding
 
 
 def step_of(samples: Floats) -> float:

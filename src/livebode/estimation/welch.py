@@ -47,7 +47,7 @@ def welch(
     Raises
     ------
     LivebodeError
-        If the recording is shorter than two segments or holds samples that are not finite.
+        If the recording is shorter than two segments or has non-finite samples.
 
     Examples
     --------

@@ -12,8 +12,8 @@ from livebode.core import SignalError, UsageError
 
 Floats = NDArray[np.float64]
 
-# A spike is clipped where it passes four times what 99.5 % of the samples stay below. Periodic excitations have crest
-# factors up to about 5, so their own peaks stay whole, and 0.5 % is more samples than a few spikes make.
+# A spike is clipped above four times the 99.5 % quantile of the samples. Periodic excitations have crest factors up to
+# about 5, so their own peaks are not clipped, and a few spikes are less than 0.5 % of the samples.
 _CLIP_QUANTILE, _CLIP_FACTOR = 0.995, 4.0
 # Bands of a sixth of an octave follow the slope of a trajectory's spectrum; below four bins a median is meaningless.
 _BAND_RATIO, _BAND_BINS = 2 ** (1 / 6), 4

@@ -50,7 +50,7 @@ def significant(periods: Complex, false_alarm: float = FALSE_ALARM) -> Flags:
     """Bins whose mean exceeds the scatter between periods, shape (bins,).
 
     F-test of G|mean|² against the scatter of G groups of neighbouring periods: F ~ F(2, 2d) without a line, so its
-    probability is (1 + F/d)^−d. Few periods leave d = G − 1 too small to tell anything, so the scatter is averaged over
+    probability is (1 + F/d)^−d. With few periods d = G − 1 is too small for a test, so the scatter is averaged over
     neighbouring bins until d reaches 20; where the bin's own scatter is larger (interference on one line), it is used.
     `false_alarm` is for all bins together (Bonferroni). Never bin 0.
     """

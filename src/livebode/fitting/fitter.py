@@ -42,7 +42,7 @@ class Fitter:
     model
         A PhysicalModel, or the name of one ("two-mass") with `options`.
     fixed, free
-        Parameters held at a value; names of those that the model holds at first (delay, friction) and that are to be
+        Parameters fixed at a value; names of those that the model fixes by default (delay, friction) and that are to be
         fitted.
     band_hz
         Lowest and highest frequency of the lines that are used; all by default.

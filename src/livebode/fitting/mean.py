@@ -14,7 +14,7 @@ from livebode.fitting.line_verdicts import LineVerdicts
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_DISTORTION_DOF = 4.0  # of detection lines behind a distortion: four, if they are all on one side of a line
+_DISTORTION_DOF = 4.0  # of detection lines for a distortion: four, if they are all on one side of a line
 
 
 def mean_response(responses: Responses | Iterable[Responses]) -> Responses:

@@ -32,9 +32,9 @@ class Fit:
     parameters, derived
         One row each: the parameters, and the derived resonances, damping ratios and ratios.
     held
-        Parameters that were not fitted, and their values.
+        Fixed parameters and their values.
     band_hz, lines
-        Lowest and highest line that was used, and how many.
+        Lowest and highest line used, and their number.
     rate_hz, hold
         Rate and hold of the input.
     measured

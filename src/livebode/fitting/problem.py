@@ -77,7 +77,7 @@ class Problem:
         if not self.free.any():
             raise UsageError(
                 "conflict",
-                f"every parameter of {model.name!r} is held",
+                f"every parameter of {model.name!r} is fixed",
                 "free at least one",
                 argument="fixed",
                 model=model.name,

@@ -16,7 +16,7 @@ from livebode.core.model import Algebra
 class Biquad(Algebra):
     """y(n) = b0·x(n) + b1·x(n−1) + b2·x(n−2) − a1·y(n−1) − a2·y(n−2), computed `rate_hz` times a second.
 
-    In series with a controller of the same rate, so that the hold behind both is counted with the controller.
+    In series with a controller of the same rate, so that the hold after both is counted with the controller.
 
     Parameters
     ----------

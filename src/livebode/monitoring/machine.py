@@ -29,7 +29,7 @@ class Machine:
     model
         As `MotionCorrection` fits it, here to all runs together.
     noise_power, quiet_power
-        Mean |E|² of the unexplained velocity at each line and each quiet bin, (lines,), (quiet,).
+        Mean |E|² of the unexplained velocity at each line and each detection line, (lines,), (quiet,).
     held, free
         Accuracy of a change of one direction, with all others fixed at the model, and with all others free.
     slowest_m_per_s, fastest_m_per_s

@@ -17,7 +17,7 @@ from livebode.monitoring.table_monitor import TableMonitor
 
 
 class Monitor:
-    """Events of changes, from the samples of a run and the responses that a Tracker made of them.
+    """Events of changes, from the samples of a run and the responses of its Tracker.
 
     If the Baseline has a model of the moving machine, that model is used; else its tables of lines and, where
     parameters are given, of parameters. The Events do not depend on how the samples are cut into Blocks.

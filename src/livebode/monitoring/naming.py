@@ -13,7 +13,7 @@ from livebode.monitoring.sensitivity import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
-# Standard deviations of a place, and the grid of its centre, as shares of the way that was learned.
+# Standard deviations of a place, and the grid of its centre, as shares of the learned travel.
 _WIDTHS = np.array([0.015, 0.026, 0.045])
 _GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")

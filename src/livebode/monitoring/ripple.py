@@ -67,7 +67,7 @@ def allowed_for(
     """Score and information with a ripple of this spread in each window, by generalised least squares.
 
     With noise of covariance Σ and a ripple ψ·a, a ~ N(0, R²), the windows' covariance is Σ + ψR²ψᵀ, and by Woodbury
-    sᵀ(Σ + ψR²ψᵀ)⁻¹e = ⟨s, e⟩ − ⟨s, ψ⟩R(I + R⟨ψ, ψ⟩R)⁻¹R⟨ψ, e⟩. Where an order meets a line, that line counts no more;
+    sᵀ(Σ + ψR²ψᵀ)⁻¹e = ⟨s, e⟩ − ⟨s, ψ⟩R(I + R⟨ψ, ψ⟩R)⁻¹R⟨ψ, e⟩. Where an order meets a line, that line is ignored;
     where it is small or far from the lines, nothing changes. Its phase need not be known.
 
     Parameters
@@ -93,8 +93,8 @@ def allowed_for(
 def amplitudes(e: Floats, gram: Floats) -> Floats:
     """Root mean square of sine and cosine of each order from ⟨ψ, e⟩ and ⟨ψ, ψ⟩ of healthy windows, (orders,).
 
-    With independent orders E⟨ψi, e⟩² = tr⟨ψi, ψi⟩ + Σj Aj²·‖⟨ψi, ψj⟩‖² (a window does not tell orders that are near
-    to each other apart), summed over the windows and solved for all Aj² ≥ 0.
+    With independent orders E⟨ψi, e⟩² = tr⟨ψi, ψi⟩ + Σj Aj²·‖⟨ψi, ψj⟩‖² (a window does not separate orders that are near
+    to each other), summed over the windows and solved for all Aj² ≥ 0.
     """
     windows, orders = len(e), e.shape[1] // 2
     power = (e.reshape(windows, orders, 2) ** 2).sum(axis=(0, 2))
