@@ -94,7 +94,7 @@ class Dashboard:
             raise InputError(
                 f"the dashboard needs {error.name}, which is not installed; pip install 'livebode[dashboard]'"
             ) from None
-        self._socket = _listening(self._serving)
+        self._socket = listening(self._serving)
         tls = self._serving.tls or (None, None)
         config = uvicorn.Config(
             self._serve,
@@ -167,7 +167,8 @@ class Dashboard:
             self._faults.take(error)
 
 
-def _listening(serving: Serving) -> socket.socket:
+def listening(serving: Serving) -> socket.socket:
+    """A socket that listens where the dashboard is to be."""
     family = socket.AF_INET6 if ":" in serving.address else socket.AF_INET
     found = socket.socket(family, socket.SOCK_STREAM)
     try:

@@ -15,7 +15,7 @@ from livebode.sources.live import SourceSettings, checked_address
 
 SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
-_MAY_BE_SECRET = {
+MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
 }
@@ -262,7 +262,7 @@ def _sentence(error: ValidationError) -> str:
         return f"there is no setting {place!r}; {nearest(first['loc'])}"
     if first["type"] == "missing":
         return f"{place!r} is missing; add it"
-    value = "what it holds" if _MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
+    value = "what it holds" if MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
     return f"{place} = {value} is not usable: {first['msg'].lower()}"
 
 
