@@ -54,7 +54,7 @@ def with_log(command: Callable[..., None]) -> Callable[..., None]:
             except LivebodeError as error:
                 log.error("%s: %s", error.code, error)
                 raise
-            except (typer.Exit, typer.Abort):
+            except (typer.Exit, typer.Abort, BrokenPipeError):
                 raise
             except Exception as error:
                 log.error("ended by %s", type(error).__name__, exc_info=error)

@@ -21,7 +21,7 @@ from livebode.sources.live.secret import secret
 
 REMOVED = "[removed]"
 _SECRET_NAME = re.compile(r"pass(word|wd|phrase)|secret|token|credential|auth|user|login|api_?key", re.IGNORECASE)
-_USER_IN_URL = re.compile(r"(?<=://)[^\s\"'<>]*@")
+_USER_IN_URL = re.compile(r"(?<=://)[^\s\"'<>]*(?=@)")
 _PIECES = re.compile(r"[^\w.%+~-]+")
 _LETTERS_MIN = 4
 """A shorter text is not looked for in others: it is in many words."""
@@ -65,9 +65,11 @@ class Secrets:
 
     def text(self, text: str) -> str:
         """A text without what was removed before, and without users in URLs."""
+        for user in _USER_IN_URL.findall(text):
+            self._removed(user)
         for found in sorted(self._found, key=len, reverse=True):
             text = text.replace(found, REMOVED)
-        return _USER_IN_URL.sub(f"{REMOVED}@", text)
+        return text
 
     def _section(self, table: Any, model: type[BaseModel]) -> Any:
         if not isinstance(table, Mapping):
