@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources import open_log
 from livebode.sources.formats import FORMATS
 from tests.recordings import RATE_HZ, WRITERS, signals, with_time, write
+from tests.support.errors import refused
 
 MODULES = sorted(WRITERS)
 TIMED = [module for module in MODULES if module != "sinumerik"]  # its rate is in the format itself
@@ -88,20 +89,24 @@ def test_samples_that_are_no_numbers_stay_that(module, tmp_path):
 @pytest.mark.parametrize("module", MODULES)
 def test_a_misspelt_channel_names_the_nearest(module, tmp_path):
     log = open_log(write(module, tmp_path, signals()), rate_hz=RATE_HZ)
-    with pytest.raises(InputError, match="no channel 'inptu'; did you mean 'input'"):
+    with pytest.raises(RecordingError) as caught:
         log.blocks(["inptu"])
+    assert (caught.value.code, caught.value.channel) == ("recording.channel-unknown", "inptu")
+    assert caught.value.remedy.startswith("did you mean 'input'?")
 
 
 @pytest.mark.parametrize("module", [module for module in TIMED if module != "mdf"])  # which always has time
 def test_neither_time_nor_rate(module, tmp_path):
-    with pytest.raises(InputError, match="give --rate"):
-        open_log(write(module, tmp_path, signals()))
+    path = write(module, tmp_path, signals())
+    with refused(RecordingError, "rate-missing", argument="rate_hz", path=str(path)):
+        open_log(path)
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_rate_that_the_file_contradicts(module, tmp_path):
-    with pytest.raises(InputError, match=r"4000 Hz.*4100 Hz"):
-        open_log(write(module, tmp_path, with_time(signals())), rate_hz=4100)
+    path = write(module, tmp_path, with_time(signals()))
+    with refused(RecordingError, "rate-conflict", argument="rate_hz", rate_hz=4000.0, given_hz=4100):
+        open_log(path, rate_hz=4100)
 
 
 @pytest.mark.parametrize("module", TIMED)
@@ -114,8 +119,9 @@ def test_time_none_ignores_the_column(module, tmp_path):
 def test_time_that_goes_back_names_the_sample(module, tmp_path):
     given = with_time(signals())
     given["t"][700] = given["t"][698]
-    with pytest.raises(InputError, match=r"decreases at sample 700: 0\.1745 after 0\.17475"):
-        open_log(write(module, tmp_path, given))
+    path = write(module, tmp_path, given)
+    with refused(RecordingError, "time-not-increasing", sample=700, times=[0.17475, 0.1745]):
+        open_log(path)
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -15,7 +15,7 @@ import zlib
 import numpy as np
 import pytest
 
-from livebode.core import Channel, InputError, Spectra, SpectraLayout
+from livebode.core import Channel, ConfigError, LivebodeError, SourceError, Spectra, SpectraLayout
 from livebode.estimation import Settings, SpectraTracker
 from livebode.sources.live import (
     Batch,
@@ -35,6 +35,7 @@ from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_lin
 from livebode.sources.live.said import Said
 from livebode.sources.live.settings import check_keys
 from livebode.sources.live.spectra_frame import read_spectra_text, spectra_text
+from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_LIVE_FUZZ", "10000"))
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
@@ -73,11 +74,11 @@ def damaged(raw: bytes, rng: random.Random) -> bytes:
     return bytes(out)
 
 
-def refused(error: pytest.ExceptionInfo[InputError] | InputError) -> None:
-    message = str(getattr(error, "value", error))
-    assert message
-    assert "\n" not in message
-    assert len(message) < 1000
+def one_sentence(error: LivebodeError) -> None:
+    assert error.message
+    json.dumps(error.as_dict())  # its facts are plain data
+    assert "\n" not in str(error)
+    assert len(str(error)) < 1000
 
 
 def test_damaged_frames_give_batches_or_a_sentence():
@@ -96,8 +97,8 @@ def test_damaged_frames_give_batches_or_a_sentence():
         raw = with_crc(raw) if rng.random() < 0.7 else raw
         try:
             found = decoder.decode(raw)
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            one_sentence(error)
             continue
         if found is not None:
             decoded += 1
@@ -139,8 +140,8 @@ def test_damaged_frames_of_spectra_give_batches_or_a_sentence():
         raw = with_crc(raw) if rng.random() < 0.7 else raw
         try:
             found = decoder.decode(raw)
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            one_sentence(error)
             continue
         if found is None:
             continue
@@ -181,8 +182,8 @@ def test_damaged_texts_of_spectra_give_a_layout_or_a_sentence():
             raw[at : at + rng.randrange(6)] = rng.choice(tokens)
         try:
             found = read_spectra_text(bytes(raw) if rng.random() < 0.5 else damaged(bytes(raw), rng))
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            one_sentence(error)
             continue
         read += 1
         assert read_spectra_text(spectra_text(found)) == found
@@ -216,7 +217,7 @@ def test_damaged_streams_keep_memory_bounded():
     frame = encode_samples(batch())
     for _ in range(CASES):
         for found in splitter.feed(damaged(frame, rng)):
-            with contextlib.suppress(InputError):
+            with contextlib.suppress(SourceError):
                 decoder.decode(found)
         assert len(splitter._bytes) <= FRAME_BYTES_MAX
 
@@ -252,41 +253,47 @@ def test_damaged_lines_give_batches_or_a_sentence():
         try:
             decoder.decode(bytes(raw))
             decoded += 1
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            one_sentence(error)
     assert decoded > CASES // 100
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("line", "code", "facts"),
     [
-        (b"[" * 100_000, "not JSON"),
-        (b'{"a":' * 100_000, "not JSON"),
-        (b"[1]", "no object"),
-        (b"\xff\xfe", "not JSON"),
-        (b'{"sample":1,"data":[["1"]]}', "something else than numbers"),
-        (b'{"sample":1,"data":[[true]]}', "something else than numbers"),
-        (b'{"sample":1,"data":[[1],[1,2]]}', "not equally long"),
-        (b'{"sample":1.5,"data":[[1],[1]]}', "not a whole number"),
-        (b'{"sample":-1,"data":[[1],[1]]}', "not a whole number"),
-        (b'{"sample":1,"data":[[1],[1]],"rate_hz":"4"}', "rate_hz is not a number"),
-        (b'{"sample":1,"data":[[1],[1]],"rate_hz":-4}', "rate_hz=-4"),
-        (b'{"sample":1,"data":[[1],[1]],"rate_hz":1' + b"0" * 400 + b"}", "larger than any float"),
-        (b'{"sample":1,"data":[[1],[1' + b"0" * 400 + b"]]}", "larger than any float"),
-        (b'{"sample":1,"data":[[1],[1]],"smaple":1}', "key 'smaple'"),
-        (b'{"data":[[1]]}', "no 'sample'"),
-        (b'{"sample":1,"data":[[1],[1]],"channels":["w","w"]}', "share a name"),
-        (b'{"sample":1,"data":[[1],[1]],"channels":["w","\\n"]}', "not printable"),
-        (b" " * (LINE_BYTES_MAX + 1), "longer than"),
-        (b'{"sample":1,"data":[[' + b"1," * (1 << 20) + b"1],[]]}", "more than"),
+        (b"[" * 100_000, "line-not-json", {}),
+        (b'{"a":' * 100_000, "line-not-json", {}),
+        (b"[1]", "line-not-json", {}),
+        (b"\xff\xfe", "line-not-json", {}),
+        (b'{"sample":1,"data":[["1"]]}', "value-invalid", {"key": "data"}),
+        (b'{"sample":1,"data":[[true]]}', "value-invalid", {"key": "data"}),
+        (b'{"sample":1,"data":[[1],[1,2]]}', "value-invalid", {"key": "data"}),
+        (b'{"sample":1,"data":[[1]]}', "batch-shape", {"channels": 2, "shape": [1, 1]}),
+        (b'{"sample":1.5,"data":[[1],[1]]}', "value-invalid", {"key": "sample"}),
+        (b'{"sample":-1,"data":[[1],[1]]}', "value-invalid", {"key": "sample"}),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":"4"}', "value-invalid", {"key": "rate_hz"}),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":-4}', "value-invalid", {"key": "rate_hz", "value": -4.0}),
+        (b'{"sample":1,"data":[[1],[1]],"rate_hz":1' + b"0" * 400 + b"}", "value-invalid", {"key": "rate_hz"}),
+        (b'{"sample":1,"data":[[1],[1' + b"0" * 400 + b"]]}", "value-invalid", {"key": "data"}),
+        (b'{"sample":1,"data":[[1],[1]],"smaple":1}', "key-unknown", {"key": "smaple"}),
+        (b'{"data":[[1]]}', "key-missing", {"key": "sample"}),
+        (b'{"sample":1,"data":[[1],[1]],"channels":["w","w"]}', "channels-invalid", {}),
+        (b'{"sample":1,"data":[[1],[1]],"channels":["w","\\n"]}', "channels-invalid", {"channel": ""}),
+        (b" " * (LINE_BYTES_MAX + 1), "line-too-long", {"limit_bytes": LINE_BYTES_MAX}),
+        (b'{"sample":1,"data":[[' + b"1," * (1 << 20) + b"1],[]]}", "value-invalid", {"key": "data"}),
     ],
 )
-def test_lines_that_are_refused(line, message):
+def test_lines_that_are_refused(line, code, facts):
     decoder = LineDecoder()
     decoder.decode(encode_line(batch()))
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(SourceError, code, **facts):
         decoder.decode(line)
-    refused(caught)
+
+
+@pytest.mark.parametrize(("more", "key"), [({}, "channels"), ({"channels": ["w"]}, "rate_hz")])
+def test_a_first_line_without_channels_or_rate_is_refused(more, key):
+    with refused(SourceError, "key-missing", key=key):
+        LineDecoder().decode(json.dumps({"sample": 1, "data": [[1]], **more}).encode())
 
 
 def test_a_line_without_end_does_not_fill_the_memory():
@@ -320,51 +327,54 @@ def changed(at: int, new: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("frame", "message"),
+    ("frame", "code", "facts"),
     [
-        (changed(24, struct.pack("<Q", 420)), r"ends at sample 420; with hop 20 they end one before its multiples"),
-        (changed(24, struct.pack("<Q", 2**64 - 1)), "is not between 0 and 2"),
-        (changed(24, struct.pack("<Q", 0)), "first_sample=-19"),
-        (changed(40, struct.pack("<d", 0.0)), "rate_hz=0"),
-        (changed(40, struct.pack("<d", float("nan"))), "rate_hz=nan"),
-        (changed(52, struct.pack("<H", 4)), "4 channels, its layout 3"),
-        (changed(54, struct.pack("<H", 4)), "4 spectra of 56 bytes each has 168 bytes"),
-        (changed(54, struct.pack("<H", 0)), "0 spectra"),
-        (changed(56, struct.pack("<I", 4)), "state 4; 0 to 3"),
+        (changed(24, struct.pack("<Q", 420)), "spectrum-misplaced", {"sample": 420, "hop": 20}),
+        (changed(24, struct.pack("<Q", 2**64 - 1)), "value-invalid", {"key": "first_sample"}),
+        (changed(24, struct.pack("<Q", 0)), "value-invalid", {"key": "first_sample", "value": -19}),
+        (changed(40, struct.pack("<d", 0.0)), "value-invalid", {"key": "rate_hz", "value": 0.0}),
+        (changed(40, struct.pack("<d", float("nan"))), "value-invalid", {"key": "rate_hz"}),
+        (changed(52, struct.pack("<H", 4)), "frame-inconsistent", {"channels": [4, 3]}),
+        (changed(54, struct.pack("<H", 4)), "frame-inconsistent", {"spectra": 4, "bytes": 168}),
+        (changed(54, struct.pack("<H", 0)), "frame-inconsistent", {"spectra": 0}),
+        (changed(56, struct.pack("<I", 4)), "value-invalid", {"key": "state", "value": 4}),
     ],
 )
-def test_spectra_that_are_refused(frame, message):
+def test_spectra_that_are_refused(frame, code, facts):
     decoder = FrameDecoder()
     decoder.decode(encode_spectra_layout(SPECTRA, 4000.0))
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(SourceError, code, **facts):
         decoder.decode(frame)
-    refused(caught)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "code", "facts"),
     [
-        (b"window\t400\n", b"", "needs one line 'window'"),
-        (b"window\t400\n", b"window\t400\nwindow\t400\n", "needs one line 'window'"),
-        (b"hop\t20", b"hop\t20\t5", "needs one line 'hop'"),
-        (b"400", b"4e2", "window '4e2', which are not whole numbers"),
-        (b"2 4", b"2  4", "are not whole numbers"),
-        (b"lines", b"line", "'line', which is none of window, hop"),
-        (b"\t0.5", b"\tnan", "the constant 'nan'"),
-        (b"differenced", b"differential", "says 'differential'"),
-        (b"rad/s\t0\tdifferenced", b"rad/s\t0\tdifferenced\tx", "a signal with 5 parts"),
-        (b"value\tx\tm", b"value\tx\tm\t1", "a value with 3 parts"),
-        (b"value\tx", b"value\t", "empty, too long"),
-        (b"value\tx", b"value\ty", "share a name"),
-        (b"\tx\tm", b"\tx\t\xff", "not UTF-8"),
+        (b"window\t400\n", b"", "layout-invalid", {"word": "window"}),
+        (b"window\t400\n", b"window\t400\nwindow\t400\n", "layout-invalid", {"word": "window"}),
+        (b"hop\t20", b"hop\t20\t5", "layout-invalid", {"word": "hop"}),
+        (b"400", b"4e2", "layout-invalid", {"word": "window"}),
+        (b"2 4", b"2  4", "layout-invalid", {"word": "lines"}),
+        (b"lines", b"line", "layout-invalid", {"word": "line"}),
+        (b"\t0.5", b"\tnan", "layout-invalid", {"word": "signal"}),
+        (b"differenced", b"differential", "layout-invalid", {"word": "signal"}),
+        (b"rad/s\t0\tdifferenced", b"rad/s\t0\tdifferenced\tx", "layout-invalid", {"word": "signal"}),
+        (b"value\tx\tm", b"value\tx\tm\t1", "layout-invalid", {"word": "value"}),
+        (b"value\tx", b"value\t", "channels-invalid", {"channel": ""}),
+        (b"\tx\tm", b"\tx\t\xff", "layout-invalid", {}),
     ],
 )
-def test_texts_of_spectra_that_are_refused(old, new, message):
+def test_texts_of_spectra_that_are_refused(old, new, code, facts):
     text = spectra_text(SPECTRA)
     assert old in text
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(SourceError, code, **facts):
         read_spectra_text(text.replace(old, new, 1))
-    refused(caught)
+
+
+def test_a_value_with_the_name_of_a_signal_is_refused():
+    with pytest.raises(LivebodeError) as caught:
+        read_spectra_text(spectra_text(SPECTRA).replace(b"value\tx", b"value\ty"))
+    one_sentence(caught.value)
 
 
 def test_spectra_without_their_layout_are_dropped():
@@ -374,25 +384,28 @@ def test_spectra_without_their_layout_are_dropped():
 
 
 @pytest.mark.parametrize(
-    ("frame", "message"),
+    ("frame", "code", "facts"),
     [
-        (b"", "0 bytes"),
-        (b"HTTP/1.1 200 OK" * 10, "begins with b'HTTP'"),
-        (encode_samples(batch())[:-1], "declares"),
-        (encode_samples(batch())[:-4] + b"\0\0\0\0", "CRC"),
-        (with_crc(b"LBOD\x02" + encode_samples(batch())[5:]), "version 2"),
-        (with_crc(b"LBOD\x01\x05" + encode_samples(batch())[6:]), "kind 5"),
-        (with_crc(b"LBOD\x01\x01\x80" + encode_samples(batch())[7:]), "flags 128"),
-        (with_crc(encode_samples(batch())[:54] + b"\x07\x00" + encode_samples(batch())[56:]), "7 samples"),
-        (with_crc(encode_layout(CHANNELS, 1.0)[:-4] + b"x\n" + b"    "), "not the one that its header names"),
+        (b"", "frame-damaged", {"bytes": 0}),
+        (b"HTTP/1.1 200 OK" * 10, "frame-damaged", {"beginning": b"HTTP".hex()}),
+        (encode_samples(batch())[:-1], "frame-damaged", {"bytes": len(encode_samples(batch())) - 1}),
+        (encode_samples(batch())[:-4] + b"\0\0\0\0", "frame-damaged", {}),
+        (with_crc(b"LBOD\x02" + encode_samples(batch())[5:]), "frame-unsupported", {"version": 2}),
+        (with_crc(b"LBOD\x01\x05" + encode_samples(batch())[6:]), "frame-unsupported", {"frame_kind": 5}),
+        (with_crc(b"LBOD\x01\x01\x80" + encode_samples(batch())[7:]), "frame-unsupported", {"flags": 128}),
+        (
+            with_crc(encode_samples(batch())[:54] + b"\x07\x00" + encode_samples(batch())[56:]),
+            "frame-inconsistent",
+            {"samples": 7},
+        ),
+        (with_crc(encode_layout(CHANNELS, 1.0)[:-4] + b"x\n" + b"    "), "frame-inconsistent", {}),
     ],
 )
-def test_frames_that_are_refused(frame, message):
+def test_frames_that_are_refused(frame, code, facts):
     decoder = FrameDecoder()
     decoder.decode(encode_layout(CHANNELS, 4000.0))
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(SourceError, code, **facts):
         decoder.decode(frame)
-    refused(caught)
 
 
 URLS = [
@@ -407,38 +420,40 @@ def test_damaged_addresses_give_an_address_or_a_sentence():
         url = damaged(rng.choice(URLS).encode(), rng).decode("utf-8", "replace")
         try:
             address = parse_address(url)
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            one_sentence(error)
         else:
             assert parse_address(str(address)) == address
 
 
 @pytest.mark.parametrize(
-    ("url", "message"),
+    ("url", "facts"),
     [
-        ("http://h:1", "no known kind"),
-        ("udp://:5000", "udp://host:port"),
-        ("udp://h", "udp://host:port"),
-        ("udp://h:99999", "no address"),
-        ("tcp://h:1/path", "leave out /path"),
-        ("mqtt://h?x=1", "no address"),
-        ("5000", "no known kind"),
-        ("udp://h:1\n", "not printable"),
+        ("http://h:1", {"value": "http://h:1"}),
+        ("udp://:5000", {"value": "udp://:5000"}),
+        ("udp://h", {"value": "udp://h"}),
+        ("udp://h:99999", {"value": "udp://h:99999"}),
+        ("tcp://h:1/path", {"value": "tcp://h:1/path"}),
+        ("mqtt://h?x=1", {"value": "mqtt://h"}),
+        ("5000", {"value": "5000"}),
+        ("udp://h:1\n", {}),
     ],
 )
-def test_addresses_that_are_refused(url, message):
-    with pytest.raises(InputError, match=message):
+def test_addresses_that_are_refused(url, facts):
+    with refused(ConfigError, "value-invalid", key="source.url", **facts):
         parse_address(url)
 
 
 def test_a_password_in_the_url_is_refused_and_not_repeated():
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(ConfigError) as caught:
         parse_address("mqtt://user:hunter2@broker/topic")
-    assert "hunter2" not in str(caught.value)
-    assert "password_env" in str(caught.value)
+    assert (caught.value.code, caught.value.key) == ("config.secret-in-url", "source.url")
+    assert "hunter2" not in repr(caught.value.as_dict())
+    assert "password_env" in caught.value.remedy
 
 
 def test_a_key_of_another_kind_of_source_is_refused():
     settings = SourceSettings(url="udp://h:1", nodes={"w": "ns=2;s=w"})
-    with pytest.raises(InputError, match=r"source\.nodes means nothing for udp; it takes rate_hz,"):
+    allowed = ["rate_hz", "reorder_batches", "sender", "url"]
+    with refused(ConfigError, "key-unused", key="source.nodes", source="udp", allowed=allowed):
         check_keys(settings, "udp")

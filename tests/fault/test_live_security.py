@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pyads.testserver import PLCVariable
 
-from livebode.core import InputError
+from livebode.core import ConfigError, SourceError
 from livebode.session import Axis
 from livebode.sources.live import SourceSettings, encode_layout, encode_samples, make_source, open_source
 from tests.peers.broker import TOPIC, Mosquitto, publisher, stop
@@ -20,6 +20,7 @@ from tests.peers.certificates import Authority, self_signed
 from tests.peers.opcua import OpcUaPeer
 from tests.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, free_port, program, until
 from tests.peers.plc import RingPeer
+from tests.support.errors import refused
 
 SECRET = "correct horse battery"
 
@@ -94,21 +95,24 @@ def test_mqtt_with_certificates_and_a_password(broker, pki):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message", "attempts"),
+    ("changes", "remedy", "attempts"),
     [
-        ({"ca_file": "other.crt"}, "no TLS with the broker: .*certificate", 1),
-        ({"username": "somebody"}, "the broker refused: Not authorized", 1),
-        ({"password_file": "users"}, "the broker refused: Not authorized", 1),
-        ({"certificate_file": "stranger.crt", "key_file": "stranger.key"}, "does it want a certificate", 3),
-        ({"certificate_file": None, "key_file": None}, "does it want a certificate", 3),
+        ({"ca_file": "other.crt"}, "check source.ca_file", 1),
+        ({"username": "somebody"}, "check source.username", 1),
+        ({"password_file": "users"}, "check source.username", 1),
+        ({"certificate_file": "stranger.crt", "key_file": "stranger.key"}, "if it requires a certificate", 3),
+        ({"certificate_file": None, "key_file": None}, "if it requires a certificate", 3),
     ],
 )
-def test_mqtt_refusals_are_said_once(broker, pki, changes, message, attempts):
+def test_mqtt_refusals_are_said_once(broker, pki, changes, remedy, attempts):
     changes = {key: value if value is None or key == "username" else pki / value for key, value in changes.items()}
     before = broker.logged("New connection")
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(SourceError) as caught:
         open_source(SourceSettings(**settings(broker, pki, **changes)))
-    assert SECRET not in str(caught.value)
+    assert caught.value.code == "source.refused"
+    assert caught.value.place == f"mqtts://127.0.0.1:{broker.port}/{TOPIC}"
+    assert caught.value.remedy.startswith(remedy)
+    assert SECRET not in repr(caught.value.as_dict())
     assert broker.logged("New connection") - before <= attempts
 
 
@@ -146,22 +150,23 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "fact"),
     [
-        ({"server_certificate_file": "them.der"}, "another certificate than source.server_certificate_file"),
-        ({"password_file": "users"}, "the server refused"),
+        ({"server_certificate_file": "them.der"}, "key"),
+        ({"password_file": "users"}, "status"),
     ],
 )
-def test_opc_ua_refusals_are_said_once(pki, tmp_path, changes, message):
-    with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer, pytest.raises(InputError, match=message) as caught:
+def test_opc_ua_refusals_are_said_once(pki, tmp_path, changes, fact):
+    with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer, pytest.raises(SourceError) as caught:
         open_source(opcua(peer, pki, **{key: pki / value for key, value in changes.items()}))
-    assert SECRET not in str(caught.value)
+    assert (caught.value.code, list(caught.value.facts)) == ("source.refused", [fact])
+    assert SECRET not in repr(caught.value.as_dict())
 
 
 def test_a_node_that_is_not_there_is_refused(tmp_path):
     with (
         OpcUaPeer(tmp_path) as peer,
-        pytest.raises(InputError, match=r"does not give node ns=2;s=axis.z \(BadNodeIdUnknown\)"),
+        refused(SourceError, "refused", node="ns=2;s=axis.z", status="BadNodeIdUnknown"),
     ):
         open_source(SourceSettings(**peer.settings | {"nodes": {"w": "ns=2;s=axis.z"}, "timeout_s": 20.0}))
 
@@ -176,42 +181,69 @@ def test_secrets_stay_out_of_the_configuration_that_is_recorded(tmp_path, monkey
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("given", "code", "facts"),
     [
-        ({"password_env": "NOT_SET_ANYWHERE"}, "the environment has no 'NOT_SET_ANYWHERE'"),
-        ({"password_file": "/nowhere"}, "/nowhere cannot be read"),
-        ({"password_env": "A", "password_file": "B"}, "both password_env and password_file"),
+        (
+            {"password_env": "NOT_SET_ANYWHERE"},
+            "secret-missing",
+            {"key": "source.password_env", "variable": "NOT_SET_ANYWHERE"},
+        ),
+        ({"password_file": "/nowhere"}, "file-unreadable", {"key": "source.password_file", "path": "/nowhere"}),
+        (
+            {"password_env": "A", "password_file": "B"},
+            "key-conflict",
+            {"key": "source", "keys": ["password_env", "password_file"]},
+        ),
     ],
 )
-def test_secrets_that_are_not_there(given, message):
-    with pytest.raises(InputError, match=message):
+def test_secrets_that_are_not_there(given, code, facts):
+    with refused(ConfigError, code, **facts):
         open_source(SourceSettings(url="mqtt://127.0.0.1:1/t", **given))
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("given", "code", "facts"),
     [
-        ({"url": "mqtt://h/a/+"}, "wildcard"),
-        ({"url": "mqtt://h"}, "topic '' is empty"),
-        ({"url": "mqtts://h/t", "ca_file": "/nowhere"}, "no file /nowhere for source.ca_file"),
-        ({"url": "opc.tcp://h", "rate_hz": 1.0}, "needs nodes and rate_hz"),
-        ({"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "rubbish"}}, "no node id"),
-        ({"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "key_file": "k"}, "needs source.security"),
+        ({}, "key-missing", {"keys": ["url"]}),
+        ({"url": "mqtt://h/a/+"}, "value-invalid", {"key": "source.url", "value": "a/+"}),
+        ({"url": "mqtt://h"}, "value-invalid", {"key": "source.url", "value": ""}),
+        (
+            {"url": "mqtts://h/t", "ca_file": "/nowhere"},
+            "file-unreadable",
+            {"key": "source.ca_file", "path": "/nowhere"},
+        ),
+        ({"url": "opc.tcp://h", "rate_hz": 1.0}, "key-missing", {"keys": ["nodes", "rate_hz"]}),
+        (
+            {"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "rubbish"}},
+            "value-invalid",
+            {"key": "source.nodes", "value": "rubbish"},
+        ),
+        (
+            {"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "key_file": "k"},
+            "key-missing",
+            {"keys": ["security"]},
+        ),
         (
             {"url": "opc.tcp://h", "rate_hz": 1.0, "nodes": {"w": "i=1"}, "security": "Basic256Sha256"},
-            "needs certificate_file too",
+            "key-missing",
+            {"keys": ["certificate_file", "key_file", "server_certificate_file"]},
         ),
-        ({"url": "udp://127.0.0.1:1", "sender": "drive"}, "source.sender = 'drive' is not an IP address"),
-        ({"url": "ads://h"}, "needs net_id, symbol and channels"),
-        ({"url": "ads://h", "net_id": "1.2", "symbol": "MAIN.x", "channels": ["w"]}, "no AMS net id"),
+        ({"url": "udp://127.0.0.1:1", "sender": "drive"}, "value-invalid", {"key": "source.sender", "value": "drive"}),
+        ({"url": "ads://h"}, "key-missing", {"keys": ["net_id", "symbol", "channels"]}),
+        (
+            {"url": "ads://h", "net_id": "1.2", "symbol": "MAIN.x", "channels": ["w"]},
+            "value-invalid",
+            {"key": "source.net_id", "value": "1.2"},
+        ),
         (
             {"url": "ads://h", "net_id": "1.2.3.4.1.1", "symbol": "M.x", "channels": ["w"], "mode": "notify"},
-            "needs rate_hz for notifications",
+            "key-missing",
+            {"keys": ["rate_hz"]},
         ),
     ],
 )
-def test_settings_that_cannot_be(given, message):
-    with pytest.raises(InputError, match=message):
+def test_settings_that_cannot_be(given, code, facts):
+    with refused(ConfigError, code, **facts):
         open_source(SourceSettings(**given))
 
 

@@ -70,7 +70,7 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
             code, out, err = running.end()
         stop(sender)
     assert code == 0, err
-    assert "has no place in source.url" in err
+    assert "source.url has a user or password" in err
     found = b"".join(path.read_bytes() for path in running.out.rglob("*") if path.is_file())
     assert b"configuration-refused" in found
     assert SECRET.encode() not in found

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Event, InputError
+from livebode.core import Event, SourceError
 from livebode.session.continuing import StreamPosition
 from livebode.sources import open_log
 from livebode.sources.live import LiveBlock, SourceSettings, make_source, open_source
 from tests.command import RATE_HZ, signals, write_csv, write_parquet
 from tests.peers.peer import PATIENCE_S, Feeding
+from tests.support.errors import refused
 
 SAMPLES = 600
 
@@ -129,7 +130,7 @@ def test_a_directory_of_recordings_is_read_in_order(tmp_path):
 
 def test_a_file_that_cannot_grow_is_refused(tmp_path):
     path = write_parquet(tmp_path / "log.parquet", signals(SAMPLES))
-    with pytest.raises(InputError, match="parquet, which cannot grow; follow a directory of whole files instead"):
+    with refused(SourceError, "no-samples", cause="source.cannot-grow", timeout_s=0.5):
         open_source(SourceSettings(log=path, follow=True, timeout_s=0.5))
 
 

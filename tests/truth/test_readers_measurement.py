@@ -7,8 +7,9 @@ import nptdms
 import numpy as np
 import pytest
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources import open_log
+from tests.support.errors import refused
 
 RATE_HZ = 4000.0
 VALUES = np.random.default_rng(0).standard_normal(500)
@@ -51,7 +52,7 @@ def test_a_tdms_file_that_ends_early_is_refused(tmp_path):
         file.write_segment([nptdms.ChannelObject("a", "u", VALUES)])
     raw = (tmp_path / "a.tdms").read_bytes()
     (tmp_path / "b.tdms").write_bytes(raw[:-8])
-    with pytest.raises(InputError, match="ends 8 bytes early"):
+    with refused(RecordingError, "truncated", path=str(tmp_path / "b.tdms"), missing_bytes=8):
         open_log(tmp_path / "b.tdms", rate_hz=RATE_HZ)
 
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources import Log, open_log
+from tests.support.errors import refused
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -107,7 +108,7 @@ def test_a_unit_that_only_the_rate_tells(tmp_path):
     time = np.arange(0, 400_000, 400)
     assert opened(tmp_path, time, rate_hz=2500).timing.unit == "us"
     assert open_log(tmp_path / "log.parquet", time="t [us]").rate_hz == 2500
-    with pytest.raises(InputError, match=r"no unit and steps of 400.*give the rate"):
+    with refused(RecordingError, "time-unit", channel="t", step=400):
         opened(tmp_path, time)
 
 
@@ -116,18 +117,22 @@ def test_the_given_rate_is_exact(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("spoil", "code", "facts"),
     [
-        (lambda t: np.where(np.arange(1000) == 500, np.nan, t), "no value .nan. at sample 500"),
-        (lambda t: np.where(np.arange(1000) == 500, t[499], t), "repeats at sample 500"),
-        (lambda t: t + (np.arange(1000) >= 500) * 1.45 / 4000, "sample 500, 2.45 periods"),
-        (lambda t: t + np.random.default_rng(1).uniform(-0.24, 0.24, 1000) / 4000, "jitters by"),
-        (lambda _: np.array([k + k // 4 for k in range(1000)]) / 4000, "249 gaps in 1000 samples"),
-        (lambda t: np.round(t, 3), "repeats at sample 1"),
+        (lambda t: np.where(np.arange(1000) == 500, np.nan, t), "time-not-finite", {"sample": 500}),
+        (lambda t: np.where(np.arange(1000) == 500, t[499], t), "time-not-increasing", {"sample": 500}),
+        (lambda t: t + (np.arange(1000) >= 500) * 1.45 / 4000, "time-irregular", {"sample": 500}),
+        (lambda t: t + np.random.default_rng(1).uniform(-0.24, 0.24, 1000) / 4000, "time-jitter", {"maximum": 0.1}),
+        (
+            lambda _: np.array([k + k // 4 for k in range(1000)]) / 4000,
+            "time-irregular",
+            {"gaps": 249, "samples": 1000},
+        ),
+        (lambda t: np.round(t, 3), "time-not-increasing", {"sample": 1}),
     ],
 )
-def test_times_that_are_refused(tmp_path, spoil, message):
-    with pytest.raises(InputError, match=message):
+def test_times_that_are_refused(tmp_path, spoil, code, facts):
+    with refused(RecordingError, code, channel="t", path=str(tmp_path / "log.parquet"), **facts):
         opened(tmp_path, spoil(np.arange(1000) / 4000))
 
 

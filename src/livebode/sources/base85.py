@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.sources.damage import damaged, truncated
 
 ALPHABET = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
 ZEROS = b"."
@@ -23,16 +23,19 @@ def decode(text: str) -> NDArray[np.float64]:
 
     Raises
     ------
-    InputError
-        For a character outside the alphabet, a group above 2³²−1, or a length that is no whole number of doubles.
+    RecordingError
+        For a character outside the alphabet, a group above 2³²−1, or a length that is not a whole number of doubles.
     """
     raw = "".join(text.split()).encode("ascii", "replace").replace(ZEROS, b"00000")
     values = VALUES[np.frombuffer(raw, np.uint8)]
     if (bad := np.flatnonzero(values == 255)).size:
-        raise InputError(f"character {chr(raw[int(bad[0])])!r} is not base-85 text; is the file damaged?")
+        character = chr(raw[int(bad[0])])
+        raise damaged(f"character {character!r} is not base-85 text", character=character)
     if len(values) % 10:
-        raise InputError(f"{len(values)} characters of base-85 text are no whole number of values; is the file whole?")
+        raise truncated(
+            f"{len(values)} characters of base-85 text are not a whole number of values", length=len(values)
+        )
     words = values.reshape(-1, 5).astype(np.int64) @ WEIGHTS
     if words.size and int(words.max()) > 0xFFFFFFFF:
-        raise InputError("a group of base-85 text is above 4294967295; is the file damaged?")
+        raise damaged("a group of base-85 text is above 4294967295")
     return words.astype(">u4").view(">f8").astype(np.float64)

@@ -8,7 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode import arrow
-from livebode.core import InputError
+from livebode.sources.damage import oversized
 from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
 from livebode.sources.units import split_units
 
@@ -24,7 +24,9 @@ def schema_columns(schema: pa.Schema, samples: int | None) -> tuple[tuple[Column
     [('u', 'V')]
     """
     if len(schema) > COLUMNS_MAX:
-        raise InputError(f"the file has {len(schema)} columns, more than {COLUMNS_MAX}; is it a recording?")
+        raise oversized(
+            f"the file has {len(schema)} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, columns=len(schema)
+        )
     columns, skipped = [], []
     for at, (field, (name, unit)) in enumerate(zip(schema, split_units(schema.names))):
         metadata = field.metadata or {}

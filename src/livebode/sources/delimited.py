@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, Kind
 from livebode.sources.columnar import to_numpy
 from livebode.sources.dialect import find_dialect
@@ -53,17 +53,17 @@ class DelimitedRecording(Recording):
             with self._opened() as file:
                 yield from self._parsed(file, columns)
         except pa.ArrowInvalid as error:
-            raise locate(self.path, self._dialect, wanted, ARROW_BLOCK_BYTES) or InputError(
-                f"cannot read {self.path}: {str(error).splitlines()[0][:200]}; repair the file"
+            raise locate(self.path, self._dialect, wanted, ARROW_BLOCK_BYTES) or RecordingError(
+                "damaged", f"cannot read {self.path}: {first_line(error)}", "repair the file", path=str(self.path)
             ) from error
 
     def parsed(self, lines: bytes, columns: Sequence[Column]) -> Chunk:
-        """The values of `columns` in whole lines of the table; InputError where one of them does not fit it."""
+        """The values of `columns` in whole lines of the table; RecordingError where one of them does not fit it."""
         dialect = self._dialect
         try:
             chunks = list(self._parsed(Tidied(io.BytesIO(lines), dialect.encoding, dialect.spaced), columns))
         except pa.ArrowInvalid as error:
-            raise InputError(str(error).splitlines()[0][:200]) from None
+            raise RecordingError("damaged", first_line(error), "repair the line") from None
         return [np.concatenate(parts) for parts in zip(*chunks)] if chunks else [np.empty(0) for _ in columns]
 
     @property
@@ -114,6 +114,10 @@ class DelimitedRecording(Recording):
             with self.path.open("rb") as file:
                 file.seek(dialect.offset)
                 yield file
+
+
+def first_line(error: pa.ArrowInvalid) -> str:
+    return str(error).splitlines()[0][:200]
 
 
 READER = DelimitedRecording

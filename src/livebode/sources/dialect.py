@@ -9,8 +9,9 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, Kind, is_comment, is_value, kind_of, zoned
+from livebode.sources.damage import oversized
 from livebode.sources.header import find_header, fits
 from livebode.sources.recording import COLUMNS_MAX
 
@@ -90,23 +91,34 @@ def find_dialect(path: Path) -> Dialect:
 
     Raises
     ------
-    InputError
+    RecordingError
         Where there is no table of numbers in the first 256 KiB.
     """
     with path.open("rb") as file:
         sample = file.read(SAMPLE_BYTES)
     encoding, mark = find_encoding(sample)
     if not encoding.startswith("utf-16") and b"\0" in sample:
-        raise InputError(f"{path} holds binary data, not text; is its ending right?")
+        raise RecordingError(
+            "format-unknown", f"{path} contains binary data, not text", "check the name's ending", path=str(path)
+        )
     text = sample[mark:].decode(encoding, "replace")
     lines = find_lines(path, text, whole=len(sample) < SAMPLE_BYTES)
     layouts = [layout for delimiter in DELIMITERS for decimal in ".," if (layout := lay_out(lines, delimiter, decimal))]
     if not layouts:
         first = lines[0].text[:40] if lines else ""
-        raise InputError(f"{path} has no row of numbers in its first {len(sample)} bytes (it begins with {first!r})")
+        raise RecordingError(
+            "table-missing",
+            f"{path} has no row of numbers in its first {len(sample)} bytes (it begins with {first!r})",
+            "check that this is a recording",
+            path=str(path),
+            beginning=first,
+        )
     best = max(layouts, key=lambda layout: layout.score)
     if best.dialect.width > COLUMNS_MAX:
-        raise InputError(f"{path} has {best.dialect.width} columns, more than {COLUMNS_MAX}; is it a recording?")
+        width = best.dialect.width
+        raise oversized(
+            f"{path} has {width} columns, more than {COLUMNS_MAX}", COLUMNS_MAX, path=str(path), columns=width
+        )
     offset = mark + len(text[: best.start.at].encode(encoding, "replace"))
     commented = COMMENT.search(text, best.start.at) is not None
     return replace(best.dialect, encoding=encoding, offset=offset, first_line=best.start.number, commented=commented)
@@ -135,7 +147,14 @@ def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:
         if len(lines) >= SAMPLE_LINES:
             break
     if not lines and not whole:
-        raise InputError(f"the first line of {path} is longer than {len(text)} characters; is it a recording?")
+        raise RecordingError(
+            "line-too-long",
+            f"the first line of {path} is longer than {len(text)} characters",
+            "check that this is a recording",
+            path=str(path),
+            line=1,
+            limit_bytes=SAMPLE_BYTES,
+        )
     return lines
 
 

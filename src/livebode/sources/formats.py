@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import LivebodeError, RecordingError
 from livebode.sources.recording import Recording, contained
 
 HEAD_BYTES = 1024
@@ -70,8 +70,10 @@ def open_recording(path: Path) -> Recording:
 
     Raises
     ------
-    InputError
-        For a file that is missing, empty, unreadable, or of none of the formats.
+    RecordingError
+        For a file that is missing, empty, unreadable, or not in one of the formats.
+    ExtraError
+        Where the package that reads its format is not installed.
     """
     head = read_head(path)
     for format_ in FORMATS:
@@ -80,30 +82,46 @@ def open_recording(path: Path) -> Recording:
     suffix = path.suffix.lower()
     named = [format_.title for format_ in FORMATS if suffix in format_.suffixes]
     if named:
-        raise InputError(
-            f"{path} is not {named[0]}, whatever its ending says: it begins with {head[:8]!r}; is it whole?"
+        raise RecordingError(
+            "format-unknown",
+            f"{path} is not {named[0]}, although its ending is {suffix}: it begins with {head[:8]!r}",
+            "check that the file is complete",
+            path=str(path),
+            suffix=suffix,
+            beginning=head[:8].hex(),
         )
     known = " ".join(dict.fromkeys(suffix for format_ in FORMATS for suffix in format_.suffixes))
-    raise InputError(f"{path} is of no known format (it begins with {head[:8]!r}); convert it to one of: {known}")
+    raise RecordingError(
+        "format-unknown",
+        f"the format of {path} is not supported (it begins with {head[:8]!r})",
+        f"convert it to one of: {known}",
+        path=str(path),
+        suffix=suffix,
+        beginning=head[:8].hex(),
+    )
 
 
 def read_head(path: Path) -> bytes:
     try:
         if path.is_dir():
-            raise InputError(f"{path} is a directory; name the file in it")
+            raise RecordingError("not-a-file", f"{path} is a directory", "name the file in it", path=str(path))
         if path.exists() and not path.is_file():
-            raise InputError(f"{path} is no regular file; write the recording to a file first")
+            raise RecordingError(
+                "not-a-file", f"{path} is not a regular file", "write the recording to a file first", path=str(path)
+            )
         with path.open("rb") as file:
             head = file.read(HEAD_BYTES)
-    except InputError:
+    except LivebodeError:
         raise
     except FileNotFoundError:
-        raise InputError(f"there is no file {path}; check the name") from None
+        raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot read {path}: {reason}; check its name and permissions") from None
+        raise RecordingError(
+            "not-readable", f"cannot read {path}: {reason}", "check its name and permissions", path=str(path)
+        ) from None
     if not head:
-        raise InputError(f"{path} is empty; is the recording whole?")
+        raise RecordingError("empty", f"{path} is empty", "check that the recording is complete", path=str(path))
     return head
 
 
@@ -112,9 +130,14 @@ def checked(recording: Recording) -> Recording:
     seen: dict[str, int] = {}
     for at, column in enumerate(recording.columns, start=1):
         if column.name in seen:
-            raise InputError(
-                f"channel name {column.name!r} stands more than once in {recording.path} (columns {seen[column.name]} "
-                f"and {at}); rename one of them"
+            first = seen[column.name]
+            raise RecordingError(
+                "channel-duplicated",
+                f"channel name {column.name!r} is duplicated in {recording.path} (columns {first} and {at})",
+                "rename one of the columns",
+                path=str(recording.path),
+                channel=column.name,
+                columns=[first, at],
             )
         seen[column.name] = at
     return recording

@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import ExtraError
 from livebode.sources.arrays import array_columns
+from livebode.sources.damage import oversized
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
 UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"
@@ -46,7 +47,14 @@ def import_h5py(path: Path) -> ModuleType:
     try:
         import h5py
     except ImportError:
-        raise InputError(f"{path} needs the HDF5 library; pip install livebode[hdf5]") from None
+        raise ExtraError(
+            "not-installed",
+            f"{path} needs the package h5py, which is not installed",
+            "run pip install livebode[hdf5]",
+            package="h5py",
+            extra="hdf5",
+            path=str(path),
+        ) from None
     return h5py  # type: ignore[no-any-return]
 
 
@@ -59,7 +67,7 @@ def datasets(file: Any) -> list[tuple[str, Any]]:
         if isinstance(item, h5py.Dataset):
             found.append((name, item))
         if len(found) > COLUMNS_MAX:
-            raise InputError(f"the file has more than {COLUMNS_MAX} datasets; is it a recording?")
+            raise oversized(f"the file has more than {COLUMNS_MAX} datasets", COLUMNS_MAX)
 
     file.visititems(visit)
     return found

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, Kind, is_comment, is_moment, is_number
 from livebode.sources.dialect import Dialect
 
 
-def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> InputError | None:
-    """The error in the first line that is ragged, too long, or has text in one of `columns`; None where none is.
+def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> RecordingError | None:
+    """The error in the first line that is ragged, too long, or has text in one of `columns`; None if no line is.
 
     Lines count from 1 as in an editor.
     """
@@ -22,24 +22,43 @@ def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max:
             if number < dialect.first_line or not line.strip() or (dialect.commented and is_comment(line)):
                 continue
             if len(line) > line_bytes_max:
-                return InputError(f"line {number} of {path} is longer than {line_bytes_max} bytes; is it a recording?")
+                return RecordingError(
+                    "line-too-long",
+                    f"line {number} of {path} is longer than {line_bytes_max} bytes",
+                    "check that this is a recording",
+                    path=str(path),
+                    line=number,
+                    limit_bytes=line_bytes_max,
+                )
             if error := check_line(path, dialect, columns, number, line.rstrip("\n")):
                 return error
     return None
 
 
-def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int, line: str) -> InputError | None:
+def check_line(path: Path, dialect: Dialect, columns: Sequence[int], number: int, line: str) -> RecordingError | None:
     cells = dialect.split(line)
     if len(cells) != dialect.width:
-        return InputError(
-            f"line {number} of {path} has {len(cells)} cells, the others {dialect.width}; repair or delete this line"
+        return RecordingError(
+            "line-ragged",
+            f"line {number} of {path} has {len(cells)} cells, the others {dialect.width}",
+            "repair or delete this line",
+            path=str(path),
+            line=number,
+            cells=len(cells),
+            columns=dialect.width,
         )
     for at in columns:
         cell = cells[at].strip()
         fits = is_moment(cell) if dialect.kinds[at] is Kind.MOMENT else is_number(cell, dialect.decimal)
         if cell not in EMPTY and not fits:
             name = dialect.headings[at]
-            return InputError(
-                f"line {number} of {path}, column {name!r}: {cell[:40]!r} is not a number; correct it or leave it empty"
+            return RecordingError(
+                "cell-not-a-number",
+                f"line {number} of {path}, column {name!r}: {cell[:40]!r} is not a number",
+                "correct it or leave it empty",
+                path=str(path),
+                line=number,
+                channel=name,
+                value=cell[:40],
             )
     return None

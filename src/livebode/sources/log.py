@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, InputError
+from livebode.core import Block, Channel, RecordingError, UsageError
 from livebode.sources.naming import resolve
-from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, stacked
+from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
 BLOCK_SAMPLES_MAX = 1 << 24
@@ -112,16 +112,27 @@ class Log:
 
         Raises
         ------
-        InputError
-            At once for a missing channel; while iterating for damage further down in the file.
+        RecordingError
+            At once for a channel that is not in the file; while iterating for damage further down in it.
+        UsageError
+            For no channel, a channel asked for twice, or a length that is out of range.
         """
         limit = checked_block_samples(self._block_samples if block_samples is None else block_samples)
         names = list(self._chosen if channels is None else channels)
-        if isinstance(channels, str) or not names:
-            raise InputError(f"channels={channels!r} is not a list of at least one channel name")
+        if isinstance(channels, str):
+            raise TypeError(f"channels={channels!r} is not a list of channel names")
+        if not names:
+            raise UsageError("missing", "channels is empty", "name at least one channel", argument="channels")
         if repeated := [name for name, count in Counter(names).items() if count > 1]:
-            raise InputError(f"channel {repeated[0]!r} is asked for more than once; name it once")
-        columns = [resolve(name, self._columns, self._recording.columns) for name in names]
+            raise UsageError(
+                "duplicate",
+                f"channel {repeated[0]!r} is asked for more than once",
+                "name it once",
+                argument="channels",
+                value=repeated[0],
+            )
+        with located(self.path):
+            columns = [resolve(name, self._columns, self._recording.columns) for name in names]
         labels = tuple(Channel(name, column.unit) for name, column in zip(names, columns))
         return self._cut(self._read(columns, limit), labels, limit)
 
@@ -146,7 +157,8 @@ class Log:
                 )
             row += length
         if row == 0:
-            raise InputError(f"{self.path} has no samples; is the recording whole?")
+            path = str(self.path)
+            raise RecordingError("empty", f"{path} has no samples", "check that the recording is complete", path=path)
 
 
 def pieces(first: int, last: int, cuts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
@@ -168,5 +180,13 @@ def holds(cuts: NDArray[np.int64], row: int) -> bool:
 
 def checked_block_samples(block_samples: int) -> int:
     if not (isinstance(block_samples, int) and 1 <= block_samples <= BLOCK_SAMPLES_MAX):
-        raise InputError(f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}")
+        raise UsageError(
+            "out-of-range",
+            f"{block_samples=} is out of range",
+            f"give a whole number from 1 to {BLOCK_SAMPLES_MAX}",
+            argument="block_samples",
+            value=block_samples,
+            minimum=1,
+            maximum=BLOCK_SAMPLES_MAX,
+        )
     return block_samples

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from livebode.core import InputError
+from livebode.core import RecordingError
+from livebode.sources.damage import damaged, oversized, truncated
 
 HEADER_BYTES = 128
 COMPRESSED, MATRIX = 15, 14
@@ -47,7 +48,7 @@ def list_variables(path: Path) -> list[Variable]:
 
     Raises
     ------
-    InputError
+    RecordingError
         Where an element ends after its container, or declares more values than it has bytes.
     """
     size = path.stat().st_size
@@ -55,7 +56,7 @@ def list_variables(path: Path) -> list[Variable]:
     with path.open("rb") as file:
         header = file.read(HEADER_BYTES)
         if len(header) < HEADER_BYTES or header[126:128] not in (b"IM", b"MI"):
-            raise InputError(f"the header of {path} is damaged; is it a MATLAB file, and whole?")
+            raise damaged(f"the MATLAB header of {path} is damaged", path=str(path))
         order = "<" if header[126:128] == b"IM" else ">"
         at = HEADER_BYTES
         while at < size:
@@ -69,17 +70,24 @@ def check_top(path: Path, file: BinaryIO, at: int, size: int, order: str) -> tup
     file.seek(at)
     tag = file.read(8)
     if len(tag) < 8:
-        raise InputError(f"{path} ends in the middle of a tag at byte {at}; is the file whole?")
+        raise truncated(f"{path} ends in the middle of a tag at byte {at}", path=str(path), byte=at)
     kind, length = struct.unpack(order + "II", tag)
     if at + 8 + length > size:
-        raise InputError(f"{path} ends at byte {size}, but the element at byte {at} has {length}; is the file whole?")
+        raise truncated(
+            f"{path} ends at byte {size}, but the element at byte {at} has {length} bytes",
+            path=str(path),
+            byte=at,
+            declared_bytes=length,
+        )
     source: Plain | Unpacked = Plain(file)
     inner = length
     if kind == COMPRESSED:
         source = Unpacked(file, length)
         kind, inner = Walk(source, order).tag(UNPACKED_MAX)
     if kind != MATRIX:
-        raise InputError(f"{path} has an element of type {kind} at byte {at}, which is no variable; is it damaged?")
+        raise damaged(
+            f"{path} has an element of type {kind} at byte {at}, which is not a variable", path=str(path), byte=at
+        )
     variable = Walk(source, order).matrix(inner, 0)
     source.rest()
     return variable, at + 8 + length
@@ -121,7 +129,7 @@ class Unpacked:
         while count > 0:
             got = len(self.read(min(count, self.PIECE)))
             if got == 0:
-                raise InputError(f"a compressed variable ends {count} bytes early; is the file whole?")
+                raise truncated(f"a compressed variable ends {count} bytes early", missing_bytes=count)
             count -= got
 
     def rest(self) -> None:
@@ -129,7 +137,7 @@ class Unpacked:
         while self._more():
             self._ready = b""
         if not self._zlib.eof:
-            raise InputError("a compressed variable has no end; is the file whole?")
+            raise truncated("a compressed variable has no end")
 
     def _more(self) -> bool:
         if self._zlib.eof:
@@ -141,6 +149,12 @@ class Unpacked:
         piece = self._zlib.decompress(packed, self.PIECE) if packed else b""
         self._ready += piece
         return bool(piece) or bool(self._zlib.unconsumed_tail) or self._left > 0
+
+
+def too_short(declared: int, left: int) -> RecordingError:
+    return truncated(
+        f"a variable declares {declared} bytes where {left} are left", declared_bytes=declared, left_bytes=left
+    )
 
 
 @dataclass
@@ -155,10 +169,10 @@ class Walk:
         """Type and length of the next element, which must fit in `room` bytes; its bytes come next."""
         raw = self.source.read(8)
         if len(raw) < 8 or room < 8:
-            raise InputError("a variable ends in the middle of a tag; is the file whole?")
+            raise truncated("a variable ends in the middle of a tag")
         kind, length = struct.unpack(self.order + "II", raw)
         if length > room - 8:
-            raise InputError(f"a variable declares {length} bytes where {room - 8} are left; is the file whole?")
+            raise too_short(length, room - 8)
         return kind, length
 
     def element(self, room: int, keep: int, types: frozenset[int]) -> tuple[bytes, int, int]:
@@ -169,15 +183,15 @@ class Walk:
         """
         raw = self.source.read(8)
         if len(raw) < 8 or room < 8:
-            raise InputError("a variable ends in the middle of a tag; is the file whole?")
+            raise truncated("a variable ends in the middle of a tag")
         kind, length = struct.unpack(self.order + "II", raw)
         inside = kind >> 16
         if inside:
             kind, length = kind & 0xFFFF, inside
         if kind not in types:
-            raise InputError(f"a variable holds an element of type {kind} where none can be; is the file damaged?")
+            raise damaged(f"a variable contains an element of type {kind} where it is not allowed", element=kind)
         if length > (4 if inside else room - 8):
-            raise InputError(f"a variable declares {length} bytes where {room - 8} are left; is the file whole?")
+            raise too_short(length, room - 8)
         if inside:
             return raw[4 : 4 + length], length, room - 8
         padded = min(length + -length % 8, room - 8)
@@ -189,22 +203,25 @@ class Walk:
         """Check a matrix of `room` bytes, and those inside it; its head."""
         self.elements += 1
         if depth > DEPTH_MAX or self.elements > ELEMENTS_MAX:
-            raise InputError(f"the file nests deeper than {DEPTH_MAX} or has more than {ELEMENTS_MAX} elements")
+            raise oversized(
+                f"the file is nested deeper than {DEPTH_MAX} levels or has more than {ELEMENTS_MAX} elements",
+                ELEMENTS_MAX,
+            )
         if room == 0:
             return Variable("", "double", (0, 0))
         raw, _, room = self.element(room, 8, FLAGS)
         if len(raw) < 8:
-            raise InputError("a variable has no flags; is the file damaged?")
+            raise damaged("a variable has no flags")
         flags = struct.unpack(self.order + "I", raw[:4])[0]
         kind = flags & 0xFF
         if kind not in CLASSES:
-            raise InputError(f"a variable is of class {kind}, which MATLAB does not have; is the file damaged?")
+            raise damaged(f"a variable has the class {kind}, which MATLAB does not have")
         if kind == OPAQUE:
             return Variable(self._opaque(room, depth), CLASSES[kind])
         raw, _, room = self.element(room, 4 * DIMENSIONS_MAX + 4, DIMENSIONS)
         shape = struct.unpack(f"{self.order}{len(raw) // 4}i", raw[: len(raw) // 4 * 4])
         if not 2 <= len(shape) <= DIMENSIONS_MAX or any(length < 0 for length in shape):
-            raise InputError(f"a variable declares the dimensions {shape[:4]}…; is the file damaged?")
+            raise damaged(f"a variable declares the dimensions {shape[:4]}…", shape=list(shape[:4]))
         name, _, room = self.element(room, 64, TEXT)
         if kind in (CELL, STRUCT, OBJECT):
             self._nested(kind, math.prod(shape), room, depth)
@@ -227,14 +244,14 @@ class Walk:
         """Check a matrix inside another; the room that is left after it."""
         inner, length = self.tag(room)
         if inner != MATRIX:
-            raise InputError(f"a variable holds an element of type {inner} for a matrix; is the file damaged?")
+            raise damaged(f"a variable contains an element of type {inner} in place of a matrix", element=inner)
         self.matrix(length, depth + 1)
         return room - 8 - length
 
     def _values(self, count: int, room: int) -> None:
         """Real and imaginary part of a matrix of `count` values, a byte each at least."""
         if count > room:
-            raise InputError(f"a variable declares {count} values where {room} bytes are left; is the file whole?")
+            raise truncated(f"a variable declares {count} values where {room} bytes are left", declared=count)
         while room >= 8:
             _, _, room = self.element(room, 0, VALUES)
         self.source.skip(room)
@@ -247,11 +264,14 @@ class Walk:
             raw, _, room = self.element(room, 4, DIMENSIONS)
             width = struct.unpack(self.order + "i", raw)[0] if len(raw) == 4 else 0
             if width <= 0:
-                raise InputError(f"a struct declares field names of {width} bytes; is the file damaged?")
+                raise damaged(f"a struct declares field names of {width} bytes")
             _, length, room = self.element(room, 0, TEXT)
             fields = length // width
         if count * fields * 8 > room:
-            raise InputError(f"a struct or cell declares {count} × {fields} parts where {room} bytes are left")
+            raise truncated(
+                f"a struct or cell declares {count} × {fields} parts where {room} bytes are left",
+                declared=count * fields,
+            )
         for _ in range(count * fields):
             room = self._inner(room, depth)
         self.source.skip(max(0, room))

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from livebode.core import InputError
 from livebode.sources.arrays import array_columns
+from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import list_variables
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
@@ -80,7 +80,11 @@ class Walk:
     def visit(self, name: str, value: Any, depth: int) -> None:
         self._steps += 1
         if depth > DEPTH_MAX or self._steps > COLUMNS_MAX:
-            raise InputError(f"the file nests deeper than {DEPTH_MAX} or has more than {COLUMNS_MAX} parts at {name!r}")
+            raise oversized(
+                f"the file is nested deeper than {DEPTH_MAX} levels or has more than {COLUMNS_MAX} parts at {name!r}",
+                COLUMNS_MAX,
+                part=name,
+            )
         if not isinstance(value, np.ndarray):
             self.skipped.append(Skipped(name, f"it is of type {type(value).__name__}"))
         elif value.dtype.names:

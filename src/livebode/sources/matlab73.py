@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.hdf5 import add_dataset, dataset_chunks, import_h5py
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
@@ -52,7 +52,11 @@ class Walk:
     def visit(self, name: str, item: Any, depth: int) -> None:
         self._steps += 1
         if depth > DEPTH_MAX or self._steps > COLUMNS_MAX:
-            raise InputError(f"the file nests deeper than {DEPTH_MAX} or has more than {COLUMNS_MAX} parts at {name!r}")
+            raise oversized(
+                f"the file is nested deeper than {DEPTH_MAX} levels or has more than {COLUMNS_MAX} parts at {name!r}",
+                COLUMNS_MAX,
+                part=name,
+            )
         if isinstance(item, self.h5py.Group):
             for field in item:
                 self._field(name, field, item[field], depth)
@@ -72,7 +76,10 @@ class Walk:
             self.visit(f"{name}.{field}", item, depth + 1)
             return
         if item.size > COLUMNS_MAX:
-            raise InputError(f"the struct array {name!r} has {item.size} elements, more than {COLUMNS_MAX}")
+            count = int(item.size)
+            raise oversized(
+                f"the struct array {name!r} has {count} elements, more than {COLUMNS_MAX}", COLUMNS_MAX, part=name
+            )
         for at, reference in enumerate(np.asarray(item[()]).ravel(), start=1):
             if reference:
                 self.visit(f"{name}({at}).{field}", self.file[reference], depth + 1)

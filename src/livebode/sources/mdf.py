@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import ExtraError
+from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
 
@@ -32,7 +33,7 @@ class MdfRecording(Recording):
         with opened(path) as file:
             for at, group in enumerate(file.groups):
                 if len(columns) + len(group.channels) > COLUMNS_MAX:
-                    raise InputError(f"{path} has more than {COLUMNS_MAX} channels; is it a recording?")
+                    raise oversized(f"{path} has more than {COLUMNS_MAX} channels", COLUMNS_MAX, path=str(path))
                 samples = int(group.channel_group.cycles_nr)
                 self._check_size(file, at, samples)
                 for index, channel in enumerate(group.channels):
@@ -51,19 +52,27 @@ class MdfRecording(Recording):
         self.skipped = tuple(skipped)
 
     def _check_size(self, file: Any, at: int, samples: int) -> None:
-        """InputError where a group declares more than the file can hold, uncompressed data as compressed by 1000."""
+        """RecordingError where a group declares more than the file can hold, even compressed by 1000."""
         width = int(file.groups[at].channel_group.samples_byte_nr)
         if samples * max(width, 1) > 1000 * self.path.stat().st_size:
-            raise InputError(f"{self.path} declares {samples} samples of {width} bytes, more than it can hold")
+            raise truncated(
+                f"{self.path} declares {samples} samples of {width} bytes, more than it can hold",
+                path=str(self.path),
+                samples=samples,
+            )
 
     def _check_place(self, channel: Any, record_bytes: int) -> None:
-        """InputError where a channel lies outside its record: asammdf would read what is behind it in memory."""
+        """RecordingError where a channel is outside its record: asammdf would read what is behind it in memory."""
         if hasattr(channel, "byte_offset"):
             end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
         else:
             end = channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0) + channel.bit_count
         if end > 8 * record_bytes:
-            raise InputError(f"{self.path}: channel {channel.name!r} ends at bit {end} of {record_bytes} bytes")
+            raise damaged(
+                f"{self.path}: channel {channel.name!r} ends at bit {end} of {record_bytes} bytes",
+                path=str(self.path),
+                channel=str(channel.name),
+            )
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         samples = columns[0].samples or 0
@@ -72,7 +81,9 @@ class MdfRecording(Recording):
                 count = min(rows, samples - first)
                 chunk = [self._values(file, column, first, count) for column in columns]
                 if any(len(found) != count for found in chunk):
-                    raise InputError(f"{self.path} ends before its {samples} samples; is it whole?")
+                    raise truncated(
+                        f"{self.path} ends before its {samples} samples", path=str(self.path), samples=samples
+                    )
                 yield chunk
 
     def _values(self, file: Any, column: Column, first: int, count: int) -> Any:
@@ -95,7 +106,14 @@ def opened(path: Path) -> Iterator[Any]:
     try:
         from asammdf import MDF
     except ImportError:
-        raise InputError(f"{path} needs the MDF library; pip install livebode[mdf]") from None
+        raise ExtraError(
+            "not-installed",
+            f"{path} needs the package asammdf, which is not installed",
+            "run pip install livebode[mdf]",
+            package="asammdf",
+            extra="mdf",
+            path=str(path),
+        ) from None
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says is in the error that follows
     with path.open("rb") as raw:  # by its name it would be mapped, and a mapped file that shrinks kills the process
         try:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from livebode.core import InputError, missing_channel
+from livebode.core import RecordingError, missing_channel
 from livebode.sources.recording import Column
 
 
@@ -17,11 +17,33 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     if len(found) == 1:
         return found[0]
     if found:
-        paths = ", ".join(column.name for column in found[:5])
-        raise InputError(f"channel {name!r} means more than one: {paths}; name the one by its path")
+        paths = [column.name for column in found[:5]]
+        raise RecordingError(
+            "channel-ambiguous",
+            f"channel {name!r} means more than one: {', '.join(paths)}",
+            "name the one by its path",
+            channel=name,
+            channels=paths,
+        )
     for column in everything:
         if column.name == name and not column.temporal:
-            raise InputError(
-                f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}; open it on its own"
+            raise RecordingError(
+                "lengths-differ",
+                f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}",
+                "open it on its own",
+                channel=name,
+                samples=[column.samples, columns[0].samples],
             )
-    raise InputError(missing_channel(name, [column.name for column in columns if not column.temporal]))
+    names = [column.name for column in columns if not column.temporal]
+    raise RecordingError(
+        "channel-unknown", f"there is no channel {name!r}", nearest(name, names), channel=name, channels=names
+    )
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """The remedy for a channel that is not there: the nearest name, and all names.
+
+    >>> nearest("iq_adX", ["iq_adx", "theta_mx"])
+    "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
+    """
+    return missing_channel(name, names).removeprefix(f"there is no channel {name!r}; ")

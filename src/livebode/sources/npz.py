@@ -14,8 +14,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from livebode.core import InputError
 from livebode.sources.arrays import Slot, array_columns
+from livebode.sources.damage import oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 
 HEADER_BYTES_MAX = 10_000
@@ -43,7 +43,13 @@ class NpzRecording(Recording):
         self._members: dict[str, Member] = {}
         with zipfile.ZipFile(path) as archive:
             if len(archive.infolist()) > COLUMNS_MAX:
-                raise InputError(f"{path} has {len(archive.infolist())} members, more than {COLUMNS_MAX}")
+                members = len(archive.infolist())
+                raise oversized(
+                    f"{path} has {members} members, more than {COLUMNS_MAX}",
+                    COLUMNS_MAX,
+                    path=str(path),
+                    members=members,
+                )
             for info in archive.infolist():
                 name = info.filename.removesuffix(".npy")
                 with archive.open(info) as file:
@@ -99,19 +105,24 @@ class Series:
         size = count * self._stride * self._dtype.itemsize
         raw = self._file.read(size)
         if len(raw) != size:
-            raise InputError(f"array {self._name!r} ends {size - len(raw)} bytes early; is the file whole?")
+            missing = size - len(raw)
+            raise truncated(f"array {self._name!r} ends {missing} bytes early", part=self._name, missing_bytes=missing)
         return np.frombuffer(raw, self._dtype)[self._phase :: self._stride]
 
 
 def read_header(file: IO[bytes], info: zipfile.ZipInfo) -> Member:
-    """Header of a .npy member, held against the size that the archive states for it."""
+    """Header of a .npy member, compared with the size that the archive states for it."""
     version = npy.read_magic(file)
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, fortran, dtype = read(file, max_header_size=HEADER_BYTES_MAX)
     member = Member(shape, fortran, dtype, file.tell())
     needed = member.offset + math.prod(shape) * dtype.itemsize
     if any(length < 0 for length in shape) or (not dtype.hasobject and needed > info.file_size):
-        raise InputError(f"{info.filename!r} declares shape {shape}, more than its {info.file_size} bytes hold")
+        raise truncated(
+            f"{info.filename!r} declares shape {shape}, more than its {info.file_size} bytes hold",
+            part=info.filename,
+            shape=list(shape),
+        )
     return member
 
 

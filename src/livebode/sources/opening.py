@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import RecordingError, UsageError
 from livebode.sources.formats import open_recording
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
-from livebode.sources.recording import Column, Recording, guarded
+from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_in_file
 
 
@@ -43,18 +43,41 @@ def open_log(
 
     Raises
     ------
-    InputError
-        For anything that cannot be used, in one sentence with its remedy.
+    RecordingError
+        Where the file cannot be read, lacks a channel, or has no usable time or rate.
+    UsageError
+        Where `rate_hz` or `block_samples` is out of range.
+    ExtraError
+        Where the package that reads the format is not installed.
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+        raise UsageError(
+            "out-of-range",
+            f"{rate_hz=} is not a positive finite number",
+            "give the samples per second",
+            argument="rate_hz",
+            value=rate_hz,
+        )
     checked_block_samples(block_samples)
     recording = open_recording(Path(path))
+    with located(recording.path):
+        return log_of(recording, rate_hz, time, channels, block_samples)
+
+
+def log_of(
+    recording: Recording, rate_hz: float | None, time: str | None, channels: Sequence[str] | None, block_samples: int
+) -> Log:
+    """The log of an open recording; parameters as in `open_log`."""
     columns = together(recording, channels)
     time_column, unit = find_time(columns, time)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
     if not chosen:
-        raise InputError(f"{recording.path} holds no channel but the time{reasons(recording)}")
+        raise RecordingError(
+            "channel-missing",
+            f"{recording.path} has no channel but the time{reasons(recording)}",
+            "check that the recording is complete",
+            path=str(recording.path),
+        )
     return Log(recording, columns, chosen, find_clock(recording, time_column, unit, rate_hz), block_samples)
 
 
@@ -68,13 +91,24 @@ def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: 
         return clock_from_time(column, unit, chunks, rate_hz, stated)
     if rate_hz is not None:
         if recording.rate_hz is not None and abs(recording.rate_hz / rate_hz - 1) > 1e-3:
-            raise InputError(
-                f"{recording.path} states {recording.rate_hz:.8g} Hz, but the given rate is {rate_hz:.8g} Hz; "
-                "correct it, or leave it out"
+            raise RecordingError(
+                "rate-conflict",
+                f"{recording.path} states {recording.rate_hz:.8g} Hz, but rate_hz is {rate_hz:.8g} Hz",
+                "correct rate_hz, or leave it out",
+                path=str(recording.path),
+                argument="rate_hz",
+                rate_hz=recording.rate_hz,
+                given_hz=rate_hz,
             )
         return Clock(rate_hz, "given")
     if stated is None:
-        raise InputError(f"{recording.path} has neither a time column nor a rate; give --rate, or name the time column")
+        raise RecordingError(
+            "rate-missing",
+            f"{recording.path} has neither a time column nor a rate",
+            "give rate_hz, or name the time column",
+            path=str(recording.path),
+            argument="rate_hz",
+        )
     return Clock(*stated)
 
 
@@ -85,7 +119,14 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
         asked = [resolve(name, everything, everything) for name in channels]
         if len({column.samples for column in asked}) > 1:
             lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(channels, asked))
-            raise InputError(f"the channels have different numbers of samples ({lengths}); name channels of one length")
+            raise RecordingError(
+                "lengths-differ",
+                f"the channels have different numbers of samples ({lengths})",
+                "name channels of one length",
+                path=str(recording.path),
+                argument="channels",
+                samples=[column.samples for column in asked],
+            )
         length = asked[0].samples
     else:
         values: Counter[int | None] = Counter()
@@ -93,11 +134,16 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
             values[column.samples] += 1 if column.samples is None else column.samples
         length = max(values, key=lambda samples: values[samples], default=0)
     if length is not None and length < 2:
-        raise InputError(f"{recording.path} holds no channel of at least 2 samples{reasons(recording)}")
+        raise RecordingError(
+            "channel-missing",
+            f"{recording.path} has no channel of at least 2 samples{reasons(recording)}",
+            "check that the recording is complete",
+            path=str(recording.path),
+        )
     return [column for column in everything if column.samples == length]
 
 
 def reasons(recording: Recording) -> str:
     """What was skipped, for the error that nothing is left."""
     listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
-    return f" ({'; '.join(listed)})" if listed else "; is the recording whole?"
+    return f" ({'; '.join(listed)})" if listed else ""

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import LivebodeError, RecordingError
 
 Chunk = list[NDArray[Any]]
 """One array for each column asked for, all of one length, numbers of any type; int64 nanoseconds for temporal ones."""
@@ -84,32 +84,62 @@ class Recording(ABC):
 
 @contextmanager
 def contained(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever a library raises on a damaged file into an InputError of one sentence.
+    """Turn whatever a library raises on a damaged file into a RecordingError of one sentence; errors name the file.
 
     >>> with contained(Path("a.mat"), "MATLAB"):
     ...     raise KeyError("mdtype 77")
     Traceback (most recent call last):
         ...
-    livebode.core.errors.base.LivebodeError: cannot read a.mat as MATLAB: mdtype 77; is the file whole and of this kind?
+    livebode.RecordingError: cannot read a.mat as MATLAB: mdtype 77; check that the file is complete and of this format
     """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the libraries warn before they fail; the failure is what counts
             yield
-    except InputError:
-        raise
+    except LivebodeError as error:
+        raise named(error, path) from error.__cause__
     except PermissionError:
-        raise InputError(f"no permission to read {path}; ask for read access to it") from None
+        raise RecordingError(
+            "not-readable", f"no permission to read {path}", "ask for read access to it", path=str(path)
+        ) from None
     except MemoryError:
-        raise InputError(f"{path} declares more data than fits in memory; is the file damaged?") from None
+        raise RecordingError(
+            "damaged",
+            f"{path} declares more data than fits in memory",
+            "check that the file is not damaged",
+            path=str(path),
+        ) from None
     except Exception as error:
         lines = str(error.args[0] if isinstance(error, KeyError) and error.args else error).strip().splitlines()
         reason = (lines[0] if lines else type(error).__name__)[:200].rstrip(" .")
-        raise InputError(f"cannot read {path} as {kind}: {reason}; is the file whole and of this kind?") from error
+        raise RecordingError(
+            "damaged",
+            f"cannot read {path} as {kind}: {reason}",
+            "check that the file is complete and of this format",
+            path=str(path),
+            format=kind,
+        ) from error
+
+
+@contextmanager
+def located(path: Path) -> Iterator[None]:
+    """Errors inside it name the file, as a fact and in front of their sentence."""
+    try:
+        yield
+    except LivebodeError as error:
+        raise named(error, path) from error.__cause__
+
+
+def named(error: LivebodeError, path: Path) -> LivebodeError:
+    """The error with the file that it belongs to; the same one where it names a file."""
+    if "path" in error.facts:
+        return error
+    error.facts["path"] = str(path)
+    return error.at(str(path))
 
 
 def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:
-    """`chunks`, with whatever reading raises turned into InputError."""
+    """`chunks`, with whatever reading raises turned into RecordingError."""
     while True:
         chunk: Chunk | None = None
         with contained(path, kind):

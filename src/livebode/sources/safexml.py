@@ -6,7 +6,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from livebode.core import InputError
+from livebode.core import RecordingError
+from livebode.sources.damage import oversized
 
 BYTES_MAX = 1 << 28
 DEPTH_MAX = 64
@@ -21,21 +22,21 @@ def parse(path: Path) -> Element:
 
     Raises
     ------
-    InputError
+    RecordingError
         For a document type or entity declaration (they can expand without bound or name other files), for more than
         256 MiB, 64 levels, a million elements or 1 MiB in one tag, and for text that is not XML.
     """
     if (size := path.stat().st_size) > BYTES_MAX:
-        raise InputError(f"{path} has {size} bytes of XML, more than {BYTES_MAX}; is it a measurement?")
+        raise oversized(f"{path} has {size} bytes of XML, more than {BYTES_MAX}", BYTES_MAX, path=str(path), bytes=size)
     builder, depth, elements = TreeBuilder(), 0, 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, elements
         depth, elements = depth + 1, elements + 1
         if elements > ELEMENTS_MAX:
-            raise InputError(f"{path} has more than {ELEMENTS_MAX} elements; is it a measurement?")
+            raise oversized(f"{path} has more than {ELEMENTS_MAX} elements", ELEMENTS_MAX, path=str(path))
         if depth > DEPTH_MAX:
-            raise InputError(f"{path} nests deeper than {DEPTH_MAX} levels; is it a measurement?")
+            raise oversized(f"{path} is nested deeper than {DEPTH_MAX} levels", DEPTH_MAX, path=str(path))
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -44,7 +45,12 @@ def parse(path: Path) -> Element:
         builder.end(tag)
 
     def refuse(*_: object) -> None:
-        raise InputError(f"{path} declares a document type or entities, which are not read; take the declaration out")
+        raise RecordingError(
+            "declaration-refused",
+            f"{path} declares a document type or entities, which are not read",
+            "remove the declaration",
+            path=str(path),
+        )
 
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -54,9 +60,12 @@ def parse(path: Path) -> Element:
         while piece := file.read(_PIECE_BYTES):
             parser.Parse(piece)
             if file.tell() - parser.CurrentByteIndex > TOKEN_BYTES_MAX:
-                raise InputError(
-                    f"{path} has a tag or comment of more than {TOKEN_BYTES_MAX} bytes at byte "
-                    f"{parser.CurrentByteIndex}; is it a measurement?"
+                at = parser.CurrentByteIndex
+                raise oversized(
+                    f"{path} has a tag or comment of more than {TOKEN_BYTES_MAX} bytes at byte {at}",
+                    TOKEN_BYTES_MAX,
+                    path=str(path),
+                    byte=at,
                 )
     parser.Parse(b"", True)
     return builder.close()

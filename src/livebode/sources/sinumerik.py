@@ -12,8 +12,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 from livebode.sources.base85 import decode
+from livebode.sources.damage import damaged, truncated
 from livebode.sources.recording import Chunk, Column, Recording, contained
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.safexml import parse
@@ -53,7 +54,13 @@ class SinumerikRecording(Recording):
         nodes = measured_nodes(root)
         lengths = {tuple(len(record) for record in records(node)) for node in nodes.values()}
         if len(lengths) != 1:
-            raise InputError(f"the signals in {path} have records of different lengths {sorted(lengths)}; is it whole?")
+            raise RecordingError(
+                "lengths-differ",
+                f"the signals in {path} have records of different lengths {sorted(lengths)}",
+                "check that the file is complete",
+                path=str(path),
+                samples=sorted(lengths),
+            )
         self._values = {name: np.concatenate(list(records(node))) for name, node in nodes.items()}
         starts = np.cumsum(lengths.pop())
         self.breaks = tuple(int(start) for start in starts[:-1])
@@ -73,8 +80,8 @@ def sinumerik_spectra(path: str | PathLike[str]) -> SinumerikSpectra:
 
     Raises
     ------
-    InputError
-        Where the file is no Sinumerik measurement or was stored without spectra.
+    RecordingError
+        Where the file is not a Sinumerik measurement or was stored without spectra.
     """
     path = Path(path)
     with contained(path, "Sinumerik XML"):
@@ -86,7 +93,13 @@ def sinumerik_spectra(path: str | PathLike[str]) -> SinumerikSpectra:
             if info.get("name") == "m_crossSpecInfoList_el" and number(info, "m_uSignodeId") == input_id
         ]
         if not cross:
-            raise InputError(f"{path} holds no cross-spectrum of output and input; let the control store spectra")
+            raise RecordingError(
+                "incomplete",
+                f"{path} has no cross-spectrum of output and input",
+                "let the control store spectra",
+                path=str(path),
+                part="SigNodeCrossSpectrumInfo",
+            )
         return SinumerikSpectra(
             numeric_array(child(cross[0], "m_FrequencyVector", deep=True), 1),
             spectrum(child(nodes["input"], "m_autospectrumInfo")),
@@ -99,9 +112,12 @@ def measured_nodes(root: Element) -> dict[str, Element]:
     """The signals "input" and "output" of the measurement, then any other as node_<number>."""
     nodes = [node for node in root.iter("PlatformSignalNode") if next(node.iter("TimeSeries"), None) is not None]
     if len(nodes) < 2:
-        raise InputError(
-            f"the XML ({root.tag}) holds time records of {len(nodes)} signals, not of an input and an output; "
-            "let the control store the time series"
+        raise RecordingError(
+            "incomplete",
+            f"the XML ({root.tag}) has time records of {len(nodes)} signals, not of an input and an output",
+            "let the control store the time series",
+            part="TimeSeries",
+            signals=len(nodes),
         )
     roles = child(root, "m_listPrimaryFreqRespSigNodeData")
     wanted = {
@@ -112,7 +128,12 @@ def measured_nodes(root: Element) -> dict[str, Element]:
         wanted.get(number(node, "m_iUniqueInstanceId"), f"node_{number(node, 'm_uNodeId'):.0f}"): node for node in nodes
     }
     if not {"input", "output"} <= named.keys():
-        raise InputError(f"the XML names input and output {sorted(wanted)}, but holds only {sorted(named)}")
+        raise RecordingError(
+            "incomplete",
+            f"the XML names input and output {sorted(wanted)}, but has only {sorted(named)}",
+            "check that the file is complete",
+            part="PlatformSignalNode",
+        )
     return {name: named[name] for name in sorted(named, key=lambda name: (name not in wanted.values(), name))}
 
 
@@ -130,16 +151,14 @@ def numeric_array(element: Element, parts: int) -> NDArray[np.float64]:
     values = decode(child(element, "m_pNumberArray").text or "")
     declared = number(element, "m_length")
     if len(values) != parts * declared:
-        raise InputError(
-            f"an array declares {declared:.0f} values and holds {len(values) / parts:g}; is the file whole?"
-        )
+        raise truncated(f"an array declares {declared:.0f} values and holds {len(values) / parts:g}", declared=declared)
     return values
 
 
 def update_time_s(root: Element) -> float:
     period_s = number(root, "m_dProcessUpdateTime")
     if not 1e-9 < period_s < 1e3:
-        raise InputError(f"the sampling interval m_dProcessUpdateTime is {period_s} s; is the file damaged?")
+        raise damaged(f"the sampling interval m_dProcessUpdateTime is {period_s} s", period_s=period_s)
     return period_s
 
 
@@ -148,7 +167,12 @@ def child(element: Element, name: str, *, deep: bool = False) -> Element:
     for part in element.iter() if deep else element:
         if part.get("name") == name:
             return part
-    raise InputError(f"{element.get('name') or element.tag} has no {name}; is this a whole Sinumerik measurement?")
+    raise RecordingError(
+        "incomplete",
+        f"{element.get('name') or element.tag} has no {name}",
+        "check that this is a complete Sinumerik measurement",
+        part=name,
+    )
 
 
 def number(element: Element, name: str, *, deep: bool = False) -> float:
@@ -156,7 +180,7 @@ def number(element: Element, name: str, *, deep: bool = False) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{name} is {text[:40]!r}, not a number; is the file damaged?") from None
+        raise damaged(f"{name} is {text[:40]!r}, not a number", part=name, value=text[:40]) from None
 
 
 READER = SinumerikRecording

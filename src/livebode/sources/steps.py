@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import RecordingError
 
 GAP_TOLERANCE = 0.25
 """How far from a whole number of periods a gap may be, in periods."""
@@ -115,9 +115,12 @@ class Steps:
         time = time.astype(np.float64, copy=False)
         if not np.isfinite(time).all():
             at = int(np.flatnonzero(~np.isfinite(time))[0])
-            raise InputError(
-                f"time column {self._name!r} has no value ({time[at]}) at sample {self.rows + at}; "
-                "repair the file, or give the rate and ignore the column (time none)"
+            raise RecordingError(
+                "time-not-finite",
+                f"time column {self._name!r} has no value ({time[at]}) at sample {self.rows + at}",
+                'repair the file, or give rate_hz and ignore the column (time = "none")',
+                channel=self._name,
+                sample=self.rows + at,
             )
         self.largest = max(self.largest, abs(float(time[0])), abs(float(time[-1])))
         return time
@@ -125,17 +128,26 @@ class Steps:
     def _backwards(self, joined: NDArray[Any], steps: NDArray[np.float64], before: int) -> None:
         at = int(np.flatnonzero(~(steps > 0))[0])
         verb = "repeats" if steps[at] == 0 else "decreases"
-        raise InputError(
-            f"time column {self._name!r} {verb} at sample {before + at + 1}: {joined[at + 1]} after {joined[at]}; "
-            "repair the file, or, where this is not time or has too few digits, give the rate and ignore it (time none)"
+        raise RecordingError(
+            "time-not-increasing",
+            f"time column {self._name!r} {verb} at sample {before + at + 1}: {joined[at + 1]} after {joined[at]}",
+            "repair the file, or, where this is not time or has too few digits, give rate_hz and ignore the column "
+            '(time = "none")',
+            channel=self._name,
+            sample=before + at + 1,
+            times=joined[at : at + 2].tolist(),
         )
 
     def _irregular(self, joined: NDArray[Any], at: int, before: int) -> None:
         step = float(joined[at + 1]) - float(joined[at])
-        raise InputError(
+        raise RecordingError(
+            "time-irregular",
             f"time column {self._name!r} steps from {joined[at]} to {joined[at + 1]} at sample {before + at + 1}, "
-            f"{step / self.nominal:.4g} periods of {self.nominal:.6g}: neither regular nor whole missing samples; "
-            "resample the recording, or give the rate and ignore the column (time none)"
+            f"{step / self.nominal:.4g} periods of {self.nominal:.6g}: neither regular nor whole missing samples",
+            'resample the recording, or give rate_hz and ignore the column (time = "none")',
+            channel=self._name,
+            sample=before + at + 1,
+            times=joined[at : at + 2].tolist(),
         )
 
     def _cut_gaps(self, joined: NDArray[Any], steps: NDArray[np.float64], before: int) -> NDArray[np.float64]:
@@ -149,7 +161,13 @@ class Steps:
             self.gap_rows.append(before + at + 1)
             self.gap_missing.append(whole - 1)
         if len(self.gap_rows) > GAPS_MAX:
-            raise InputError(f"time column {self._name!r} has more than {GAPS_MAX} gaps; is it time, and is it whole?")
+            raise RecordingError(
+                "time-irregular",
+                f"time column {self._name!r} has more than {GAPS_MAX} gaps",
+                "check that this is the time and that the recording is complete",
+                channel=self._name,
+                gaps=len(self.gap_rows),
+            )
         return steps[regular]
 
     def _gather(self, steps: NDArray[np.float64]) -> None:

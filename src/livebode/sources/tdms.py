@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import ExtraError
+from livebode.sources.damage import damaged, oversized, truncated
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
 from livebode.sources.rounding import exact_rate_hz
 
@@ -38,7 +39,9 @@ class TdmsRecording(Recording):
         with opened(path) as file:
             channels = [channel for group in file.groups() for channel in group.channels()]
             if len(channels) > COLUMNS_MAX:
-                raise InputError(f"{path} has {len(channels)} channels, more than {COLUMNS_MAX}; is it a recording?")
+                raise oversized(
+                    f"{path} has {len(channels)} channels, more than {COLUMNS_MAX}", COLUMNS_MAX, path=str(path)
+                )
             several = len(file.groups()) > 1
             count = Counter(channel.name for channel in channels)
             for channel in channels:
@@ -73,7 +76,7 @@ def values(data: Any) -> Any:
 
 
 def refuse_truncated(path: Path) -> None:
-    """InputError where the file ends before its last segment does; npTDMS would give what is there without a word."""
+    """RecordingError where the file ends before its last segment does; npTDMS would read the rest without an error."""
     size = path.stat().st_size
     at = segments = 0
     with path.open("rb") as file:
@@ -82,12 +85,16 @@ def refuse_truncated(path: Path) -> None:
             tag, _, _, following, _ = LEAD_IN.unpack(file.read(LEAD_IN.size))
             segments += 1
             if tag != b"TDSm" or segments > SEGMENTS_MAX:
-                raise InputError(f"{path} has no TDMS segment at byte {at}; is it whole?")
+                raise damaged(f"{path} has no TDMS segment at byte {at}", path=str(path), byte=at)
             if following == _UNFINISHED:
                 return  # its writer was stopped, and says so
             at += LEAD_IN.size + following
     if at != size:
-        raise InputError(f"{path} ends {abs(at - size)} bytes {'early' if at > size else 'late'}; is it whole?")
+        raise truncated(
+            f"{path} ends {abs(at - size)} bytes {'early' if at > size else 'late'}",
+            path=str(path),
+            missing_bytes=at - size,
+        )
 
 
 @contextmanager
@@ -95,7 +102,14 @@ def opened(path: Path) -> Iterator[Any]:
     try:
         import nptdms
     except ImportError:
-        raise InputError(f"{path} needs the TDMS library; pip install livebode[tdms]") from None
+        raise ExtraError(
+            "not-installed",
+            f"{path} needs the package npTDMS, which is not installed",
+            "run pip install livebode[tdms]",
+            package="npTDMS",
+            extra="tdms",
+            path=str(path),
+        ) from None
     logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # what it says is in the error that follows
     # Given a name it would look into the index file beside, which may be of another recording.
     with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:

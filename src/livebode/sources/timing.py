@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, missing_channel
+from livebode.core import RecordingError
+from livebode.sources.naming import nearest
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps
@@ -88,7 +89,15 @@ def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | Non
         for column in columns:
             if wanted == column.name or wanted in column.aliases:
                 return column, given
-    raise InputError(f"time column: {missing_channel(bare, [column.name for column in columns])}")
+    names = [column.name for column in columns]
+    raise RecordingError(
+        "channel-unknown",
+        f"there is no time column {bare!r}",
+        nearest(bare, names),
+        argument="time",
+        channel=bare,
+        channels=names,
+    )
 
 
 def time_rank(column: Column) -> int | None:
@@ -137,7 +146,7 @@ def clock_from_time(
     rate_hz
         Rate that the user gave; it is taken as exact, and refused where the column contradicts it.
     stated
-        Rate that the file states elsewhere; it helps only where the unit of time cannot be told.
+        Rate that the file states elsewhere; it helps only where the unit of time is not stated.
     """
     unit = stated_unit(column, unit)
     steps = Steps(column.name)
@@ -145,19 +154,20 @@ def clock_from_time(
         steps.add(time)
     if not steps.regular:
         if rate_hz is None:
-            raise InputError(f"time column {column.name!r} has {steps.rows} samples, too few to tell the rate; give it")
+            raise RecordingError(
+                "rate-missing",
+                f"time column {column.name!r} has {steps.rows} samples, too few to measure the rate",
+                "give rate_hz",
+                argument="rate_hz",
+                channel=column.name,
+                samples=steps.rows,
+            )
         return Clock(rate_hz, "given", steps.rows)
     told = (rate_hz, "the given rate") if rate_hz is not None else stated
     unit, scale, guessed = (unit, SECONDS[unit.casefold()], "") if unit else guess_unit(column, steps.mean, told)
     refuse_jitter(column.name, steps)
     measured_hz = exact_rate_hz(steps.mean * scale, uncertainty(steps))
-    if not 1e-9 < measured_hz < 1e12:
-        raise InputError(f"time column {column.name!r} gives a rate of {measured_hz:.6g} Hz; is it time?")
-    if rate_hz is not None and abs(measured_hz / rate_hz - 1.0) > RATE_TOLERANCE:
-        raise InputError(
-            f"time column {column.name!r} says {measured_hz:.8g} Hz, but the given rate is {rate_hz:.8g} Hz; "
-            "correct the rate, or ignore the column (time none)"
-        )
+    check_rate(column.name, measured_hz, rate_hz)
     origin = f"time column {column.name!r} in {unit}{guessed}"
     return Clock(
         rate_hz if rate_hz is not None else measured_hz,
@@ -170,11 +180,39 @@ def clock_from_time(
     )
 
 
+def check_rate(name: str, measured_hz: float, rate_hz: float | None) -> None:
+    """RecordingError where no recording has the measured rate, or where it contradicts the given one."""
+    if not 1e-9 < measured_hz < 1e12:
+        raise RecordingError(
+            "rate-implausible",
+            f"time column {name!r} gives a rate of {measured_hz:.6g} Hz",
+            "check that this is the time",
+            channel=name,
+            rate_hz=measured_hz,
+        )
+    if rate_hz is not None and abs(measured_hz / rate_hz - 1.0) > RATE_TOLERANCE:
+        raise RecordingError(
+            "rate-conflict",
+            f"time column {name!r} gives {measured_hz:.8g} Hz, but rate_hz is {rate_hz:.8g} Hz",
+            'correct rate_hz, or ignore the column (time = "none")',
+            argument="rate_hz",
+            channel=name,
+            rate_hz=measured_hz,
+            given_hz=rate_hz,
+        )
+
+
 def stated_unit(column: Column, given: str) -> str:
     """Unit of a time column as the user, the file or its name says it; empty where none does."""
     unit = given or time_unit(column.name, column.unit)
     if unit and unit.casefold() not in SECONDS:
-        raise InputError(f"time column {column.name!r} is in {unit!r}, which is no unit of time; use s, ms, us or ns")
+        raise RecordingError(
+            "time-unit",
+            f"time column {column.name!r} is in {unit!r}, which is not a unit of time",
+            "use s, ms, us or ns",
+            channel=column.name,
+            unit=unit,
+        )
     return unit
 
 
@@ -187,32 +225,51 @@ def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> t
     if told is None:
         if mean < 1.0:
             return "s", 1.0, ""
-        raise InputError(
-            f"time column {column.name!r} has no unit and steps of {mean:.6g}, in seconds {1 / mean:.4g} Hz; "
-            f"give the rate, or its unit (time '{column.name} [us]')"
+        raise RecordingError(
+            "time-unit",
+            f"time column {column.name!r} has no unit and steps of {mean:.6g}, in seconds {1 / mean:.4g} Hz",
+            f"give rate_hz, or its unit (time = '{column.name} [us]')",
+            channel=column.name,
+            step=mean,
         )
     rate_hz, where = told
     for unit in ("s", "ms", "us", "ns"):
         if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= RATE_TOLERANCE:
             return unit, SECONDS[unit], "" if unit == "s" else f" (unit told by {where})"
-    raise InputError(
+    raise RecordingError(
+        "rate-conflict",
         f"time column {column.name!r} has no unit and steps of {mean:.8g}, in seconds {1 / mean:.8g} Hz, "
-        f"but {where} is {rate_hz:.8g} Hz; correct the rate, or ignore the column (time none)"
+        f"but {where} is {rate_hz:.8g} Hz",
+        'correct rate_hz, or ignore the column (time = "none")',
+        argument="rate_hz",
+        channel=column.name,
+        rate_hz=1 / mean,
+        given_hz=rate_hz,
     )
 
 
 def refuse_jitter(name: str, steps: Steps) -> None:
     gaps = len(steps.gap_rows)
     if gaps > 3 and gaps > GAPS_SHARE_MAX * steps.regular:
-        raise InputError(
-            f"time column {name!r} has {gaps} gaps in {steps.rows} samples; resample the recording, or, where time has "
-            "too few digits, give the rate and ignore the column (time none)"
+        raise RecordingError(
+            "time-irregular",
+            f"time column {name!r} has {gaps} gaps in {steps.rows} samples",
+            "resample the recording, or, where time has too few digits, give rate_hz and ignore the column "
+            '(time = "none")',
+            channel=name,
+            gaps=gaps,
+            samples=steps.rows,
         )
     if steps.std > JITTER_MAX * steps.mean and not steps.printed:
-        raise InputError(
+        raise RecordingError(
+            "time-jitter",
             f"time column {name!r} jitters by {steps.std / steps.mean:.1%} of its period (standard deviation; at most "
-            f"{JITTER_MAX:.0%}), which biases every spectrum; resample the recording, or, where the samples are "
-            "regular and only their stamps are late, give the rate and ignore the column (time none)"
+            f"{JITTER_MAX:.0%}), which biases every spectrum",
+            "resample the recording, or, where the samples are regular and only their stamps are late, give rate_hz "
+            'and ignore the column (time = "none")',
+            channel=name,
+            jitter=steps.std / steps.mean,
+            maximum=JITTER_MAX,
         )
 
 

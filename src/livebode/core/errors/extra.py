@@ -12,4 +12,6 @@ class ExtraError(LivebodeError):
     """An optional package that this needs is not installed."""
 
     area: ClassVar[str] = "extra"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "not-installed": "The package that this needs is not installed.",
+    }

@@ -12,4 +12,8 @@ class UsageError(LivebodeError):
     """An argument of a call, or an option of a command, cannot be used."""
 
     area: ClassVar[str] = "usage"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "duplicate": "A name is given twice where each may be given once.",
+        "missing": "A required argument is missing or empty.",
+        "out-of-range": "The value is outside the range of the argument.",
+    }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 
 PORTS: dict[str, int | None] = {
     "udp": None, "tcp": None, "mqtt": 1883, "mqtts": 8883, "opc.tcp": 4840, "ads": 48898,
@@ -33,8 +33,8 @@ def parse_address(url: str) -> Address:
 
     Raises
     ------
-    InputError
-        For a kind that is not known, a port that is none, or a password in it; a password is never repeated.
+    ConfigError
+        For a kind that is not supported, an invalid port, or a password in it; a password is never repeated.
 
     Examples
     --------
@@ -46,21 +46,36 @@ def parse_address(url: str) -> Address:
     if url in ("stdin:", "stdin://"):
         return Address("stdin")
     if "@" in url:
-        raise InputError("a user or password has no place in source.url; give username, and password_env or _file")
+        raise ConfigError(
+            "secret-in-url",
+            "source.url has a user or password",
+            "take it out, and set source.username and source.password_env or source.password_file",
+            key="source.url",
+        )
     if not url.isprintable() or len(url) > 2000:
-        raise InputError("source.url is longer than 2000 letters or has one that is not printable")
+        raise ConfigError(
+            "value-invalid",
+            "source.url is longer than 2000 characters or has a character that is not printable",
+            "give the URL of the machine",
+            key="source.url",
+        )
     shown = url.split("?")[0].split("#")[0]  # what stands behind may be a secret
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
     except ValueError as error:
-        raise InputError(f"source.url = {shown!r} is no address: {error}") from None
+        raise url_error(shown, f"is not an address: {error}", "give kind://host:port") from None
     if parts.scheme not in PORTS:
-        raise InputError(f"source.url = {shown!r} is of no known kind; give one of {', '.join(PORTS)} or stdin:")
+        raise url_error(shown, "is of a kind that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
-        raise InputError(f"source.url = {shown!r} is no address; give {parts.scheme}://host:port")
+        raise url_error(shown, "is not a complete address", f"give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):
-        raise InputError(f"source.url = {shown!r} has a path, which {parts.scheme} does not take; leave out /{path}")
+        raise url_error(shown, f"has a path, which {parts.scheme} does not take", f"leave out /{path}")
     return Address(parts.scheme, host, port, path)
+
+
+def url_error(shown: str, wrong: str, remedy: str) -> ConfigError:
+    """The error for a URL of which only `shown` may be repeated."""
+    return ConfigError("value-invalid", f"source.url = {shown!r} {wrong}", remedy, key="source.url", value=shown)

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
 from livebode.sources.live.address import Address
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, Ring, new_rows, read_ring, ring_batch
 from livebode.sources.live.settings import SourceSettings, named_channels
-from livebode.sources.live.source import LiveSource, RefusedError
+from livebode.sources.live.source import LiveSource
 
 TIMEOUT_MS = 2000
 SYMBOL_BYTES_MAX = 16 << 20
@@ -35,17 +35,31 @@ class AdsSource(LiveSource):
         super().__init__(settings, address)
         self._pyads = import_pyads()
         if settings.symbol is None or not settings.channels or settings.net_id is None:
-            raise InputError(
-                "source needs net_id, symbol and channels for ads; docs/live.md says what the PLC must have"
+            raise ConfigError(
+                "key-missing",
+                "ads needs source.net_id, source.symbol and source.channels",
+                "set them; docs/live.md describes what the PLC must have",
+                key="source",
+                keys=["net_id", "symbol", "channels"],
             )
         if settings.mode == "notify" and settings.rate_hz is None:
-            raise InputError("source needs rate_hz for notifications: that of the PLC task")
+            raise ConfigError(
+                "key-missing",
+                "notifications need source.rate_hz",
+                "set it to the rate of the PLC task",
+                key="source",
+                keys=["rate_hz"],
+            )
         self._channels = named_channels(settings.channels)
         try:
             self._plc_address = self._pyads.AmsAddr(settings.net_id, settings.ams_port)
         except (ValueError, TypeError):
-            raise InputError(
-                f"source.net_id = {settings.net_id!r} is no AMS net id; it looks like 5.1.2.3.1.1"
+            raise ConfigError(
+                "value-invalid",
+                f"source.net_id = {settings.net_id!r} is not an AMS net id",
+                "give one such as 5.1.2.3.1.1",
+                key="source.net_id",
+                value=settings.net_id,
             ) from None
 
     def _receive(self) -> bool:
@@ -63,7 +77,13 @@ class AdsSource(LiveSource):
         except pyads.ADSError as error:
             code = getattr(error, "err_code", None)
             if code in _REFUSED:
-                raise RefusedError(f"{_REFUSED[code]} ({settings.symbol})") from None
+                raise SourceError(
+                    "refused",
+                    f"{_REFUSED[code]} ({settings.symbol})",
+                    "check source.symbol, source.ams_port and the access rights in the PLC",
+                    symbol=settings.symbol,
+                    ads_error=code,
+                ) from None
             raise ConnectionError(str(error).strip()) from None
         except RuntimeError as error:  # pyads, of an answer that is shorter than what was asked for
             raise ConnectionError(f"the PLC's answer cannot be used: {str(error).strip()}"[:200]) from None
@@ -73,7 +93,13 @@ class AdsSource(LiveSource):
         """Index group, index offset and size of the symbol."""
         info = self._pyads.pyads_ex.adsGetSymbolInfo(plc._port, plc._adr, self.settings.symbol)
         if not 0 < info.size <= SYMBOL_BYTES_MAX:
-            raise RefusedError(f"symbol {self.settings.symbol} has {info.size} bytes, not 1 to {SYMBOL_BYTES_MAX}")
+            raise SourceError(
+                "refused",
+                f"symbol {self.settings.symbol} has {info.size} bytes, not 1 to {SYMBOL_BYTES_MAX}",
+                "check source.symbol",
+                symbol=self.settings.symbol,
+                bytes=info.size,
+            )
         return info.iGroup, info.iOffs, info.size
 
     def _poll(self, plc: Any) -> None:
@@ -96,7 +122,7 @@ class AdsSource(LiveSource):
                     after, _ = read_ring(read(0, HEADER.size), size)
                     self._take_rows(raw, first, ring, after, dtype)
                 have, epoch = ring.count, ring.epoch
-            except InputError as error:
+            except LivebodeError as error:
                 self._malformed(error)
                 self._stop.wait(NO_RING_S)
             self._stop.wait(self.settings.poll_s)
@@ -110,8 +136,12 @@ class AdsSource(LiveSource):
         pyads, settings = self._pyads, self.settings
         group, offset, size = self._place(plc)
         if size not in (4 * len(self._channels), 8 * len(self._channels)):
-            raise RefusedError(
-                f"symbol {settings.symbol} has {size} bytes; declare it as ARRAY of {len(self._channels)} REAL or LREAL"
+            raise SourceError(
+                "refused",
+                f"symbol {settings.symbol} has {size} bytes",
+                f"declare it as ARRAY of {len(self._channels)} REAL or LREAL",
+                symbol=settings.symbol,
+                bytes=size,
             )
         assert settings.rate_hz is not None
         came: deque[tuple[int, bytes]] = deque(maxlen=NOTIFIED_MAX)
@@ -146,7 +176,7 @@ class AdsSource(LiveSource):
         for stamp, row in values:
             try:
                 samples.append(numbered.sample((stamp - FILETIME_1970) / 1e7, row))
-            except InputError as error:
+            except LivebodeError as error:
                 self._malformed(error)
         for batch in numbered.batches(samples):
             self._deliver(batch)
@@ -162,7 +192,13 @@ def import_pyads() -> ModuleType:
     try:
         import pyads
     except ImportError:
-        raise InputError("ads needs the ADS library; pip install livebode[ads]") from None
+        raise ExtraError(
+            "not-installed",
+            "ads needs the package pyads, which is not installed",
+            "run pip install livebode[ads]",
+            package="pyads",
+            extra="ads",
+        ) from None
     return pyads  # type: ignore[no-any-return]
 
 

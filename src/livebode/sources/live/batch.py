@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, InputError
+from livebode.core import Block, Channel, SourceError
 from livebode.sources.live.position import Mark, Origin
 
 CHANNELS_MAX = 1024
@@ -41,7 +41,7 @@ class Batch:
 
     Raises
     ------
-    InputError
+    SourceError
         If it has no samples or too many, shapes disagree, or a number or a name cannot be.
     """
 
@@ -56,9 +56,12 @@ class Batch:
 
     def __post_init__(self) -> None:
         if self.data.ndim != 2 or len(self.data) != len(self.channels) or not 0 < self.data.size <= VALUES_MAX:
-            raise InputError(
-                f"a batch of {len(self.channels)} channels has data of shape {self.data.shape}; "
-                f"it takes (channels, samples), at most {VALUES_MAX} values"
+            raise SourceError(
+                "batch-shape",
+                f"a batch of {len(self.channels)} channels has data of shape {self.data.shape}",
+                f"send (channels, samples), at most {VALUES_MAX} values",
+                shape=list(self.data.shape),
+                channels=len(self.channels),
             )
         check_numbers(self.first_sample, self.rate_hz, self.stamp_s)
         check_channels(self.channels)
@@ -85,26 +88,40 @@ class Batch:
 
 
 def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> None:
-    """InputError where a sender's number, rate or stamp cannot be."""
+    """SourceError where a sender's number, rate or stamp cannot be."""
     if not 0 <= first_sample < SAMPLE_MAX:
-        raise InputError(f"first_sample={first_sample} is not between 0 and 2^62")
+        raise wrong_value("first_sample", first_sample, "is not between 0 and 2^62")
     if not (np.isfinite(rate_hz) and 0 < rate_hz < 1e9):
-        raise InputError(f"rate_hz={rate_hz} is not a number of samples per second between 0 and 1e9")
+        raise wrong_value("rate_hz", rate_hz, "is not a number of samples per second between 0 and 1e9")
     if stamp_s is not None and not abs(stamp_s) < 1e11:
-        raise InputError(f"stamp_s={stamp_s} is not a number of seconds since 1970")
+        raise wrong_value("stamp_s", stamp_s, "is not a number of seconds since 1970")
+
+
+def wrong_value(key: str, value: float, wrong: str) -> SourceError:
+    return SourceError("value-invalid", f"{key}={value} {wrong}", "correct the sender", key=key, value=value)
 
 
 def check_channels(channels: tuple[Channel, ...], at_least: int = 1) -> None:
-    """InputError where a sender's channels have no name, a name twice, or one that no line of text can hold."""
+    """SourceError where a sender's channels have no name, a name twice, or one that no line of text can hold."""
     if not at_least <= len(channels) <= CHANNELS_MAX:
-        raise InputError(f"{len(channels)} channels are not between {at_least} and {CHANNELS_MAX}")
+        raise SourceError(
+            "channels-invalid",
+            f"the sender has {len(channels)} channels, not {at_least} to {CHANNELS_MAX}",
+            "correct the sender",
+            channels=len(channels),
+        )
     names = {channel.name for channel in channels}
     if len(names) != len(channels):
-        raise InputError("two channels share a name; each needs its own")
+        raise SourceError("channels-invalid", "two channels of the sender have the same name", "rename one of them")
     for channel in channels:
         text = channel.name + channel.unit
         if not channel.name or len(channel.name) > NAME_MAX or len(channel.unit) > NAME_MAX or not text.isprintable():
-            raise InputError(f"channel name {channel.name[:40]!r} is empty, too long or not printable")
+            raise SourceError(
+                "channels-invalid",
+                f"channel name {channel.name[:40]!r} is empty, too long or not printable",
+                f"give a name and a unit of at most {NAME_MAX} printable characters",
+                channel=channel.name[:40],
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, InputError
+from livebode.core import Channel, LivebodeError, SourceError
 from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
@@ -90,11 +90,11 @@ class FollowSource(LiveSource):
         """The table, once it has enough rows to tell what is in it."""
         try:
             if not path.exists():
-                raise InputError(f"there is no file {path} yet")
+                raise SourceError("not-found", f"there is no file {path} yet", "check the name", path=str(path))
             log = open_log(path, rate_hz=self.settings.rate_hz or self._sequencer.face.rate_hz, time=self.settings.time)
             return table_of(log, self.settings.time, path.stat().st_ino)
-        except (InputError, OSError) as error:
-            self._trouble = str(error)
+        except (LivebodeError, OSError) as error:
+            self._trouble = error
             return None
 
     def _follow_file(self, path: Path, table: Table) -> None:
@@ -140,7 +140,7 @@ class FollowSource(LiveSource):
         wanted = [*table.columns, *([table.time] if table.time else [])]
         try:
             values = table.recording.parsed(lines, wanted)
-        except InputError as error:
+        except LivebodeError as error:
             middle = lines.rfind(b"\n", 0, max(len(lines) // 2, 1)) + 1 or lines.find(b"\n") + 1
             if middle >= len(lines):
                 self._malformed(error)
@@ -208,8 +208,8 @@ class FollowSource(LiveSource):
                 last = counted + block.stop
             if held is not None:
                 self._pass_on(replace(held, mark=replace(mark, stop=last, last=held.stop).as_plain()))
-        except (InputError, OSError) as error:
-            self._trouble = str(error)
+        except (LivebodeError, OSError) as error:
+            self._trouble = error
             return None
         return last
 
@@ -221,10 +221,16 @@ class FollowSource(LiveSource):
 
 
 def table_of(log: Log, time: str | None, inode: int) -> Table:
-    """How to go on reading the table that a log is of; InputError where it is none."""
+    """How to continue reading the table that a log is of; SourceError where it is not a table."""
     recording: Recording = log._recording
     if not isinstance(recording, DelimitedRecording):
-        raise InputError(f"{log.path} is {log.format}, which cannot grow; follow a directory of whole files instead")
+        raise SourceError(
+            "cannot-grow",
+            f"{log.path} is {log.format}, which cannot grow",
+            "follow a directory of whole files instead",
+            path=str(log.path),
+            format=log.format,
+        )
     column, _ = find_time(recording.columns, time)
     scale_s = 1.0
     if column is not None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from livebode.core import Channel, InputError, SpectraLayout
+from livebode.core import Channel, SourceError, SpectraLayout
 from livebode.sources.live.batch import Batch, check_channels
 from livebode.sources.live.framing import (
     CRC,
@@ -20,7 +20,9 @@ from livebode.sources.live.framing import (
     SPECTRA,
     SPECTRA_LAYOUT,
     Header,
+    damaged_frame,
     framed,
+    inconsistent_frame,
     read_header,
 )
 from livebode.sources.live.spectra_batch import AnyBatch
@@ -56,7 +58,13 @@ def encode_samples(batch: Batch, *, sequence: int = 0, double: bool = False) -> 
     """
     channels, samples = batch.data.shape
     if samples > SAMPLES_MAX:
-        raise InputError(f"{samples} samples do not fit into one frame; send at most {SAMPLES_MAX}")
+        raise SourceError(
+            "frame-too-long",
+            f"{samples} samples do not fit into one frame",
+            f"send at most {SAMPLES_MAX} at once",
+            samples=samples,
+            maximum=SAMPLES_MAX,
+        )
     payload = np.ascontiguousarray(batch.data.T, dtype="<f8" if double else "<f4").tobytes()
     stamp_ns = 0 if batch.stamp_s is None else round(batch.stamp_s * 1e9)
     layout = zlib.crc32(layout_text(batch.channels))
@@ -80,17 +88,23 @@ class FrameDecoder:
 
         Raises
         ------
-        InputError
+        SourceError
             Where the frame is damaged, of another version or kind, or contradicts itself.
         """
         header = read_header(frame)
         if header.length != len(frame):
-            raise InputError(f"a frame declares {header.length} bytes and has {len(frame)}")
+            raise damaged_frame(f"a frame declares {header.length} bytes and has {len(frame)}", bytes=len(frame))
         if zlib.crc32(frame[: -CRC.size]) != CRC.unpack_from(frame, len(frame) - CRC.size)[0]:
-            raise InputError("a frame's CRC is wrong")
+            raise damaged_frame("a frame's CRC is wrong")
         payload = frame[HEADER.size : -CRC.size]
         if header.kind not in (SAMPLES, LAYOUT, SPECTRA, SPECTRA_LAYOUT) or header.flags & ~FLOAT64:
-            raise InputError(f"a frame of kind {header.kind} with flags {header.flags} is not known")
+            raise SourceError(
+                "frame-unsupported",
+                f"a frame of kind {header.kind} with flags {header.flags} is not supported",
+                "update livebode, or correct the sender",
+                frame_kind=header.kind,
+                flags=header.flags,
+            )
         if header.kind in (LAYOUT, SPECTRA_LAYOUT):
             self._remember(header, bytes(payload))
             return None
@@ -102,7 +116,7 @@ class FrameDecoder:
 
     def _remember(self, header: Header, text: bytes) -> None:
         if len(text) > LAYOUT_BYTES_MAX or zlib.crc32(text) != header.layout:
-            raise InputError(f"a layout of {len(text)} bytes is too long or not the one that its header names")
+            raise inconsistent_frame(f"a layout of {len(text)} bytes is too long or not the one that its header names")
         layout: tuple[Channel, ...] | SpectraLayout
         if header.kind == LAYOUT:
             layout = _read_layout_text(text)
@@ -111,7 +125,9 @@ class FrameDecoder:
             layout = read_spectra_text(text)
             count = len(layout.signals) + len(layout.values)
         if count != header.channels:
-            raise InputError(f"a layout names {count} channels, its header {header.channels}")
+            raise inconsistent_frame(
+                f"a layout names {count} channels, its header {header.channels}", channels=[count, header.channels]
+            )
         key = (header.kind, header.layout)
         self._layouts.pop(key, None)
         self._layouts[key] = layout
@@ -123,7 +139,7 @@ def _read_layout_text(text: bytes) -> tuple[Channel, ...]:
     try:
         lines = text.decode("utf-8").removesuffix("\n").split("\n")
     except UnicodeDecodeError:
-        raise InputError("a layout is not UTF-8") from None
+        raise SourceError("layout-invalid", "a layout is not UTF-8", "correct the sender") from None
     channels = tuple(Channel(*line.partition("\t")[::2]) for line in lines)
     check_channels(channels)
     return channels
@@ -132,11 +148,17 @@ def _read_layout_text(text: bytes) -> tuple[Channel, ...]:
 def _samples(header: Header, payload: bytes | memoryview, channels: tuple[Channel, ...], arrived_s: float) -> Batch:
     dtype = np.dtype("<f8" if header.flags & FLOAT64 else "<f4")
     if len(payload) != header.channels * header.samples * dtype.itemsize:
-        raise InputError(
-            f"a frame of {header.channels} channels and {header.samples} samples has {len(payload)} bytes of them"
+        raise inconsistent_frame(
+            f"a frame of {header.channels} channels and {header.samples} samples has {len(payload)} bytes of them",
+            channels=header.channels,
+            samples=header.samples,
+            bytes=len(payload),
         )
     if len(channels) != header.channels:
-        raise InputError(f"a frame has {header.channels} channels, its layout {len(channels)}")
+        raise inconsistent_frame(
+            f"a frame has {header.channels} channels, its layout {len(channels)}",
+            channels=[header.channels, len(channels)],
+        )
     with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
         data = np.frombuffer(payload, dtype).reshape(header.samples, header.channels).T.astype("f8", order="C")
     return Batch(

@@ -10,7 +10,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from livebode.core import InputError
+from livebode.core import SourceError
 
 MAGIC = b"LBOD"
 VERSION = 1
@@ -49,10 +49,16 @@ def framed(
     kind: int, flags: int, sequence: int, epoch: int, sample: int, stamp_ns: int, rate_hz: float, layout: int,
     channels: int, samples: int, payload: bytes,
 ) -> bytes:  # fmt: skip
-    """A whole frame; InputError where it would be too long."""
+    """A whole frame; SourceError where it would be too long."""
     length = FRAME_BYTES_MIN + len(payload)
     if length > FRAME_BYTES_MAX:
-        raise InputError(f"a frame of {length} bytes is longer than {FRAME_BYTES_MAX}; send fewer samples at once")
+        raise SourceError(
+            "frame-too-long",
+            f"a frame of {length} bytes is longer than {FRAME_BYTES_MAX}",
+            "send fewer samples at once",
+            bytes=length,
+            maximum=FRAME_BYTES_MAX,
+        )
     head = HEADER.pack(
         MAGIC, VERSION, kind, flags, length, sequence, epoch, sample, stamp_ns, rate_hz, layout, channels, samples
     )
@@ -60,17 +66,34 @@ def framed(
 
 
 def read_header(frame: bytes | memoryview) -> Header:
-    """The header of what may be a frame; InputError where it cannot begin one."""
+    """The header of what may be a frame; SourceError where it cannot begin one."""
     if len(frame) < FRAME_BYTES_MIN:
-        raise InputError(f"a frame of {len(frame)} bytes is shorter than a header")
+        raise damaged_frame(f"a frame of {len(frame)} bytes is shorter than a header", bytes=len(frame))
     header = Header(*HEADER.unpack_from(frame))
     if header.magic != MAGIC:
-        raise InputError(f"a frame begins with {bytes(frame[:4])!r} instead of {MAGIC!r}")
+        raise damaged_frame(
+            f"a frame begins with {bytes(frame[:4])!r} instead of {MAGIC!r}", beginning=bytes(frame[:4]).hex()
+        )
     if header.version != VERSION:
-        raise InputError(f"a frame of version {header.version}; this livebode reads version {VERSION}")
+        raise SourceError(
+            "frame-unsupported",
+            f"a frame has version {header.version}; this livebode reads version {VERSION}",
+            "update livebode, or correct the sender",
+            version=header.version,
+        )
     if not FRAME_BYTES_MIN <= header.length <= FRAME_BYTES_MAX:
-        raise InputError(f"a frame declares {header.length} bytes, not {FRAME_BYTES_MIN} to {FRAME_BYTES_MAX}")
+        raise damaged_frame(
+            f"a frame declares {header.length} bytes, not {FRAME_BYTES_MIN} to {FRAME_BYTES_MAX}", bytes=header.length
+        )
     return header
+
+
+def damaged_frame(message: str, **facts: object) -> SourceError:
+    return SourceError("frame-damaged", message, "check the sender and the connection", **facts)
+
+
+def inconsistent_frame(message: str, **facts: object) -> SourceError:
+    return SourceError("frame-inconsistent", message, "correct the sender", **facts)
 
 
 class FrameSplitter:
@@ -90,7 +113,7 @@ class FrameSplitter:
         while len(self._bytes) >= FRAME_BYTES_MIN:
             try:
                 header = read_header(bytes(self._bytes[:FRAME_BYTES_MIN]))
-            except InputError:
+            except SourceError:
                 self._skip()
                 continue
             if len(self._bytes) < header.length:

@@ -7,7 +7,7 @@ import select
 import sys
 from typing import ClassVar
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
 from livebode.sources.live.source import TICK_S, LiveSource
 
@@ -40,7 +40,7 @@ class StdinSource(LiveSource):
     def _decode(self, decoder: LineDecoder, line: bytes) -> None:
         try:
             batch = decoder.decode(line)
-        except InputError as error:
+        except LivebodeError as error:
             self._malformed(error)
             return
         self._deliver(batch)

@@ -6,14 +6,14 @@ import socket
 import ssl
 from typing import Any, ClassVar
 
-from livebode.core import InputError
+from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
 from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.framing import FRAME_BYTES_MAX
 from livebode.sources.live.ndjson import LineDecoder
 from livebode.sources.live.secret import existing, password
 from livebode.sources.live.settings import SourceSettings
-from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
+from livebode.sources.live.source import TICK_S, LiveSource
 
 KEEPALIVE_S = 15
 SESSION_S = 3600
@@ -35,18 +35,28 @@ class MqttSource(LiveSource):
         try:
             from paho.mqtt import client as mqtt
         except ImportError:
-            raise InputError("mqtt needs its library; pip install livebode[mqtt]") from None
+            raise ExtraError(
+                "not-installed",
+                "mqtt needs the package paho-mqtt, which is not installed",
+                "run pip install livebode[mqtt]",
+                package="paho-mqtt",
+                extra="mqtt",
+            ) from None
         self._mqtt = mqtt
         topic = address.path
         if not topic or "+" in topic or "#" in topic or len(topic.encode()) > _TOPIC_BYTES_MAX:
-            raise InputError(
-                f"the topic {topic[:40]!r} is empty, too long or has a wildcard; give mqtt://broker/one/topic"
+            raise ConfigError(
+                "value-invalid",
+                f"the topic {topic[:40]!r} in source.url is empty, too long or has a wildcard",
+                "give mqtt://broker/one/topic",
+                key="source.url",
+                value=topic[:40],
             )
         self._password = password(settings)
         self._tls = tls_context(settings) if address.scheme == "mqtts" else None
         self._frames, self._lines = FrameDecoder(), LineDecoder(settings.rate_hz)
         self._unanswered = 0
-        self._refusal: RefusedError | None = None
+        self._refusal: SourceError | None = None
         self._answered = False
 
     def _receive(self) -> bool:
@@ -99,29 +109,40 @@ class MqttSource(LiveSource):
             )
         except ssl.SSLError as error:
             close_left(error)
-            raise RefusedError(
-                f"no TLS with the broker: {getattr(error, 'verify_message', '') or error.reason}"
+            raise SourceError(
+                "refused",
+                f"no TLS with the broker: {getattr(error, 'verify_message', '') or error.reason}",
+                "check source.ca_file and the broker's certificate",
             ) from None
 
     def _gone(self, code: int) -> None:
         if not self._answered:
             self._unanswered += 1
             if self._tls is not None and self._unanswered >= _UNANSWERED_MAX:
-                raise RefusedError(
-                    "the broker ends the connection before it answers; does it want a certificate of ours?"
+                raise SourceError(
+                    "refused",
+                    "the broker ends the connection before it answers",
+                    "if it requires a certificate, check source.certificate_file and source.key_file",
                 )
         raise ConnectionError(self._mqtt.error_string(code).rstrip("."))
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         self._answered, self._unanswered = True, 0
         if reason.value in _REFUSALS:
-            self._refusal = RefusedError(f"the broker refused: {reason}")
+            self._refusal = SourceError(
+                "refused", f"the broker refused: {reason}", "check source.username and its password"
+            )
         elif not reason.is_failure:
             client.subscribe(self.address.path, qos=1)
 
     def _on_subscribe(self, _client: Any, _data: Any, _number: int, reasons: list[Any], _properties: Any) -> None:
         if any(reason.is_failure for reason in reasons):
-            self._refusal = RefusedError(f"the broker does not let us read {self.address.path}: {reasons[0]}")
+            self._refusal = SourceError(
+                "refused",
+                f"the broker does not let us read {self.address.path}: {reasons[0]}",
+                "check the topic and the broker's access rights",
+                topic=self.address.path,
+            )
         else:
             self._stands()
 
@@ -129,7 +150,7 @@ class MqttSource(LiveSource):
         payload = message.payload
         try:
             batch = self._lines.decode(payload) if payload[:1] == b"{" else self._frames.decode(payload)
-        except InputError as error:
+        except LivebodeError as error:
             self._malformed(error)
             return
         if batch is not None:
@@ -145,7 +166,12 @@ def tls_context(settings: SourceSettings) -> ssl.SSLContext:
             key = None if settings.key_file is None else existing(settings.key_file, "key_file")
             context.load_cert_chain(existing(settings.certificate_file, "certificate_file"), key)
     except ssl.SSLError as error:
-        raise InputError(f"a certificate or key of source cannot be used: {error.reason or error}") from None
+        raise ConfigError(
+            "file-unusable",
+            f"a certificate or key of [source] cannot be used: {error.reason or error}",
+            "check source.ca_file, source.certificate_file and source.key_file",
+            key="source",
+        ) from None
     return context
 
 

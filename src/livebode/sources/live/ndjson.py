@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, InputError
+from livebode.core import Channel, SourceError
 from livebode.sources.live.batch import CHANNELS_MAX, VALUES_MAX, Batch
 from livebode.sources.live.settings import named_channels
 
@@ -55,18 +55,24 @@ class LineDecoder:
 
         Raises
         ------
-        InputError
-            Where the line is too long, no JSON object, or has a key or value that cannot be.
+        SourceError
+            Where the line is too long, not a JSON object, or has an unknown key or an invalid value.
         """
         if len(line) > LINE_BYTES_MAX:
-            raise InputError(f"a line is longer than {LINE_BYTES_MAX} bytes")
+            raise SourceError(
+                "line-too-long",
+                f"a line is longer than {LINE_BYTES_MAX} bytes",
+                "send fewer samples in a line",
+                limit_bytes=LINE_BYTES_MAX,
+            )
         said = _object(line)
         channels = _channels(said["channels"]) if "channels" in said else self._channels
         rate_hz = _number(said, "rate_hz") if "rate_hz" in said else self._rate_hz
         epoch = _whole(said, "epoch") if "epoch" in said else self._epoch
         stamp_s = _number(said, "stamp_s") if said.get("stamp_s") is not None else None
         if not channels or rate_hz is None:
-            raise InputError("the first line names no channels or no rate_hz; add them")
+            key = "rate_hz" if channels else "channels"
+            raise SourceError("key-missing", f"the first line has no {key!r}", "add it", key=key)
         batch = Batch(_whole(said, "sample"), _data(said), channels, rate_hz, epoch, stamp_s, arrived_s)
         self._channels, self._rate_hz, self._epoch = channels, rate_hz, epoch
         return batch
@@ -76,48 +82,60 @@ def _object(line: bytes) -> dict[str, Any]:
     try:
         said = json.loads(line)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"a line is not JSON: {type(error).__name__}") from None
+        raise SourceError(
+            "line-not-json", f"a line is not JSON: {type(error).__name__}", "send one JSON object in each line"
+        ) from None
     if not isinstance(said, dict):
-        raise InputError("a line is JSON but no object")
+        raise SourceError("line-not-json", "a line is JSON but not an object", "send one JSON object in each line")
     if unknown := sorted(said.keys() - KEYS):
-        raise InputError(f"a line has the key {unknown[0][:40]!r}; known are {', '.join(sorted(KEYS))}")
+        raise SourceError(
+            "key-unknown",
+            f"a line has the unknown key {unknown[0][:40]!r}",
+            f"use {', '.join(sorted(KEYS))}",
+            key=unknown[0][:40],
+            allowed=sorted(KEYS),
+        )
     if missing := {"sample", "data"} - said.keys():
-        raise InputError(f"a line has no {min(missing)!r}")
+        raise SourceError("key-missing", f"a line has no {min(missing)!r}", "add it", key=min(missing))
     return said
+
+
+def _invalid(key: str, wrong: str) -> SourceError:
+    return SourceError("value-invalid", f"{key} {wrong}", "correct the sender", key=key)
 
 
 def _channels(names: object) -> tuple[Channel, ...]:
     if not isinstance(names, list) or len(names) > CHANNELS_MAX or not all(isinstance(n, str) for n in names):
-        raise InputError("channels is not a list of names")
+        raise _invalid("channels", "is not a list of names")
     return named_channels(names)
 
 
 def _number(said: dict[str, Any], key: str) -> float:
     value = said[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{key} is not a number")
+        raise _invalid(key, "is not a number")
     try:
         return float(value)
     except OverflowError:
-        raise InputError(f"{key} is larger than any float") from None
+        raise _invalid(key, "is larger than any float") from None
 
 
 def _whole(said: dict[str, Any], key: str) -> int:
     value = said[key]
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 64:
-        raise InputError(f"{key} is not a whole number from 0 to 2^64")
+        raise _invalid(key, "is not a whole number from 0 to 2^64")
     return value
 
 
 def _data(said: dict[str, Any]) -> NDArray[np.float64]:
     rows = said["data"]
     if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
-        raise InputError("data is not a list of one list for each channel")
+        raise _invalid("data", "is not a list of one list for each channel")
     if sum(map(len, rows)) > VALUES_MAX or len({len(row) for row in rows}) != 1:
-        raise InputError(f"the lists in data are not equally long, or have more than {VALUES_MAX} values")
+        raise _invalid("data", f"has lists that are not equally long, or more than {VALUES_MAX} values")
     if not all(type(value) in (int, float, type(None)) for row in rows for value in row):
-        raise InputError("data has something else than numbers and null")
+        raise _invalid("data", "has something other than numbers and null")
     try:
         return np.array(rows, dtype=np.float64)
     except (OverflowError, ValueError, TypeError):
-        raise InputError("data has a number that is larger than any float") from None
+        raise _invalid("data", "has a number that is larger than any float") from None

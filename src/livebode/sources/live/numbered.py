@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, InputError
+from livebode.core import Channel, SourceError
 from livebode.sources.live.batch import Batch
 
 Sample = tuple[int, float, NDArray[np.float64]]
@@ -31,7 +31,13 @@ class Numbered:
     def number(self, stamp_s: float, samples: int) -> int:
         """Number of the first of `samples` samples, that was taken at `stamp_s`, seconds since 1970."""
         if not 0 <= stamp_s < 1e11:
-            raise InputError(f"a timestamp of {stamp_s:g} s since 1970 cannot be")
+            raise SourceError(
+                "value-invalid",
+                f"the timestamp {stamp_s:g} s since 1970 is out of range",
+                "set the sender's clock",
+                key="stamp_s",
+                value=stamp_s,
+            )
         number = round(stamp_s * self._rate_hz)
         if self._next is not None and abs(number - self._next) <= NEAR * samples:
             number = self._next
@@ -39,7 +45,7 @@ class Numbered:
         return number
 
     def sample(self, stamp_s: float, row: bytes) -> Sample:
-        """One sample: a row of REAL or LREAL that was taken at `stamp_s`. InputError where it is none."""
+        """One sample: a row of REAL or LREAL that was taken at `stamp_s`. SourceError where it is not one."""
         taken = values(row, len(self._channels))
         return self.number(stamp_s, 1), stamp_s, taken
 
@@ -63,6 +69,12 @@ def values(row: bytes, width: int) -> NDArray[np.float64]:
     """Numbers in a row of REAL or LREAL, told by its length."""
     dtype = {4 * width: "<f4", 8 * width: "<f8"}.get(len(row))
     if dtype is None:
-        raise InputError(f"a sample of {len(row)} bytes is no row of {width} REAL or LREAL")
+        raise SourceError(
+            "batch-shape",
+            f"a sample of {len(row)} bytes is not a row of {width} REAL or LREAL",
+            f"declare the symbol as ARRAY of {width} REAL or LREAL",
+            bytes=len(row),
+            channels=width,
+        )
     with np.errstate(invalid="ignore"):
         return np.frombuffer(row, dtype).astype(np.float64)

@@ -12,13 +12,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import ConfigError, ExtraError, LivebodeError, SourceError
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import VALUES_MAX, Batch
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.secret import existing, password
 from livebode.sources.live.settings import SourceSettings, named_channels
-from livebode.sources.live.source import TICK_S, LiveSource, RefusedError
+from livebode.sources.live.source import TICK_S, LiveSource
 
 REQUEST_S = 5.0
 PUBLISH_MS = 50
@@ -46,9 +46,15 @@ class Gathered:
         self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
 
     def take(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
-        """A new value of node `key`; the batch that it completes. InputError for what no batch can be made of."""
+        """A new value of node `key`; the batch that it completes. SourceError where no batch can be made from it."""
         if stamp is None:
-            raise InputError(f"node {key} has no source timestamp; the server must give one for each array")
+            raise SourceError(
+                "key-missing",
+                f"node {key} has no source timestamp",
+                "let the server give one for each array",
+                key="SourceTimestamp",
+                node=key,
+            )
         found = whole(value) if key == self._sample_node else numbers(value)
         moment = self._moments.setdefault(stamp, {})
         moment[key] = found
@@ -59,7 +65,13 @@ class Gathered:
         del self._moments[stamp]
         rows = [moment[key] for key in self._keys]
         if len({len(row) for row in rows}) != 1 or not len(rows[0]):
-            raise InputError(f"the arrays of one moment have the lengths {[len(row) for row in rows][:8]}")
+            lengths = [len(row) for row in rows][:8]
+            raise SourceError(
+                "batch-shape",
+                f"the arrays of one moment have the lengths {lengths}",
+                "let the server give arrays of one length",
+                lengths=lengths,
+            )
         stamp_s = stamp.replace(tzinfo=stamp.tzinfo or UTC).timestamp()
         first = moment[self._sample_node] if self._sample_node else self._numbered.number(stamp_s, len(rows[0]))
         return Batch(first, np.stack(rows), self._channels, self._rate_hz, 0, stamp_s)
@@ -73,17 +85,21 @@ def numbers(value: Any) -> NDArray[np.float64]:
     """
     values = value if isinstance(value, list) else [value]
     if len(values) > VALUES_MAX or not all(isinstance(x, bool | int | float) for x in values):
-        raise InputError("a node's value is no array of numbers, or too long")
+        raise wrong_node("a node's value is not an array of numbers, or too long")
     try:
         return np.array(values, dtype=np.float64)
     except OverflowError:
-        raise InputError("a node's value has a number that is larger than any float") from None
+        raise wrong_node("a node's value has a number that is larger than any float") from None
 
 
 def whole(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise InputError("the value of sample_node is no whole number")
+        raise wrong_node("the value of sample_node is not a whole number")
     return value
+
+
+def wrong_node(message: str) -> SourceError:
+    return SourceError("value-invalid", message, "correct the server's program", key="source.nodes")
 
 
 class OpcUaSource(LiveSource):
@@ -96,11 +112,23 @@ class OpcUaSource(LiveSource):
         try:
             import asyncua
         except ImportError:
-            raise InputError("opc.tcp needs the OPC UA library; pip install livebode[opcua]") from None
+            raise ExtraError(
+                "not-installed",
+                "opc.tcp needs the package asyncua, which is not installed",
+                "run pip install livebode[opcua]",
+                package="asyncua",
+                extra="opcua",
+            ) from None
         self._asyncua: Any = asyncua
         logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # else it says on its own what we say in Events
         if not settings.nodes or settings.rate_hz is None:
-            raise InputError("source needs nodes and rate_hz for opc.tcp; docs/live.md says what the server must have")
+            raise ConfigError(
+                "key-missing",
+                "opc.tcp needs source.nodes and source.rate_hz",
+                "set them; docs/live.md describes what the server must have",
+                key="source",
+                keys=["nodes", "rate_hz"],
+            )
         for node in [*settings.nodes.values(), *([settings.sample_node] if settings.sample_node else [])]:
             self._checked_node(node)
         self._password = password(settings)
@@ -110,8 +138,12 @@ class OpcUaSource(LiveSource):
         try:
             self._asyncua.ua.NodeId.from_string(node)
         except Exception:
-            raise InputError(
-                f"source.nodes has {node[:80]!r}, which is no node id; it looks like ns=2;s=axis.w"
+            raise ConfigError(
+                "value-invalid",
+                f"source.nodes has {node[:80]!r}, which is not a node id",
+                "give one such as ns=2;s=axis.w",
+                key="source.nodes",
+                value=node[:80],
             ) from None
 
     def _security_files(self) -> tuple[str, str, str] | None:
@@ -119,10 +151,22 @@ class OpcUaSource(LiveSource):
         given = {name: getattr(s, name) for name in ("certificate_file", "key_file", "server_certificate_file")}
         if s.security is None:
             if named := [name for name, file in given.items() if file is not None]:
-                raise InputError(f"source.{named[0]} needs source.security, such as 'Basic256Sha256'")
+                raise ConfigError(
+                    "key-missing",
+                    f"source.{named[0]} needs source.security",
+                    "set it, such as 'Basic256Sha256'",
+                    key="source",
+                    keys=["security"],
+                )
             return None
         if missing := [name for name, file in given.items() if file is None]:
-            raise InputError(f"source.security needs {missing[0]} too; without it nobody is who they say")
+            raise ConfigError(
+                "key-missing",
+                f"source.security needs source.{missing[0]}",
+                "set it; the identity is proved with it",
+                key="source",
+                keys=missing,
+            )
         certificate, key, server = (existing(file, name) for name, file in given.items())
         return certificate, key, server
 
@@ -133,7 +177,12 @@ class OpcUaSource(LiveSource):
         except ua.UaError as error:
             name = type(error).__name__
             if name.startswith(_REFUSALS):
-                raise RefusedError(f"the server refused ({name})") from None
+                raise SourceError(
+                    "refused",
+                    f"the server refused ({name})",
+                    "check user, password, certificates and the server's security policies",
+                    status=name,
+                ) from None
             raise ConnectionError(f"{name}: {error}"[:200]) from None
         return False
 
@@ -155,7 +204,13 @@ class OpcUaSource(LiveSource):
             items = await subscription.subscribe_data_change(list(by_node), queuesize=QUEUE, sampling_interval=0)
             for text, item in zip(by_node.values(), items):
                 if isinstance(item, self._asyncua.ua.StatusCode):
-                    raise RefusedError(f"the server does not give node {text} ({item.name})")
+                    raise SourceError(
+                        "refused",
+                        f"the server does not give node {text} ({item.name})",
+                        "check source.nodes",
+                        node=text,
+                        status=item.name,
+                    )
             self._stands()
             while not self._stop.is_set():
                 await asyncio.sleep(TICK_S)
@@ -170,11 +225,23 @@ class OpcUaSource(LiveSource):
             # Asked without security: only what comes next proves that the server has the key as well.
             plain = self._asyncua.Client(str(self.address), timeout=REQUEST_S)
             shown = {endpoint.ServerCertificate for endpoint in await plain.connect_and_get_server_endpoints()}
-            if uacrypto.der_from_x509(expected) not in shown:  # type: ignore[no-untyped-call]
-                raise RefusedError("the server shows another certificate than source.server_certificate_file")
-            await client.set_security(policy, certificate, key, server_certificate=server)
+            expected_is_shown = uacrypto.der_from_x509(expected) in shown  # type: ignore[no-untyped-call]
+            if expected_is_shown:
+                await client.set_security(policy, certificate, key, server_certificate=server)
         except (ValueError, TypeError) as error:
-            raise InputError(f"a certificate or key of source cannot be read: {str(error)[:100]}") from None
+            raise ConfigError(
+                "file-unusable",
+                f"a certificate or key of [source] cannot be read: {str(error)[:100]}",
+                "check source.certificate_file, source.key_file and source.server_certificate_file",
+                key="source",
+            ) from None
+        if not expected_is_shown:
+            raise SourceError(
+                "refused",
+                "the server shows another certificate than source.server_certificate_file",
+                "replace that file if the server has a new certificate",
+                key="source.server_certificate_file",
+            )
 
 
 class Handler:
@@ -189,7 +256,7 @@ class Handler:
             batch = self._gathered.take(self._by_node[node], value, data.monitored_item.Value.SourceTimestamp)
             if batch is not None:
                 self._source._deliver(batch)
-        except InputError as error:
+        except LivebodeError as error:
             self._source._malformed(error)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.sources.live.address import Address, parse_address
 from livebode.sources.live.follow import FollowSource
 from livebode.sources.live.settings import SourceSettings, check_keys
@@ -27,19 +27,28 @@ def open_source(settings: SourceSettings) -> LiveSource:
 
     Raises
     ------
-    InputError
-        Where the settings do not fit the kind of source, its library is missing, the peer refuses us, or no samples
-        come within `timeout_s`.
+    ConfigError
+        Where the settings do not fit the kind of source.
+    ExtraError
+        Where the package that it needs is not installed.
+    SourceError
+        Where the peer refuses us, or no samples come within `timeout_s`.
     """
     return make_source(settings).open()
 
 
 def make_source(settings: SourceSettings) -> LiveSource:
-    """The same, still to be opened; InputError where the settings do not fit or a library is missing."""
+    """The same, still to be opened; errors as `open_source` where settings do not fit or a package is missing."""
     if settings.url is None:
         check_keys(settings, "log")
         if settings.log is None or not settings.follow:
-            raise InputError("source names no machine; give url, such as udp://0.0.0.0:5000, or log with follow = true")
+            raise ConfigError(
+                "key-missing",
+                "[source] names no live source",
+                "set source.url, such as udp://0.0.0.0:5000, or source.log with source.follow = true",
+                key="source",
+                keys=["url"],
+            )
         return FollowSource(settings, Address("follow", path=str(settings.log)))
     address = checked_address(settings.url, settings)
     kind: type[LiveSource] = import_module(f"livebode.sources.live.{MODULES[address.scheme]}").SOURCE
@@ -47,7 +56,7 @@ def make_source(settings: SourceSettings) -> LiveSource:
 
 
 def checked_address(url: str, settings: SourceSettings) -> Address:
-    """The address in the url of these settings; InputError where it is none, or a key means nothing for its kind."""
+    """The address in the url of these settings; ConfigError where it or a key beside it is invalid."""
     address = parse_address(url)
     check_keys(settings, address.scheme)
     return address

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from livebode.core import Channel, InputError
+from livebode.core import Channel, SourceError
 from livebode.sources.live.batch import CHANNELS_MAX, SAMPLE_MAX, VALUES_MAX, Batch
 
 MAGIC = 0x474E524C  # "LRNG"
@@ -44,26 +44,42 @@ def read_ring(raw: bytes, symbol_bytes: int) -> tuple[Ring, np.dtype[np.floating
 
     Raises
     ------
-    InputError
-        Where it is no ring, or its numbers contradict its size.
+    SourceError
+        Where it is not a ring, or its numbers contradict its size.
     """
     if len(raw) < HEADER.size:
-        raise InputError(f"a ring of {len(raw)} bytes is shorter than its header")
+        raise wrong_ring(f"a ring of {len(raw)} bytes is shorter than its header", bytes=len(raw))
     ring = Ring(*HEADER.unpack_from(raw))
     if ring.magic != MAGIC or ring.version != VERSION:
-        raise InputError(f"the symbol is no ring of version {VERSION}: it begins with {raw[:6].hex(' ')}")
+        raise wrong_ring(
+            f"the symbol is not a ring of version {VERSION}: it begins with {raw[:6].hex(' ')}", beginning=raw[:6].hex()
+        )
     values = ring.channels * ring.length
     if not (0 < ring.channels <= CHANNELS_MAX and ring.length > 1 and values <= VALUES_MAX):
-        raise InputError(f"a ring of {ring.length} samples of {ring.channels} channels is empty or too large")
+        raise wrong_ring(
+            f"a ring of {ring.length} samples of {ring.channels} channels is empty or too large",
+            channels=ring.channels,
+            samples=ring.length,
+        )
     if not 1e-9 < ring.rate_hz < 1e9:
-        raise InputError(f"the ring's rate_hz={ring.rate_hz} is not a number of samples per second")
+        raise wrong_ring(
+            f"the ring's rate_hz={ring.rate_hz} is not a number of samples per second", rate_hz=ring.rate_hz
+        )
     for dtype in (np.dtype("<f4"), np.dtype("<f8")):
         if HEADER.size + values * dtype.itemsize == symbol_bytes:
             return ring, dtype
-    raise InputError(
-        f"a ring of {ring.length} samples of {ring.channels} channels does not have {symbol_bytes} bytes; "
-        "declare its data as ARRAY [0..length-1, 0..channels-1] OF REAL or LREAL"
+    raise SourceError(
+        "ring-invalid",
+        f"a ring of {ring.length} samples of {ring.channels} channels does not have {symbol_bytes} bytes",
+        "declare its data as ARRAY [0..length-1, 0..channels-1] OF REAL or LREAL",
+        channels=ring.channels,
+        samples=ring.length,
+        bytes=symbol_bytes,
     )
+
+
+def wrong_ring(message: str, **facts: object) -> SourceError:
+    return SourceError("ring-invalid", message, "check source.symbol and the PLC program (docs/live.md)", **facts)
 
 
 def new_rows(ring: Ring, have: int | None) -> list[tuple[int, int]]:
@@ -87,7 +103,13 @@ def ring_batch(
 ) -> Batch | None:
     """The rows from sample `first` on, without those that `after` tells were written over meanwhile; None for none."""
     if len(channels) != ring.channels:
-        raise InputError(f"the ring has {ring.channels} channels, and source.channels names {len(channels)}")
+        raise SourceError(
+            "channels-invalid",
+            f"the ring has {ring.channels} channels, and source.channels names {len(channels)}",
+            "correct source.channels",
+            key="source.channels",
+            channels=[ring.channels, len(channels)],
+        )
     if (after.epoch, after.length, after.channels) != (ring.epoch, ring.length, ring.channels):
         return None
     if not 0 <= ring.count <= after.count < SAMPLE_MAX:

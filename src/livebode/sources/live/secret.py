@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.sources.live.settings import SourceSettings
 
 SECRET_BYTES_MAX = 1 << 16
@@ -16,38 +16,70 @@ def password(settings: SourceSettings) -> str | None:
 
     Raises
     ------
-    InputError
+    ConfigError
         Where the variable is not set or the file cannot be read; the message names it, never what is in it.
     """
     return secret("source", "password", settings.password_env, settings.password_file)
 
 
 def secret(section: str, key: str, variable: str | None, path: Path | None) -> str | None:
-    """What the section's `key`_env or `key`_file points to; None where neither is given, InputError as `password`."""
+    """What the section's `key`_env or `key`_file points to; None where neither is given, ConfigError as `password`."""
     if variable is not None and path is not None:
-        raise InputError(f"{section} has both {key}_env and {key}_file; leave out one of them")
+        raise ConfigError(
+            "key-conflict",
+            f"[{section}] has both {key}_env and {key}_file",
+            "leave out one of them",
+            key=section,
+            keys=[f"{key}_env", f"{key}_file"],
+        )
     if variable is not None:
         value = os.environ.get(variable)
         if value is None:
-            raise InputError(f"the environment has no {variable!r}, which {section}.{key}_env names; set it")
+            raise ConfigError(
+                "secret-missing",
+                f"the environment has no {variable!r}, which {section}.{key}_env names",
+                "set it",
+                key=f"{section}.{key}_env",
+                variable=variable,
+            )
         return value
-    return None if path is None else _in_file(path)
+    return None if path is None else _in_file(path, f"{section}.{key}_file")
 
 
-def _in_file(path: Path) -> str:
+def _in_file(path: Path, key: str) -> str:
     """The text of a file without the line's end behind it."""
     try:
         if path.stat().st_size > SECRET_BYTES_MAX:
-            raise InputError(f"{path} is longer than {SECRET_BYTES_MAX} bytes; is it the password?")
+            raise ConfigError(
+                "file-unusable",
+                f"{path} is longer than {SECRET_BYTES_MAX} bytes",
+                f"check that {key} names the right file",
+                key=key,
+                path=str(path),
+            )
         return path.read_text(encoding="utf-8").rstrip("\r\n")
     except UnicodeDecodeError:
-        raise InputError(f"{path} is not text; is it the password?") from None
+        raise ConfigError(
+            "file-unusable", f"{path} is not text", f"check that {key} names the right file", key=key, path=str(path)
+        ) from None
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}; check its name and permissions") from None
+        raise ConfigError(
+            "file-unreadable",
+            f"{path} cannot be read: {error.strerror}",
+            "check its name and permissions",
+            key=key,
+            path=str(path),
+        ) from None
 
 
 def existing(path: Path, what: str) -> str:
-    """The path as text; InputError where there is no readable file."""
+    """The path as text; ConfigError where there is no readable file."""
     if not path.is_file():
-        raise InputError(f"there is no file {path} for source.{what}; check the name")
+        raise ConfigError(
+            "file-unreadable",
+            f"there is no file {path} for source.{what}",
+            "check the name",
+            key=f"source.{what}",
+            path=str(path),
+        )
     return str(path)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.core import Channel, InputError
+from livebode.core import Channel, ConfigError
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -81,10 +81,17 @@ class SourceSettings(BaseModel):
 
 
 def check_keys(settings: SourceSettings, kind: str) -> None:
-    """InputError for a key that means nothing for this kind of source: the scheme of a URL, or "log"."""
+    """ConfigError for a key that has no meaning for this kind of source: the scheme of a URL, or "log"."""
     taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
     if stray := sorted(settings.model_fields_set - taken - {"timeout_s"}):
-        raise InputError(f"source.{stray[0]} means nothing for {kind}; it takes {', '.join(sorted(taken))}")
+        raise ConfigError(
+            "key-unused",
+            f"source.{stray[0]} has no meaning for {kind}",
+            f"take it out; {kind} takes {', '.join(sorted(taken))}",
+            key=f"source.{stray[0]}",
+            source=kind,
+            allowed=sorted(taken),
+        )
 
 
 def named_channels(headings: list[str]) -> tuple[Channel, ...]:

@@ -13,7 +13,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from livebode.core import Channel, Event, InputError, SpectraLayout, missing_channel
+from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause
@@ -27,13 +27,10 @@ from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.sources.naming import nearest
 
 TICK_S = 0.1
 """How soon a request to end is seen."""
-
-
-class RefusedError(Exception):
-    """The peer does not let us in (certificate, password, policy): trying again would not help."""
 
 
 class LiveSource(ABC):
@@ -71,8 +68,8 @@ class LiveSource(ABC):
         self._connected = False
         self._outage = False
         self._failure: BaseException | None = None
-        self._refused: str | None = None
-        self._trouble = "nobody sent anything"
+        self._refused: SourceError | None = None
+        self._trouble: object = "nobody sent anything"
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
@@ -86,8 +83,8 @@ class LiveSource(ABC):
         ------
         OSError
             Where there is no connection, or no longer one; it is tried again.
-        RefusedError
-            Where trying again would not help.
+        SourceError
+            With the code "refused" where trying again would not help (certificate, password, policy).
         """
 
     @property
@@ -162,7 +159,7 @@ class LiveSource(ABC):
     def open(self, late: Callable[[str], None] | None = None) -> Self:
         """Begin to receive, and wait for the first batch.
 
-        Where none comes within `timeout_s`, InputError; with `late` a sentence is handed to it once, and the wait
+        Where none comes within `timeout_s`, SourceError; with `late` a sentence is handed to it once, and the wait
         continues until the machine sends, refuses or the source is stopped.
         """
         self._thread.start()
@@ -175,8 +172,7 @@ class LiveSource(ABC):
                 asked = self._stop.is_set()
                 self.close()
                 self._raise_failure()
-                when = "before it was ended" if asked else f"within {self.settings.timeout_s:g} s"
-                raise InputError(f"{self.address}: {self._refused or f'no samples came {when} ({self._trouble})'}")
+                raise self._refused or self._silence(asked)
             self._take(TICK_S)
         return self
 
@@ -193,13 +189,19 @@ class LiveSource(ABC):
 
         Raises
         ------
-        InputError
+        SourceError
             At once for a missing channel.
         """
         names = [channel.name for channel in self.channels]
         for name in channels or ():
             if name not in names:
-                raise InputError(missing_channel(name, names))
+                raise SourceError(
+                    "channel-unknown",
+                    f"there is no channel {name!r}",
+                    nearest(name, names),
+                    channel=name,
+                    channels=names,
+                )
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
         return (replace(block, data=block.data[rows], channels=labels) for block in self._stream(until))
@@ -245,6 +247,19 @@ class LiveSource(ABC):
         else:
             self._ready += self._sequencer.push(batch)
 
+    def _silence(self, asked: bool) -> SourceError:
+        """The error that no samples came, until the end was asked for or time was up."""
+        when = "before it was ended" if asked else f"within {self.settings.timeout_s:g} s"
+        address, cause = str(self.address), self._trouble.code if isinstance(self._trouble, LivebodeError) else ""
+        return SourceError(
+            "no-samples",
+            f"no samples came {when} ({self._trouble})",
+            "check that the machine is on and sends",
+            address=address,
+            timeout_s=self.settings.timeout_s,
+            cause=cause,
+        ).at(address)
+
     def _raise_failure(self) -> None:
         if self._failure is not None:
             raise self._failure
@@ -258,11 +273,12 @@ class LiveSource(ABC):
                 except OSError as error:
                     self._lost_connection(str(error.strerror or error) or type(error).__name__)
                     self._stop.wait(self._pauses.next_s())
-        except RefusedError as error:
-            self._refused = str(error)
-            self._said.say("refused", f"{self.address}: {error}; it is not tried again")
         except BaseException as error:  # of ours, or the library's: it must not vanish with the thread
-            self._failure = error
+            if isinstance(error, SourceError) and error.code == "source.refused":
+                self._refused = error.at(str(self.address))
+                self._said.say("refused", f"{self._refused}; it is not tried again")
+            else:
+                self._failure = error
         finally:
             self._connected = False
             self._dropped.finish()
@@ -285,7 +301,7 @@ class LiveSource(ABC):
 
     def _malformed(self, why: object) -> None:
         self._said.say("malformed", f"{self.address}: {why}")
-        self._trouble = str(why)
+        self._trouble = why
 
     def _deliver(self, batch: AnyBatch) -> None:
         now = time.monotonic()

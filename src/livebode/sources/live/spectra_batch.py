@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, InputError, Spectra, SpectraLayout, rms
+from livebode.core import Channel, SourceError, Spectra, SpectraLayout, rms
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
 from livebode.sources.live.position import Origin
 
@@ -37,7 +37,7 @@ class SpectraBatch:
 
     Raises
     ------
-    InputError
+    SourceError
         If there are no spectra or too many, shapes disagree, or a number cannot be.
     """
 
@@ -59,16 +59,24 @@ class SpectraBatch:
             or self.values.shape != (values, spectra)
             or not 0 < 2 * self.sums.size + self.values.size <= VALUES_MAX
         ):
-            raise InputError(
+            raise SourceError(
+                "batch-shape",
                 f"a batch of {spectra} spectra has sums of shape {self.sums.shape} and values of shape "
-                f"{self.values.shape}; it takes (signals, spectra, bins) and (values, spectra), at most "
-                f"{VALUES_MAX} numbers"
+                f"{self.values.shape}",
+                f"send (signals, spectra, bins) and (values, spectra), at most {VALUES_MAX} numbers",
+                spectra=spectra,
+                shape=list(self.sums.shape),
+                values_shape=list(self.values.shape),
             )
         check_numbers(self.first_sample, self.rate_hz, self.stamp_s)
         if self.first_sample % self.layout.hop:
-            raise InputError(
-                f"a spectrum ends at sample {self.first_sample + self.layout.hop - 1}; with hop {self.layout.hop} they "
-                "end one before its multiples"
+            last, hop = self.first_sample + self.layout.hop - 1, self.layout.hop
+            raise SourceError(
+                "spectrum-misplaced",
+                f"a spectrum ends at sample {last}, which is not one before a multiple of the hop {hop}",
+                "correct the sender",
+                sample=last,
+                hop=hop,
             )
 
     @property

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, InputError, SpectraLayout
+from livebode.core import Channel, SourceError, SpectraLayout
 from livebode.sources.live.batch import check_channels
-from livebode.sources.live.framing import FLOAT64, SPECTRA, SPECTRA_LAYOUT, Header, framed
+from livebode.sources.live.framing import FLOAT64, SPECTRA, SPECTRA_LAYOUT, Header, framed, inconsistent_frame
 from livebode.sources.live.spectra_batch import SpectraBatch
 
 _STATES = 3
@@ -38,20 +38,22 @@ def spectra_text(layout: SpectraLayout) -> bytes:
 
 
 def read_spectra_text(text: bytes) -> SpectraLayout:
-    """The layout in such a text; InputError where it is none."""
+    """The layout in such a text; SourceError where it is not one."""
     found: dict[str, list[list[str]]] = {word: [] for word in ("window", "hop", "lines", "quiet", "signal", "value")}
     try:
         rows = text.decode("utf-8").removesuffix("\n").split("\n")
     except UnicodeDecodeError:
-        raise InputError("a layout is not UTF-8") from None
+        raise _wrong("a layout is not UTF-8") from None
     for row in rows:
         word, *parts = row.split("\t")
         if word not in found:
-            raise InputError(f"a layout of spectra says {word[:40]!r}, which is none of {', '.join(found)}")
+            raise _wrong(
+                f"a layout of spectra has {word[:40]!r}, which is not one of {', '.join(found)}", word=word[:40]
+            )
         found[word].append(parts)
     for word in ("window", "hop", "lines", "quiet"):
         if [len(parts) for parts in found[word]] not in ([1], [] if word == "quiet" else [1]):
-            raise InputError(f"a layout of spectra needs one line {word!r} with one part behind it")
+            raise _wrong(f"a layout of spectra needs one line {word!r} with one part behind it", word=word)
     signals = [_signal(parts) for parts in found["signal"]]
     values = [_channel("value", parts, 2) for parts in found["value"]]
     check_channels(tuple(signal for signal, _, _ in signals))
@@ -68,17 +70,21 @@ def read_spectra_text(text: bytes) -> SpectraLayout:
     )
 
 
+def _wrong(message: str, **facts: object) -> SourceError:
+    return SourceError("layout-invalid", message, "correct the sender", **facts)
+
+
 def _numbers(word: str, found: dict[str, list[list[str]]]) -> tuple[int, ...]:
     text = found[word][0][0]
     numbers = text.split(" ")
     if not all(number.isascii() and number.isdigit() and len(number) < 9 for number in numbers):
-        raise InputError(f"a layout of spectra has {word} {text[:40]!r}, which are not whole numbers")
+        raise _wrong(f"a layout of spectra has {word} {text[:40]!r}, which are not whole numbers", word=word)
     return tuple(map(int, numbers))
 
 
 def _channel(word: str, parts: list[str], most: int) -> Channel:
     if not 1 <= len(parts) <= most:
-        raise InputError(f"a layout of spectra has a {word} with {len(parts)} parts; give 1 to {most}")
+        raise _wrong(f"a layout of spectra has a {word} with {len(parts)} parts, not 1 to {most}", word=word)
     return Channel(*parts[:2])
 
 
@@ -89,9 +95,13 @@ def _signal(parts: list[str]) -> tuple[Channel, float, bool]:
     except ValueError:
         constant = float("nan")
     if not isfinite(constant):
-        raise InputError(f"signal {channel.name[:40]!r} has the constant {parts[2][:40]!r}, which is no number")
+        raise _wrong(
+            f"signal {channel.name[:40]!r} has the constant {parts[2][:40]!r}, which is not a number", word="signal"
+        )
     if len(parts) > 3 and parts[3] != _DIFFERENCED:
-        raise InputError(f"signal {channel.name[:40]!r} says {parts[3][:40]!r}; it may say {_DIFFERENCED!r}")
+        raise _wrong(
+            f"signal {channel.name[:40]!r} has {parts[3][:40]!r} where only {_DIFFERENCED!r} is allowed", word="signal"
+        )
     return channel, constant, len(parts) > 3
 
 
@@ -132,18 +142,29 @@ def _payload(layout: SpectraLayout, double: bool) -> np.dtype[Any]:
 
 
 def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLayout, arrived_s: float) -> SpectraBatch:
-    """The batch in the payload of a frame; InputError where it contradicts its header or its layout."""
+    """The batch in the payload of a frame; SourceError where it contradicts its header or its layout."""
     count = len(layout.signals) + len(layout.values)
     if header.channels != count:
-        raise InputError(f"a frame of spectra has {header.channels} channels, its layout {count}")
+        raise inconsistent_frame(
+            f"a frame of spectra has {header.channels} channels, its layout {count}", channels=[header.channels, count]
+        )
     dtype = _payload(layout, bool(header.flags & FLOAT64))
     if not header.samples or len(payload) != header.samples * dtype.itemsize:
-        raise InputError(
-            f"a frame of {header.samples} spectra of {dtype.itemsize} bytes each has {len(payload)} bytes of them"
+        raise inconsistent_frame(
+            f"a frame of {header.samples} spectra of {dtype.itemsize} bytes each has {len(payload)} bytes of them",
+            spectra=header.samples,
+            bytes=len(payload),
         )
     rows = np.frombuffer(payload, dtype)
     if np.any(rows["state"] > _STATES):
-        raise InputError(f"a spectrum has the state {int(rows['state'].max())}; 0 to {_STATES} are known")
+        state = int(rows["state"].max())
+        raise SourceError(
+            "value-invalid",
+            f"a spectrum has the state {state}, not 0 to {_STATES}",
+            "correct the sender",
+            key="state",
+            value=state,
+        )
     with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
         sums = rows["sums"].astype(np.float64)
         values = rows["values"].T.astype(np.float64, order="C")

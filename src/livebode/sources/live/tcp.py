@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from typing import ClassVar
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.framing import FrameSplitter
 from livebode.sources.live.source import TICK_S, LiveSource
@@ -51,7 +51,7 @@ class TcpSource(LiveSource):
     def _decode(self, decoder: FrameDecoder, frame: bytes) -> None:
         try:
             batch = decoder.decode(frame)
-        except InputError as error:
+        except LivebodeError as error:
             self._malformed(error)
             return
         if batch is not None:

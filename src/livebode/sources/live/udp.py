@@ -6,7 +6,7 @@ import socket
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import ClassVar
 
-from livebode.core import InputError
+from livebode.core import ConfigError, LivebodeError
 from livebode.sources.live.address import Address
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.settings import SourceSettings
@@ -28,8 +28,12 @@ class UdpSource(LiveSource):
         try:
             self._sender = None if settings.sender is None else plain_address(settings.sender)
         except ValueError:
-            raise InputError(
-                f"source.sender = {settings.sender!r} is not an IP address; give one such as 192.168.0.5"
+            raise ConfigError(
+                "value-invalid",
+                f"source.sender = {settings.sender!r} is not an IP address",
+                "give one such as 192.168.0.5",
+                key="source.sender",
+                value=settings.sender,
             ) from None
 
     def _receive(self) -> bool:
@@ -51,7 +55,7 @@ class UdpSource(LiveSource):
                     continue
                 try:
                     batch = decoder.decode(datagram)
-                except InputError as error:
+                except LivebodeError as error:
                     self._malformed(error)
                     continue
                 if batch is not None:

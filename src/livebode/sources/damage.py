@@ -1,0 +1,20 @@
+"""The errors that readers of every format raise: a file is damaged, ends early, or is larger than a recording is."""
+
+from __future__ import annotations
+
+from livebode.core import RecordingError
+
+
+def damaged(message: str, **facts: object) -> RecordingError:
+    """The error for content that contradicts its format."""
+    return RecordingError("damaged", message, "copy or export the file again", **facts)
+
+
+def truncated(message: str, **facts: object) -> RecordingError:
+    """The error for a file that ends before its content does."""
+    return RecordingError("truncated", message, "check that the file was copied completely", **facts)
+
+
+def oversized(message: str, limit: int, **facts: object) -> RecordingError:
+    """The error for more columns, parts or bytes than are read."""
+    return RecordingError("too-large", message, "check that this is a recording", limit=limit, **facts)
