@@ -15,9 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.cli.log_output import LineFormatter, log_output
+from livebode.core import SourceError
+from livebode.dashboard import Dashboard, Serving
+from livebode.session import Axis
+from livebode.sources.live import SourceSettings, make_source
+from livebode.sources.live.address import PORTS
 from tests.command import livebode, signals, write_parquet
+from tests.peers.peer import Feeding, batches, free_port, send_all, until
+from tests.peers.plain import TcpPeer
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z (DEBUG|INFO|WARNING|ERROR) livebode\.[a-z0-9_.]+: .+")
+SECRET = "hunter2-and-more"
 ROLES = ("--output", "y", "--input", "u", "--excitation", "w", "--json")
 
 
@@ -103,3 +111,104 @@ def test_a_log_file_is_of_bounded_size(tmp_path: Path, monkeypatch: pytest.Monke
             log.info("line %d", number)
     assert sum(os.path.getsize(path) for path in tmp_path.iterdir()) <= 20_000
     assert (tmp_path / "own.log").read_text().endswith("line 999\n")
+
+
+LOGIN = 'username = "joe-the-user"\npassword_env = "LIVEBODE_TEST_PASSWORD"'
+SOURCES = {
+    "udp": 'url = "udp://127.0.0.1:{port}"',
+    "tcp": 'url = "tcp://127.0.0.1:{port}"',
+    "mqtt": f'url = "mqtt://127.0.0.1:{{port}}/t"\n{LOGIN}\nclient_id = "c"',
+    "mqtts": f'url = "mqtts://127.0.0.1:{{port}}/t"\n{LOGIN}',
+    "opc.tcp": f'url = "opc.tcp://127.0.0.1:{{port}}"\nrate_hz = 1000\n{LOGIN}\n[source.nodes]\ny = "ns=2;s=y"',
+    "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
+}
+REST = '[signals]\noutput = "y"\ninput = "w"\n[lines]\nfrequencies = "100"\nwindow = 400\n'
+
+
+def test_every_kind_of_url_is_in_the_test_below() -> None:
+    assert set(SOURCES) == set(PORTS)
+
+
+@pytest.mark.parametrize("kind", SOURCES)
+def test_a_source_that_does_not_answer_is_logged_with_its_address_and_without_a_secret(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, kind: str
+) -> None:
+    monkeypatch.setenv("LIVEBODE_TEST_PASSWORD", SECRET)
+    (tmp_path / "axis.toml").write_text(f"[source]\ntimeout_s = 0.2\n{SOURCES[kind].format(port=free_port())}\n{REST}")
+    axis = Axis.read(tmp_path / "axis.toml")
+    with caplog.at_level(logging.DEBUG, "livebode"), pytest.raises(SourceError):
+        make_source(axis.source).open()
+    assert f"opening {axis.source.url}" in caplog.text
+    assert {name for name, _, _ in caplog.record_tuples} == {make_source(axis.source).__module__}
+    for secret in (SECRET, "joe-the-user"):
+        assert secret not in caplog.text + "".join(repr(record.__dict__) for record in caplog.records)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        f'url = "mqtt://me:{SECRET}@127.0.0.1/t"',
+        f'url = "mqtt://me:{SECRET}"',
+        f'url = "mqtt://me:{SECRET}%40h/t"',
+        f'url = "tcp://h:1/{SECRET}"',
+        f'url = "http://h/{SECRET}"',
+        f'url = "udp://127.0.0.1:1?password={SECRET}"',
+        f'url = "mqtt://h/t"\npassword = "{SECRET}"',
+        f'url = "mqtt://h/t"\npassword_env = ["{SECRET}"]',
+        f'url = "mqtt://h/t"\nusername = ["{SECRET}"]',
+    ],
+)
+def test_a_configuration_that_is_refused_is_logged_without_its_secret(tmp_path: Path, source: str) -> None:
+    (tmp_path / "axis.toml").write_text(f"[source]\n{source}\n{REST}")
+    own = tmp_path / "own.log"
+    done = livebode("--log-level", "debug", "run", tmp_path / "axis.toml", "--log-file", own)
+    assert done.code == 2
+    assert " ERROR livebode.cli.run_command: config." in own.read_text()
+    assert SECRET not in own.read_text() + done.err + done.out
+
+
+def test_a_machine_that_comes_goes_and_comes_again_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with TcpPeer(tmp_path) as peer, caplog.at_level(logging.DEBUG, "livebode"):
+
+        def script() -> None:
+            peer.wait_ready()
+            send_all(peer, batches(2))
+
+        with Feeding(script), make_source(SourceSettings(**peer.settings)) as source:
+            source.open()
+            peer.interrupt()
+            until(lambda: source.health.counts["connected"] == 2, "the second connection")
+        address = peer.settings["url"]
+    lines = [(record.levelname, record.getMessage()) for record in caplog.records if record.name.endswith(".tcp")]
+    assert lines[0] == ("INFO", f"opening {address}")
+    assert lines[-1] == ("INFO", f"{address}: reception ended")
+    assert lines.count(("INFO", f"connected to {address}")) == 2
+    assert ("INFO", f"{address}: 2 channels at 4000 Hz") in lines
+    assert [level for level, text in lines if "closed the connection" in text] == ["WARNING", "DEBUG"]
+
+
+def test_a_record_is_logged_from_its_beginning_over_its_segments_to_its_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    log = write_parquet(tmp_path / "log.parquet", signals(4000))
+    axis = tmp_path / "axis.toml"
+    axis.write_text(
+        f'[source]\nlog = "{log}"\n[signals]\noutput = "y"\ninput = "u"\nexcitation = "w"\n[record]\nsegment_s = 1.0\n'
+    )
+    with caplog.at_level(logging.INFO, "livebode"):
+        assert livebode("run", axis, "--out", tmp_path / "run", "--json").code == 0
+    text = [f"{name}: {message}" for name, level, message in caplog.record_tuples if level == logging.INFO]
+    begun = text.index(f"livebode.records.segments.store: {tmp_path / 'run'}: the record begins at sample 0")
+    ended = text.index(f"livebode.records.segments.store: {tmp_path / 'run'}: the record ends, finished")
+    closed = [i for i, line in enumerate(text) if line.startswith("livebode.records.segments.shelf: ")]
+    assert begun < closed[0] < closed[-1] < ended
+    assert len(closed) >= 4
+
+
+def test_a_dashboard_is_logged_from_its_start_to_its_stop(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "livebode"), Dashboard(Serving("127.0.0.1", 0)) as dashboard:
+        url = dashboard.url
+    assert [message for name, _, message in caplog.record_tuples if name == "livebode.dashboard.dashboard"] == [
+        f"listening at {url}",
+        "stopped",
+    ]

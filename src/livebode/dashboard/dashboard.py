@@ -24,6 +24,7 @@ BACKLOG = 4096
 """Connections that the system holds until they are taken in; one that finds no room tries again a second later."""
 _START_S = 30.0
 _END_S = 2
+_logger = logging.getLogger(__name__)
 
 
 class Dashboard:
@@ -43,7 +44,7 @@ class Dashboard:
     """
 
     def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
-        self._serving, self._tell = serving, tell
+        self._serving, self._hears = serving, tell
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
         self._server: Any = None
@@ -127,6 +128,7 @@ class Dashboard:
             if not self._thread.is_alive() or time.monotonic() > until:
                 raise InputError(f"the dashboard did not start at {self.url}")
             time.sleep(0.005)
+        _logger.info("listening at %s", self.url)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -135,6 +137,12 @@ class Dashboard:
         self._server.should_exit = True
         self._thread.join(_END_S + 8)
         self._socket.close()
+        _logger.info("stopped")
+
+    def _tell(self, sentence: str) -> None:
+        """Log what a person should know, and tell it; what comes here is limited in its rate."""
+        _logger.warning("%s", sentence)
+        self._hears(sentence)
 
     def _run(self) -> None:
         asyncio.run(self._work())
