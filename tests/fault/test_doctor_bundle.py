@@ -19,7 +19,8 @@ from livebode.doctor.check import Check
 from livebode.doctor.secrets import REMOVED, Secrets
 from livebode.session.axis import MAY_BE_SECRET, Axis
 from livebode.session.experiment import Experiment
-from tests.command import livebode, signals, write_parquet
+from tests.command import livebode, signals
+from tests.support.runs import small_run
 
 SECRET = "hunter2-and-more"
 REST = '[signals]\noutput = "y"\ninput = "w"\n[lines]\nfrequencies = "100"\nwindow = 400\n'
@@ -139,9 +140,7 @@ def test_a_bundle_of_a_run_holds_its_summary_its_newest_events_versions_checks_a
     columns = signals(4000)
     for sample in (500, 1500, 2500, 3500):
         columns["y"][sample] = float("nan")
-    log = write_parquet(tmp_path / "log.parquet", columns)
-    roles = ("--output", "y", "--input", "u", "--excitation", "w")
-    assert livebode("run", log, *roles, "--out", tmp_path / "run", "--json").code == 0
+    small_run(tmp_path, columns)
     done = livebode(
         "doctor", tmp_path / "run", "--bundle", tmp_path / "b.zip", "--log-file", tmp_path / "own.log", "--json"
     )

@@ -23,6 +23,7 @@ from livebode.sources.live.address import PORTS
 from tests.command import livebode, signals, write_parquet
 from tests.peers.peer import Feeding, batches, free_port, send_all, until
 from tests.peers.plain import TcpPeer
+from tests.support.runs import small_run
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z (DEBUG|INFO|WARNING|ERROR) livebode\.[a-z0-9_.]+: .+")
 SECRET = "hunter2-and-more"
@@ -52,13 +53,13 @@ def test_a_record_is_one_printable_line_whatever_it_holds(message: str, fact: st
 def test_the_log_goes_to_a_file_with_options_before_or_behind_the_command(tmp_path: Path, before: bool) -> None:
     log = write_parquet(tmp_path / "log.parquet", signals(1000))
     own = tmp_path / "own.log"
-    options, command = ("--log-level", "debug", "--log-file", own), ("run", log, *ROLES, "--out", tmp_path / "run")
+    options, command = ("--log-level", "debug", "--log-file", own), ("inspect", log, "--json")
     done = livebode(*options, *command) if before else livebode(*command, *options)
     assert (done.code, done.err) == (0, "")
     lines = own.read_text().splitlines()
     assert all(LINE.fullmatch(line) for line in lines)
-    assert lines[0].endswith("livebode run begins")
-    assert lines[-1].endswith("livebode run ends")
+    assert lines[0].endswith("livebode inspect begins")
+    assert lines[-1].endswith("livebode inspect ends")
     assert logging.getLogger("livebode").level == logging.NOTSET
 
 
@@ -190,19 +191,18 @@ def test_a_machine_that_comes_goes_and_comes_again_is_logged(tmp_path: Path, cap
 def test_a_record_is_logged_from_its_beginning_over_its_segments_to_its_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    log = write_parquet(tmp_path / "log.parquet", signals(4000))
-    axis = tmp_path / "axis.toml"
-    axis.write_text(
-        f'[source]\nlog = "{log}"\n[signals]\noutput = "y"\ninput = "u"\nexcitation = "w"\n[record]\nsegment_s = 1.0\n'
-    )
+    columns = signals(4000)
+    columns["y"][2000] = float("nan")
     with caplog.at_level(logging.INFO, "livebode"):
-        assert livebode("run", axis, "--out", tmp_path / "run", "--json").code == 0
+        run = small_run(tmp_path, columns, record={"segment_s": 1.0})
     text = [f"{name}: {message}" for name, level, message in caplog.record_tuples if level == logging.INFO]
-    begun = text.index(f"livebode.records.segments.store: {tmp_path / 'run'}: the record begins at sample 0")
-    ended = text.index(f"livebode.records.segments.store: {tmp_path / 'run'}: the record ends, finished")
+    begun = text.index(f"livebode.records.segments.store: {run}: the record begins at sample 0")
+    ended = text.index(f"livebode.records.segments.store: {run}: the record ends, finished")
     closed = [i for i, line in enumerate(text) if line.startswith("livebode.records.segments.shelf: ")]
     assert begun < closed[0] < closed[-1] < ended
     assert len(closed) >= 4
+    (event,) = [line for line in text[begun:ended] if line.startswith("livebode.session.audience: ")]
+    assert "not finite" in event
 
 
 def test_a_dashboard_is_logged_from_its_start_to_its_stop(caplog: pytest.LogCaptureFixture) -> None:

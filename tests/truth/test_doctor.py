@@ -26,6 +26,7 @@ from livebode.kernel import instruction_sets
 from tests.command import livebode, signals, write_parquet
 from tests.peers.peer import free_port
 from tests.support.errors import refused
+from tests.support.runs import small_run
 
 ROOT = Path(__file__).parents[2]
 REST = """
@@ -186,10 +187,7 @@ def test_an_experiment_is_a_configuration_too() -> None:
 
 
 def test_a_run_is_read_and_what_is_damaged_is_named(tmp_path: Path) -> None:
-    log = write_parquet(tmp_path / "log.parquet", signals())
-    run = tmp_path / "run"
-    roles = ("--output", "y", "--input", "u", "--excitation", "w")
-    assert livebode("run", log, *roles, "--out", run, "--json").code == 0
+    run = small_run(tmp_path, signals())
     found = doctor(run)[1]
     assert found["run"]["verdict"] == "ok"
     assert found["run"]["facts"]["finished"]
