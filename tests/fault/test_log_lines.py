@@ -175,8 +175,9 @@ def test_a_machine_that_comes_goes_and_comes_again_is_logged(tmp_path: Path, cap
             peer.wait_ready()
             send_all(peer, batches(2))
 
-        with Feeding(script), make_source(SourceSettings(**peer.settings)) as source:
+        with Feeding(script) as feeding, make_source(SourceSettings(**peer.settings)) as source:
             source.open()
+            feeding.join()
             peer.interrupt()
             until(lambda: source.health.counts["connected"] == 2, "the second connection")
         address = peer.settings["url"]
