@@ -18,7 +18,7 @@ import numpy as np
 
 from examples.kernel_drive import KernelDrive
 from livebode import Channel, Lines, multisine
-from livebode.core import InputError, SpectraLayout
+from livebode.core import LivebodeError, SpectraLayout
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode.sources.live import Batch, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
 
@@ -79,7 +79,7 @@ def main() -> None:
     else:
         try:
             made = spectra_frames(options.seconds, epoch, layout(options.spectra))
-        except InputError as error:
+        except LivebodeError as error:
             parser.error(f"--spectra {options.spectra:g}: {error}")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for frame in made:

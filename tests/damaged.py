@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from livebode.core import DamageWarning, Event, InputError
+from livebode.core import DamageWarning, Event, LivebodeError, UsageError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
@@ -99,8 +99,8 @@ def by_query(path: Path) -> dict[str, list[str]]:
         for name in TABLES:
             try:
                 answer = query(Run.open(path), f"FROM {name}", _MOST)
-            except InputError as error:
-                if "does not exist" not in str(error):
+            except UsageError as error:
+                if "does not exist" not in error.reason:
                     raise
                 found[name] = []
                 continue
@@ -134,7 +134,7 @@ def run_commands(path: Path, out: Path) -> None:
     for call in commands(path, out).values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DamageWarning)
-            with contextlib.suppress(InputError):
+            with contextlib.suppress(LivebodeError):
                 call()
 
 

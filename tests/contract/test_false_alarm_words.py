@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.monitoring import seconds_between
+from tests.support.errors import refused
 
 DAY_S = 86400.0
 
@@ -29,7 +30,13 @@ def test_words_that_are_read(words: str, seconds: float) -> None:
     assert seconds_between(words) == pytest.approx(seconds)
 
 
-@pytest.mark.parametrize("words", ["", "never", "once in a while", "0 per day", "-3", "nan", "one in 3 parsecs", "0"])
-def test_words_that_are_refused(words: str) -> None:
-    with pytest.raises(InputError, match="false alarms"):
+@pytest.mark.parametrize("words", ["", "never", "once in a while", "0 per day", "one in 3 parsecs"])
+def test_words_that_cannot_be_read_are_refused(words: str) -> None:
+    with refused(UsageError, "unreadable", argument="false_alarms", value=words):
+        seconds_between(words)
+
+
+@pytest.mark.parametrize("words", ["-3", "nan", "0"])
+def test_a_time_that_is_not_positive_is_refused(words: str) -> None:
+    with refused(UsageError, "out-of-range", argument="false_alarms", value=words):
         seconds_between(words)

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import InputError, Lines, Parameters, Responses
+from livebode.core import FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
 from livebode.fitting.weighing import epsilon_for
+from tests.support.errors import refused
 from tests.truth.test_fits import LINES, TRUTH, noisy
 
 BELT = TwoMass(radius_m=0.019)
@@ -60,9 +61,9 @@ def test_a_resumed_fitter_equals_one_that_went_on(late_s: float) -> None:
     second = Fitter(BELT)
     second.restore(first.snapshot())
     same(Parameters.join([head, second.process(every[37:])]), expected)
-    with pytest.raises(InputError, match="other settings"):
+    with refused(UsageError, "conflict", argument="snapshot"):
         Fitter(BELT, free=["delay"]).restore(first.snapshot())
-    with pytest.raises(InputError, match="damaged"):
+    with refused(UsageError, "unreadable", argument="snapshot"):
         second.restore(first.snapshot()[:40])
 
 
@@ -84,40 +85,47 @@ def test_events_tell_where_fits_fail_and_hold_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options", "says"),
+    ("arguments", "options", "error"),
     [
-        (("two-masses",), {}, "no model 'two-masses'"),
-        (("rigid",), {"inertia_ratio": 2.0}, "does not take inertia_ratio"),
-        ((BELT,), {"fixed": {"jS": 1.0}}, "did you mean 'Js'"),
-        ((BELT,), {"fixed": {"Js": -1.0}}, "Js = -1 is not between"),
-        ((BELT,), {"free": ["B", "K"]}, "'K'"),
-        ((BELT,), {"fixed": {"Js": 1.0, "mL": 1.0, "Keff": 1e5, "bs": 1.0}}, "every parameter"),
-        ((BELT,), {"band_hz": (50.0, 90.0)}, "2 lines, too few for 4"),
+        (("two-masses",), {}, (UsageError, "unknown-name", {"argument": "model", "value": "two-masses"})),
+        (("rigid",), {"inertia_ratio": 2.0}, (UsageError, "conflict", {"argument": "inertia_ratio", "value": 2.0})),
+        ((BELT,), {"fixed": {"jS": 1.0}}, (UsageError, "unknown-name", {"argument": "fixed", "value": "jS"})),
+        ((BELT,), {"fixed": {"Js": -1.0}}, (UsageError, "out-of-range", {"parameter": "Js", "value": -1.0})),
+        ((BELT,), {"free": ["B", "K"]}, (UsageError, "unknown-name", {"argument": "free", "value": "K"})),
+        ((BELT,), {"fixed": {"Js": 1.0, "mL": 1.0, "Keff": 1e5, "bs": 1.0}}, (UsageError, "conflict", {})),
+        ((BELT,), {"band_hz": (50.0, 90.0)}, (FitError, "too-few-lines", {"lines": 2, "parameters": 4})),
     ],
 )
-def test_what_cannot_be_is_refused(arguments: tuple, options: dict, says: str) -> None:
-    with pytest.raises(InputError) as refused:
+def test_what_cannot_be_is_refused(arguments: tuple, options: dict, error: tuple) -> None:
+    kind, code, facts = error
+    with refused(kind, code, **facts):
         Fitter(*arguments, **options).process(run())
-    assert says in str(refused.value)
+
+
+def test_an_unknown_parameter_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(UsageError) as caught:
+        Fitter(BELT, fixed={"jS": 1.0}).process(run())
+    assert caught.value.remedy.startswith("did you mean 'Js'?")
 
 
 def test_other_lines_and_other_quantities_are_refused() -> None:
     every = run()
     fitter = Fitter(BELT)
     fitter.process(every[:3])
-    with pytest.raises(InputError, match="other lines"):
+    with refused(GridError, "not-alike"):
         fitter.process(Responses(**{**vars(every), "lines": Lines.parse("20:140:20", 4000, 800)}))
-    with pytest.raises(InputError, match="'closed loop'"):
+    with refused(SignalError, "wrong-quantity", quantity="closed loop"):
         Fitter(BELT).process(Responses(**{**vars(every), "quantity": "closed loop"}))
     for bad in ({"output": "force"}, {"side": "left"}, {"radius_m": -1.0}):
-        with pytest.raises(InputError, match="=" if "radius_m" not in bad else "radius_m"):
+        code, (argument, value) = "out-of-range" if "radius_m" in bad else "not-one-of", *bad.items()
+        with refused(UsageError, code, argument=argument, value=value):
             model_named("two-mass", **bad)
 
 
 def test_a_failed_fit_evaluates_to_nothing() -> None:
     nothing = fit(run()[31], BELT)
     assert nothing.status == "no response"
-    with pytest.raises(InputError, match="there is no fit"):
+    with refused(FitError, "not-fitted", status="no response"):
         nothing.response(20.0)
     assert np.isnan(nothing["Keff"])
     assert np.isnan(nothing.bound("resonance"))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.core import GridError, InputError, Lines
+from livebode.core import GridError, Lines, LivebodeError, UsageError
+from tests.support.errors import refused
 
 
 @given(window=st.integers(8, 5000), rate_hz=st.sampled_from([1000, 2500, 4000, 8000.0]), data=st.data())
@@ -29,14 +28,20 @@ def test_the_windows_that_would_fit_do_fit(window: int, tenths: int) -> None:
     try:
         assert Lines.parse(str(frequency), rate_hz, window).frequency_hz[0] == pytest.approx(frequency, rel=1e-5)
     except GridError as error:
-        if "nearest" not in str(error):
+        if error.code == "grid.above-nyquist":
             assert frequency >= rate_hz / 2 or frequency < rate_hz / window
-            return
-        near, fitting = re.search(r"nearest lines? (?:are|is) (.*?) Hz, and (.*)", str(error)).groups()
-        for line in near.split(" and "):
-            assert abs(float(line) - frequency) < rate_hz / window
-        for size in re.findall(r"\d+", fitting):
-            assert Lines.parse(str(frequency), rate_hz, int(size)).frequency_hz[0] == pytest.approx(frequency)
+        else:
+            check_proposals(error, frequency)
+
+
+def check_proposals(error: GridError, frequency: float) -> None:
+    assert error.code == "grid.line-off"
+    for line in error.nearest_hz:
+        assert f"{line:.6g}" in error.remedy
+        assert abs(line - frequency) < error.resolution_hz
+    for size in error.windows:
+        assert str(size) in error.remedy
+        assert Lines.parse(str(frequency), error.rate_hz, size).frequency_hz[0] == pytest.approx(frequency)
 
 
 @pytest.mark.parametrize(
@@ -54,36 +59,44 @@ def test_ranges_are_inclusive_and_commas_join(text: str, bins: tuple[int, ...]) 
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "kind", "code", "facts"),
     [
-        ("", "'' in lines '' cannot be read"),
-        ("20:140", "'20:140' in lines"),
-        ("20:140:20:3", "'20:140:20:3'"),
-        ("20:20:140", "did you mean 20:140:20?"),
-        ("20:5:120", "did you mean 20:120:5?"),
-        ("40:20:5", "no start:stop:step"),
-        ("1/0", "cannot be read"),
-        ("nan", "cannot be read"),
-        ("0", "0 Hz is not between 0 and the Nyquist frequency 2000 Hz"),
-        ("-20", "-20 Hz is not between"),
-        ("2000", "2000 Hz is not between"),
-        ("10:1990:0.00001", "take a larger step"),
-        ("20,20", "bin 2 (20 Hz) is named more than once"),
+        ("", UsageError, "unreadable", {"argument": "lines", "value": ""}),
+        ("20:140", UsageError, "unreadable", {"value": "20:140"}),
+        ("20:140:20:3", UsageError, "unreadable", {"value": "20:140:20:3"}),
+        ("20:20:140", UsageError, "out-of-range", {"value": "20:20:140"}),
+        ("40:20:5", UsageError, "out-of-range", {"value": "40:20:5"}),
+        ("1/0", UsageError, "unreadable", {"value": "1/0"}),
+        ("nan", UsageError, "unreadable", {"value": "nan"}),
+        ("0", GridError, "above-nyquist", {"frequency_hz": 0.0, "nyquist_hz": 2000.0}),
+        ("-20", GridError, "above-nyquist", {"frequency_hz": -20.0}),
+        ("2000", GridError, "above-nyquist", {"frequency_hz": 2000.0}),
+        ("10:1990:0.00001", UsageError, "too-many", {"argument": "lines", "limit": 100_000}),
+        ("20,20", GridError, "line-duplicated", {"bin": 2, "frequency_hz": 20.0}),
+        ("25", GridError, "line-off", {"nearest_hz": [20.0, 30.0], "windows": [320, 480]}),
     ],
 )
-def test_what_cannot_be_a_line(text: str, says: str) -> None:
-    with pytest.raises(InputError) as refused:
+def test_what_cannot_be_a_line(text: str, kind: type[LivebodeError], code: str, facts: dict) -> None:
+    with refused(kind, code, **facts):
         Lines.parse(text, rate_hz=4000, window=400)
-    assert says in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"), [("20:20:140", "did you mean 20:140:20?"), ("20:5:120", "did you mean 20:120:5?")]
+)
+def test_exchanged_parts_of_a_range_are_recognised(text: str, meant: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        Lines.parse(text, rate_hz=4000, window=400)
+    assert caught.value.remedy == meant
 
 
 @pytest.mark.parametrize("window", [0, -4, 2, 2.5, True, "400"])
 def test_windows_that_cannot_be(window: object) -> None:
-    with pytest.raises(GridError, match="window="):
+    with refused(GridError, "window-out-of-range", window=window):
         Lines.parse("20", rate_hz=4000, window=window)
 
 
 @pytest.mark.parametrize("rate_hz", [0, -1, float("nan"), float("inf")])
 def test_rates_that_cannot_be(rate_hz: float) -> None:
-    with pytest.raises(InputError, match="rate_hz="):
+    with refused(UsageError, "out-of-range", argument="rate_hz", value=rate_hz):
         Lines.parse("20", rate_hz=rate_hz, window=400)

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from livebode.core import Block, InputError
+from livebode.core import BaselineError, Block, LivebodeError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.simulation import TensionLoss
 from studies.monitoring_axis import LINES
 from tests.monitored import machine, pieces, recorded, told
+from tests.support.errors import refused
 
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet")
 FAULT = TensionLoss(start_s=6.0, loss=0.03)
@@ -67,20 +68,20 @@ def test_a_gap_costs_its_windows_alone() -> None:
 
 def test_a_snapshot_of_another_monitor_is_refused() -> None:
     snapshot = Monitor(baseline(True), SETTINGS).snapshot()
-    with pytest.raises(InputError, match="other settings"):
+    with pytest.raises(LivebodeError, match="other settings"):
         Monitor(baseline(False), SETTINGS).restore(snapshot)
 
 
 def test_a_baseline_of_other_runs_is_refused() -> None:
     learned = baseline(False)
-    for other, word in (
-        (replace(SETTINGS, output="y"), "output velocity"),
-        (replace(SETTINGS, schedule=None), "schedule x"),
-        (replace(SETTINGS, estimator="direct"), "estimator joint"),
+    for other, setting, own in (
+        (replace(SETTINGS, output="y"), "output", "velocity"),
+        (replace(SETTINGS, schedule=None), "schedule", "x"),
+        (replace(SETTINGS, estimator="direct"), "estimator", "joint"),
     ):
-        with pytest.raises(InputError, match=f"learned with {word}"):
+        with refused(BaselineError, "settings-differ", setting=setting, learned=own):
             Monitor(learned, other)
-    with pytest.raises(InputError, match="'now and then' cannot be read"):
+    with refused(UsageError, "unreadable", argument="false_alarms", value="now and then"):
         Monitor(learned, SETTINGS, "now and then")
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode import InputError, Lines, MotionCorrection, Responses, Settings, Tracker, multisine
+from livebode import Lines, LivebodeError, MotionCorrection, Responses, Settings, Tracker, multisine
 from livebode.core import Block
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from tests.contract.test_tracker_cuts import assert_same
@@ -123,12 +123,12 @@ def test_a_damaged_or_foreign_snapshot_is_refused_and_changes_nothing() -> None:
     correction.process(record().cut(0, 6000))
     good = correction.snapshot()
     for size in (0, 1, len(good) // 2, len(good) - 1):
-        with pytest.raises(InputError, match="snapshot"):
+        with pytest.raises(LivebodeError, match="snapshot"):
             correction.restore(good[:size])
     for other in (new(radius_m=0.02), new(chunk_samples=CHUNK + 1), new(stiffness_splines=6)):
-        with pytest.raises(InputError, match="other settings"):
+        with pytest.raises(LivebodeError, match="other settings"):
             correction.restore(other.snapshot())
-    with pytest.raises(InputError, match="other settings"):
+    with pytest.raises(LivebodeError, match="other settings"):
         correction.restore(Tracker(SETTINGS).snapshot())
     assert correction.snapshot() == good
 
@@ -137,6 +137,6 @@ def test_samples_that_come_twice_are_refused_and_change_nothing() -> None:
     correction = new()
     correction.process(record().cut(0, 6000))
     good = correction.snapshot()
-    with pytest.raises(InputError, match="came twice"):
+    with pytest.raises(LivebodeError, match="came twice"):
         correction.process(record().cut(5000, 6000))
     assert correction.snapshot() == good

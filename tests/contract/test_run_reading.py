@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Block, DamageWarning, InputError, Lines
+from livebode.core import Block, DamageWarning, Lines, RecordError
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
 from tests.command import RATE_HZ, livebode, signals, write_parquet
+from tests.support.errors import refused
 
 
 @pytest.fixture
@@ -42,22 +43,20 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
 
 
 def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) -> None:
-    def refused(path: Path) -> str:
-        with pytest.raises(InputError) as error:
-            Run.open(path).responses()
-        return str(error.value)
-
-    assert "has no run.json" in refused(tmp_path)
+    with refused(RecordError, "not-a-run", path=str(tmp_path)):
+        Run.open(tmp_path)
     table = run / "responses.parquet"
     whole = table.read_bytes()
     table.write_bytes(whole[: len(whole) // 2])
     with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is, and nothing of it can be read"):
         assert len(Run.open(run).responses()) == 0
     (run / "run.json").write_text("{")
-    with pytest.warns(DamageWarning, match=r"run\.json' is damaged \(it has no checksum\); its copy"):
+    with pytest.warns(DamageWarning, match=r"run\.json' is damaged: it has no checksum; its copy"):
         assert Run.open(run).events()
     (run / "run-copy.json").write_text("[]")
-    assert "run.json' cannot be read" in refused(run)
+    with refused(RecordError, "damaged", path=str(run / "run.json"), reason="it has no checksum"):
+        Run.open(run)
     (run / "run-copy.json").unlink()
     (run / "run.json").write_text("{}")
-    assert "is not what a run writes (found: Field required)" in refused(run)
+    with refused(RecordError, "unexpected-content", path=str(run / "run.json"), reason="found: Field required"):
+        Run.open(run)

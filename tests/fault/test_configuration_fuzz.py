@@ -8,17 +8,20 @@ from __future__ import annotations
 import os
 import random
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from livebode.core import InputError
+from livebode.core import ConfigError, LivebodeError
 from livebode.session import ConfigurationFile
 from livebode.session.axis import Axis
 from livebode.session.configuration import axes_of
 from livebode.session.fits import chosen_model, fitter_of
 from livebode.session.plan import live_follower
 from livebode.session.toml_file import FILE_BYTES_MAX
+from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_CONFIGURATION_FUZZ", "2000"))
 GROWN_BYTES_MAX = 100 << 20
@@ -144,11 +147,20 @@ def rss_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def refused(error: InputError) -> None:
+def is_one_sentence(error: LivebodeError) -> None:
     message = str(error)
     assert message
     assert message.isprintable(), message
     assert len(message) < 1200, len(message)
+
+
+@contextmanager
+def printable() -> Iterator[None]:
+    try:
+        yield
+    except LivebodeError as error:
+        is_one_sentence(error)
+        raise
 
 
 def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
@@ -160,8 +172,8 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
             for axis in axes_of(text, path, {}).values():
                 used(axis)
             good += 1
-        except InputError as error:
-            refused(error)
+        except LivebodeError as error:
+            is_one_sentence(error)
         except BaseException:
             print(text.decode(errors="replace"))
             raise
@@ -170,31 +182,37 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "code", "facts"),
     [
-        (b"a = " + b"[" * 100_000, "not"),
-        (b"a = " + b"{a=" * 50_000 + b"1" + b"}" * 50_000, "nested too deeply"),
-        (b"[" + b"a." * 50_000 + b"a]\n", "nested too deeply"),
-        (b"a = " + b"9" * 10_000, "not TOML"),
-        (b"#" * (FILE_BYTES_MAX + 1), "longer than"),
-        (b"\xff\xfe", "not text"),
-        (b"a = 1\na = 2", "not TOML"),
-        (b"[source]\n[source]", "not TOML"),
-        (b"\x00", "not TOML"),
-        (b"[source]\nlog = 1979-05-27\n[signals]\noutput = 'y'", "source.log = datetime.date(1979, 5, 27)"),
-        (b"[source]\nlog = \"a\\u0000b\"\n[signals]\noutput = 'y'", "source.log"),
-        (b"[lines]\n" + b"\n".join(b"k%d = 1" % k for k in range(50_000)), "no setting 'lines.k0'"),
-        (b"\n".join(b"[axes.a%d]" % k for k in range(5000)), "more than 64"),
+        (b"a = " + b"{a=" * 50_000 + b"1" + b"}" * 50_000, "nested-too-deeply", {}),
+        (b"[" + b"a." * 50_000 + b"a]\n", "nested-too-deeply", {}),
+        (b"a = " + b"9" * 10_000, "not-toml", {}),
+        (b"#" * (FILE_BYTES_MAX + 1), "file-too-long", {"limit_bytes": FILE_BYTES_MAX}),
+        (b"\xff\xfe", "not-text", {}),
+        (b"a = 1\na = 2", "not-toml", {}),
+        (b"[source]\n[source]", "not-toml", {}),
+        (b"\x00", "not-toml", {}),
+        (b"[source]\nlog = 1979-05-27\n[signals]\noutput = 'y'", "value-invalid",
+         {"key": "source.log", "value": "datetime.date(1979, 5, 27)"}),
+        (b"[source]\nlog = \"a\\u0000b\"\n[signals]\noutput = 'y'", "value-invalid", {"key": "source.log"}),
+        (b"[lines]\n" + b"\n".join(b"k%d = 1" % k for k in range(50_000)), "key-unknown", {"key": "lines.k0"}),
+        (b"\n".join(b"[axes.a%d]" % k for k in range(5000)), "axes-invalid", {"count": 5000, "limit": 64}),
     ],
-    ids=range(13),
+    ids=range(12),
 )  # fmt: skip
-def test_hostile_configurations_are_refused(tmp_path: Path, data: bytes, says: str) -> None:
+def test_hostile_configurations_are_refused(tmp_path: Path, data: bytes, code: str, facts: dict) -> None:
     path = tmp_path / "axes.toml"
     path.write_bytes(data)
-    with pytest.raises(InputError) as caught:
+    with refused(ConfigError, code, **facts), printable():
         ConfigurationFile(path, {}).read()
-    refused(caught.value)
-    assert says in str(caught.value)
+
+
+def test_brackets_without_an_end_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "axes.toml"
+    path.write_bytes(b"a = " + b"[" * 100_000)
+    with pytest.raises(ConfigError) as caught, printable():  # Python's versions give up at another depth
+        ConfigurationFile(path, {}).read()
+    assert caught.value.code in ("config.not-toml", "config.nested-too-deeply")
 
 
 def test_the_seed_is_whole() -> None:

@@ -105,7 +105,7 @@ def test_lines_off_or_closer_than_the_grid_are_refused_with_the_nearest_choice()
     between = refused(lambda: choose(Wish(band_hz=(31, 49), resolution_hz=20), MACHINE), GridError)
     assert "nearest are 30 and 50 Hz" in between
     twice = refused(lambda: choose(Wish(lines="20, 20", window=400), MACHINE), GridError)
-    assert "more than once" in twice
+    assert "duplicated" in twice
 
 
 def test_typed_lines_that_no_window_fits_are_refused():
@@ -261,7 +261,7 @@ def test_a_wish_that_makes_no_sense_is_refused(excitation, words):
         ({"excitation": {}, "belt": {}, "loop": {}}, "leave out [loop]"),
         ({"excitation": {}, "measured": {"run": "x"}, "loop": {"velocity": {"foo": 1}}}, "known here: rate_hz"),
         ({"excitation": {}, "belt": {}, "signals": {"input": "w"}}, "are both 'w'"),
-        ({"excitation": {}, "belt": {}, "signals": {"output": "a\x7fb"}}, "names no channel"),
+        ({"excitation": {}, "belt": {}, "signals": {"output": "a\x7fb"}}, "cannot be the name of a channel"),
         ({"excitation": {}, "measured": {"noise": 1.0}}, "'measured.run' is missing"),
         ({"excitation": {}, "belt": {"mechanic": {}}}, "did you mean 'mechanics'?"),
         ({"excitation": {}, "belt": {"mechanics": {"load": 3}}}, "did you mean 'load_kg'?"),
@@ -321,13 +321,13 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
     for options, words in (
         (["--amplitude", "-1"], "amplitude_n_m=-1"),
         (["--band", "20-140"], "--band '20-140'"),
-        (["--to", "xlsx"], "'.xlsx' is not known"),
+        (["--to", "xlsx"], "'.xlsx' is not supported"),
         (["--name", "int"], "keyword or macro of C"),
         (["--name", "NULL", "--to", "h"], "take for example 'NULL_w'"),
         (["--name", "a,b", "--to", "csv"], "cannot head a column"),
-        (["--name", "../a", "--to", "csv"], "none of a file"),
-        (["--name", "/tmp/a", "--to", "npz"], "none of a file"),
-        (["--name", "", "--to", "npz"], "none of a file"),
+        (["--name", "../a", "--to", "csv"], "the name of a file"),
+        (["--name", "/tmp/a", "--to", "npz"], "the name of a file"),
+        (["--name", "", "--to", "npz"], "the name of a file"),
     ):
         done = livebode("design", experiment, "--out", out, *options)
         assert done.code == 2, done.err
@@ -343,22 +343,22 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
 def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experiment, tmp_path):
     out = tmp_path / "design"
     assert livebode("design", experiment, "--out", out).code == 0
-    assert "--force" in livebode("design", experiment, "--out", out).err
+    assert "exists already" in livebode("design", experiment, "--out", out).err
     assert livebode("design", experiment, "--out", out, "--amplitude", "0.5", "--force").code == 0
     assert json.loads((out / "design.json").read_text())["excitation"]["amplitude_n_m"] == 0.5
     (out / "log.parquet").write_text("an afternoon")
-    assert "also holds 'log.parquet'" in livebode("design", experiment, "--out", out, "--force").err
+    assert "also contains 'log.parquet'" in livebode("design", experiment, "--out", out, "--force").err
     assert (out / "log.parquet").read_text() == "an afternoon"
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "thesis.txt").write_text("years")
-    assert "not what an earlier design left" in livebode("design", experiment, "--out", mine, "--force").err
+    assert "not the directory of an earlier design" in livebode("design", experiment, "--out", mine, "--force").err
     assert (mine / "thesis.txt").read_text() == "years"
 
 
 def test_a_recording_may_not_be_named_as_a_file_of_the_design(experiment, tmp_path):
     whole = experiment.read_text()
-    for log, words in (("excitation.csv", "a file of the design"), ("", "no file of a recording")):
+    for log, words in (("excitation.csv", "a file of the design"), ("", "cannot be the file of a recording")):
         experiment.write_text(f'log = "{log}"\n{whole}')
         assert words in livebode("design", experiment, "--out", tmp_path / "design").err
 

@@ -16,11 +16,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, OutputError, RecordError, SignalError
 from livebode.export import at, save, write_csv, write_mat, write_netcdf, write_uff
 from livebode.fitting import mean_response
 from tests.command import livebode, signals, write_parquet
 from tests.responses import made
+from tests.support.errors import refused
 
 LINES = Lines.parse("20:140:20", 4000, 400)
 
@@ -42,8 +43,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "xarray"), "xarray is no file; in Python it is to_xarray"),
         (("--to", "control"), "control is no file; in Python it is mean_response(Run"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
-        (("--to", "csv", "--at", "nan"), "nan is not a moment"),
-        (("--to", "csv", "--at", "99"), "no valid response stands within half a window (0.05 s) of 99 s; the nearest"),
+        (("--to", "csv", "--at", "nan"), "nan is not finite; give seconds in the recording's clock"),
+        (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; take the nearest"),
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )
@@ -57,7 +58,7 @@ def test_what_cannot_be(run: Path, tmp_path: Path, options: tuple[str, ...], sen
 
 def test_no_run_and_no_file(run: Path, tmp_path: Path) -> None:
     assert "is not the directory of a run" in livebode("export", tmp_path, "--to", "csv").err
-    assert "is a directory; name a file with --out" in livebode("export", run, "--to", "csv", "--out", tmp_path).err
+    assert "is a directory" in livebode("export", run, "--to", "csv", "--out", tmp_path).err
     file = tmp_path / "file"
     file.write_text("")
     assert "could not be written: " in livebode("export", run, "--to", "csv", "--out", file / "a.csv").err
@@ -106,7 +107,7 @@ def test_a_disk_that_takes_no_more_of_one_function(tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9000, hard))
     try:
-        with pytest.raises(InputError, match="could not be written: File too large; nothing was left"):
+        with refused(OutputError, "not-written", reason="File too large"):
             save(tmp_path / "a.uff", lambda partial: write_uff(partial, [made(1, lines)]))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -131,7 +132,7 @@ def test_too_many_values_for_what_is_held_at_once(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("livebode.export.written.VALUES_MAX", 100)
     parts = [made(10, LINES), made(10, LINES)]
     for write, name in ((write_mat, "mat"), (write_netcdf, "netcdf")):
-        with pytest.raises(InputError, match=rf"more than 100 values .* as {name} at once; .*--mean.* or csv"):
+        with refused(OutputError, "too-large", format=name, limit=100):
             write(tmp_path / "a", parts)
     for write in (write_csv, write_uff):
         write(tmp_path / "a", parts)
@@ -139,15 +140,15 @@ def test_too_many_values_for_what_is_held_at_once(tmp_path: Path, monkeypatch: p
 
 def test_nothing_to_export(tmp_path: Path) -> None:
     for write in (write_csv, write_mat, write_netcdf):
-        with pytest.raises(InputError, match="no responses to export"):
+        with refused(RecordError, "no-responses"):
             write(tmp_path / "a", iter([]))
     invalid = made(5, LINES, hole=1.0)
-    with pytest.raises(InputError, match="no response has a valid line"):
+    with refused(SignalError, "no-valid-response"):
         at([invalid], 0.0)
-    with pytest.raises(InputError, match="none of the responses is valid at any line; track more periods"):
+    with refused(SignalError, "no-valid-response"):
         mean_response([invalid])
     invalid.valid[:, 0], invalid.value[:, 0] = True, 1.0
-    with pytest.raises(InputError, match="no response has 2 valid lines"):
+    with refused(SignalError, "too-few-lines", lines_min=2):
         write_uff(tmp_path / "a", [invalid])
 
 

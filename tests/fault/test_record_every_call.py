@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from tests.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
 
 SAMPLES = 2000
@@ -101,7 +101,7 @@ def test_a_call_that_fails_once_costs_nothing(folder: Path) -> None:
             if begun < at <= ended - BESIDE:
                 record_machine(machine(SAMPLES), out, tell=said.append)
             else:  # at its very beginning or end the user may be told
-                with suppress(InputError):
+                with suppress(LivebodeError):
                     record_machine(machine(SAMPLES), out, tell=said.append)
         kinds = [event.kind for event in said if event.kind not in CLOSING]
         unclosed += len(kinds) < len(said)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.design import Bearable, Wish, belt_machine, choose, worst, write
 from livebode.records import Run
 from livebode.session.experiment import Experiment
@@ -15,6 +15,7 @@ from livebode.simulation import BeltAxis, SimulatedAxis
 from tests.command import livebode, write_parquet
 from tests.experiments import extremes
 from tests.structured_text import Machine
+from tests.support.errors import refused
 
 RATE_HZ = 4000
 LOOP = """
@@ -131,20 +132,20 @@ def test_a_design_from_a_run_goes_on_as_the_run_was_described(runs):
 
 
 @pytest.mark.parametrize(
-    ("measured", "words"),
+    ("measured", "code", "facts"),
     [
-        ('run = "run-theta"', "output is a position, and its loop as described acts on a velocity"),
-        ('run = "run-theta"\noutput = "velocity"', "plant is in rad/(N m); leave it out"),
-        ('run = "run-speed"\noutput = "position"', "plant is in rad/s/(N m); leave it out"),
-        ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "is no torque"),
+        ('run = "run-theta"', "value-mismatch", {"key": "loop.position_pd", "value": "position"}),
+        ('run = "run-theta"\noutput = "velocity"', "value-mismatch", {"key": "measured.output", "unit": "rad/(N m)"}),
+        ('run = "run-speed"\noutput = "position"', "value-mismatch", {"key": "measured.output", "unit": "rad/s/(N m)"}),
+        ('run = "run-speed"\n[loop]\nexcitation_at = "velocity reference"', "value-invalid",
+         {"key": "loop.excitation_at", "value": "velocity reference"}),
     ],
-)
-def test_a_run_that_the_loop_does_not_fit_is_refused(runs, measured, words):
+)  # fmt: skip
+def test_a_run_that_the_loop_does_not_fit_is_refused(runs, measured, code, facts):
     found = Experiment.of({**tomllib.loads(f"{EXCITATION}[measured]\n{measured}\n")}, "here")
     found = found.model_copy(update={"measured": found.measured.model_copy(update={"run": runs / found.measured.run})})
-    with pytest.raises(InputError) as caught:
+    with refused(ConfigError, code, **facts):
         found.machine()
-    assert words in str(caught.value)
 
 
 def test_a_design_from_an_indirect_run_needs_no_input(runs):

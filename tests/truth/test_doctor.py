@@ -200,7 +200,7 @@ def test_a_run_is_read_and_what_is_damaged_is_named(tmp_path: Path) -> None:
 
 
 def test_two_configurations_at_once_are_refused() -> None:
-    with refused(UsageError, "conflict"):
+    with refused(UsageError, "too-many", argument="targets"):
         Subject.of([Path("a.toml"), Path("b.toml")])
 
 

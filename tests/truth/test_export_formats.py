@@ -16,10 +16,11 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings
 
-from livebode.core import InputError, Lines, Responses
+from livebode.core import Lines, Responses, SignalError
 from livebode.export import at, to_xarray, write_csv, write_mat, write_netcdf, write_uff
 from livebode.sources import open_log
 from tests.responses import any_responses, cut, made
+from tests.support.errors import refused
 
 ABOUT = {"configuration": {"signals": {"output": "ω", "input": "iq"}}, "found": {"unit": "µm"}}
 SOME = settings(max_examples=40, deadline=None)
@@ -126,7 +127,7 @@ def test_uff_has_every_function_with_two_valid_lines(
     path = tmp_path_factory.mktemp("uff") / "a.uff"
     kept = [response for response in responses if response.valid.sum() >= 2]
     if not kept:
-        with pytest.raises(InputError, match="no response has 2 valid lines, which UFF 58 needs"):
+        with refused(SignalError, "too-few-lines", lines_min=2):
             write_uff(path, [responses], ABOUT)
         return
     assert write_uff(path, cut(responses, 1), ABOUT) == (len(kept), len(responses) - len(kept))

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode.core import Block, Channel, InputError, Lines
+from livebode.core import BaselineError, Block, Channel, Lines
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Machine, Rows, learn_table
 from livebode.monitoring.accuracy import Accuracy
@@ -24,6 +24,7 @@ from livebode.sources.live import Batch
 from livebode.sources.live.ndjson import encode_line
 from tests.command import Result, livebode, write_parquet
 from tests.monitored import recorded
+from tests.support.errors import refused
 
 SIGNALS = ["--excitation", "w", "--input", "u", "--output", "velocity"]
 OPTIONS = [*SIGNALS, "--lines", "20:140:20", "--window", "400", "--noise", "quiet"]
@@ -142,7 +143,7 @@ def _not_fitted(toml: Path, base: Path, tmp_path: Path) -> None:
     alone = livebode("run", toml, "--false-alarms", "once a year", "--average", "--out", tmp_path / "four")
     assert "'once a year' has no effect without one" in alone.out
     averaged = livebode("learn", tmp_path / "four", "--out", tmp_path / "x.json")
-    assert (averaged.code, "was made with --average" in averaged.err) == (2, True)
+    assert (averaged.code, "was created with tracking.average" in averaged.err) == (2, True)
 
 
 def _refusals(tmp_path: Path, log: Path) -> None:
@@ -189,16 +190,16 @@ def test_axis_toml_names_the_baseline(tmp_path: Path) -> None:
 
 def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
-    for text, word in (
-        ("{", "is not a baseline"),
-        ("[]", "is not a baseline"),
-        ('{"format": "livebode baseline", "version": 99}', "version 99"),
-        ('{"format": "livebode baseline", "version": 4}', "damaged"),
+    for text, code, facts in (
+        ("{", "not-a-baseline", {}),
+        ("[]", "not-a-baseline", {}),
+        ('{"format": "livebode baseline", "version": 99}', "version", {"version": 99}),
+        ('{"format": "livebode baseline", "version": 4}', "damaged", {"key": "lines"}),
     ):
         path.write_text(text, encoding="utf-8")
-        with pytest.raises(InputError, match=word):
+        with refused(BaselineError, code, path=str(path), **facts):
             Baseline.load(path)
-    with pytest.raises(InputError, match="there is no baseline"):
+    with refused(BaselineError, "absent", path=str(tmp_path / "missing.json")):
         Baseline.load(tmp_path / "missing.json")
 
 
@@ -240,8 +241,9 @@ def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: 
     if value is not None:
         part[name] = value
     path.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(InputError) as found:
+    with pytest.raises(BaselineError) as found:
         Baseline.load(path)
+    assert (found.value.code, found.value.key) == ("baseline.damaged", at)
     assert str(found.value) == f"the baseline {str(path)!r} is damaged: {words}; learn it again"
 
 

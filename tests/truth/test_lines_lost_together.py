@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Block, Channel, InputError, Responses
+from livebode.core import Block, Channel, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
@@ -16,6 +16,7 @@ from livebode.session.averaged import averaged
 from tests.command import livebode
 from tests.reports import write_run
 from tests.responses import cut
+from tests.support.errors import refused
 
 RATE_HZ, N = 4000.0, 800
 LINES = odd_lines(20, 140, RATE_HZ, N, seed=1)
@@ -47,18 +48,18 @@ def test_lines_that_become_invalid_together_have_no_mean_and_the_reason_is_given
     responses = tracked(block(coarse(periods)), average=average)
     assert responses.valid[N // 200].all()  # before the first verdict
     assert not responses.valid[-1].any()
-    with pytest.raises(InputError, match="repeats with the excitation"):
+    with refused(SignalError, "no-valid-response"):
         mean_response(cut(responses, 3, 5))
 
 
 def test_a_run_and_its_export_have_no_average_either(tmp_path: Path) -> None:
     responses = tracked(block(coarse(20)))
     run = write_run(tmp_path / "run", responses)
-    with pytest.raises(InputError, match="repeats with the excitation"):
+    with refused(SignalError, "no-valid-response"):
         averaged(Run.open(run))
-    refused = livebode("export", run, "--to", "csv", "--mean", "--out", tmp_path / "mean.csv")
-    assert refused.code == 2
-    assert "repeats with the excitation" in refused.err
+    done = livebode("export", run, "--to", "csv", "--mean", "--out", tmp_path / "mean.csv")
+    assert done.code == 2
+    assert "repeats with the excitation" in done.err
     assert livebode("query", run, "SELECT DISTINCT distortion FROM responses WHERE NOT valid", "--json").code == 0
 
 

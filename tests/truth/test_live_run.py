@@ -98,7 +98,7 @@ def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
     process = started(path, tmp_path / "live")
     _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
     assert process.returncode == 2
-    assert b"give lines.frequencies and lines.window for a live source" in err
+    assert b"set lines.frequencies and lines.window for a live source" in err
     assert not (tmp_path / "live").exists()
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from examples.kernel_drive import KernelDrive
-from livebode.core import Block, Channel, InputError, Lines, SpectraLayout
+from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.records import Run
@@ -30,6 +30,7 @@ from tests.contract.test_live_contract import fed
 from tests.peers.broker import MqttPeer
 from tests.peers.peer import PATIENCE_S, Peer
 from tests.peers.plain import TcpPeer, UdpPeer
+from tests.support.errors import refused
 from tests.truth.test_learn_command import _small
 from tests.truth.test_live_run import started, table
 
@@ -263,19 +264,24 @@ def configured(text: str) -> Axis:
 
 
 @pytest.mark.parametrize(
-    ("more", "message"),
+    ("more", "code", "facts"),
     [
-        ("[motion]\nradius_m = 0.019\n", r"\[motion\] drives its model with samples"),
-        ("[record]\nsamples = true\n", r"record\.samples keeps samples"),
-        ("[lines]\nwindow = 800\n", r"lines\.window is 800, and the drive's is 400"),
-        ('[lines]\nfrequencies = "20:120:20"\n', r"and the drive's are 20, 40, 60, 80, 100, 120, 140 Hz"),
-        ('[lines]\nfrequencies = "25"\n', "not on the 10 Hz grid"),
-        ("hop = 20\n", r"tracking\.hop is 20, and the drive's is 200"),
+        ("[motion]\nradius_m = 0.019\n", "needs-samples", {"key": "motion"}),
+        ("[record]\nsamples = true\n", "needs-samples", {"key": "record.samples"}),
+        ("[lines]\nwindow = 800\n", "value-mismatch", {"key": "lines.window", "value": 800, "allowed": 400}),
+        ('[lines]\nfrequencies = "20:120:20"\n', "value-mismatch",
+         {"key": "lines.frequencies", "value": "20:120:20", "allowed": "20, 40, 60, 80, 100, 120, 140 Hz"}),
+        ("hop = 20\n", "value-mismatch", {"key": "tracking.hop", "value": 20, "allowed": 200}),
     ],
-)
-def test_what_the_frames_do_not_say_is_refused(more: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+)  # fmt: skip
+def test_what_the_frames_do_not_say_is_refused(more: str, code: str, facts: dict) -> None:
+    with refused(ConfigError, code, **facts):
         check_spectra(configured(REST + more), layout(), 4000.0)
+
+
+def test_a_line_off_the_grid_of_the_frames_is_refused() -> None:
+    with refused(GridError, "line-off", frequency_hz=25.0, resolution_hz=10.0):
+        check_spectra(configured(REST + '[lines]\nfrequencies = "25"\n'), layout(), 4000.0)
 
 
 def test_lines_are_taken_from_the_frames_or_must_be_theirs() -> None:

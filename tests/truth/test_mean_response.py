@@ -14,11 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
-from livebode.core import Block, InputError, Lines, Response, Responses
+from livebode.core import Block, Lines, Response, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
 from tests.responses import any_responses, cut, made
+from tests.support.errors import refused
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 RUNS, PERIODS, SIGMA = 400, 20, 0.1
@@ -93,7 +94,7 @@ def test_bounds_hold_after_a_few_periods(periods: int) -> None:
 @given(any_responses(), st.lists(st.integers(0, 6), max_size=3))
 def test_sigma_is_that_of_the_formula_for_every_cut(responses: Responses, at: list[int]) -> None:
     if not responses.valid.any():
-        with pytest.raises(InputError, match="none of the responses is valid"):
+        with refused(SignalError, "no-valid-response"):
             mean_response(cut(responses, *at))
         return
     found = mean_response(cut(responses, *at))[0]

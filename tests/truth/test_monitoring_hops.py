@@ -8,11 +8,12 @@ from functools import cache
 
 import pytest
 
-from livebode.core import Block, Event, InputError
+from livebode.core import BaselineError, Block, Event
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.simulation import Fault, SimulatedAxis, Strokes, TensionLoss
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, SPEED_M_PER_S, axis
+from tests.support.errors import refused
 
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet", hop=20)
 LEARNED_S, JUDGED_S = 120.0, 24.0
@@ -68,9 +69,7 @@ def test_the_same_change_is_told_at_every_hop() -> None:
 
 @pytest.mark.parametrize(("learned", "hop"), [(20, 800), (400, 89), (100, 89), (800, 1200)])
 def test_windows_that_the_baseline_does_not_know_are_refused(learned: int, hop: int) -> None:
-    with pytest.raises(
-        InputError, match=rf"learned with hop {learned}, and this run has {hop}, .*; take hop {learned}"
-    ):
+    with refused(BaselineError, "settings-differ", setting="hop", learned=learned, value=hop):
         Monitor(replace(baseline(20), hop=learned), replace(SETTINGS, hop=hop))
 
 

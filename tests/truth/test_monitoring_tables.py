@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import InputError
+from livebode.core import BaselineError
 from livebode.monitoring import Rows, TableMonitor, learn_table, seconds_between
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
+from tests.support.errors import refused
 
 NAMES = ("20 Hz", "60 Hz", "100 Hz")
 TRUE = np.array([1.4 + 0.2j, 4.0 - 1.0j, 0.5 - 1.1j])
@@ -173,7 +174,7 @@ def test_a_change_is_found_as_soon_as_information_allows() -> None:
 
 
 def test_too_little_is_refused() -> None:
-    with pytest.raises(InputError, match="give longer runs"):
+    with refused(BaselineError, "too-few-windows", quantity="lines"):
         learn_table("lines", NAMES, [made(20, 11)])
-    with pytest.raises(InputError, match="hold 0 windows"):
+    with refused(BaselineError, "too-few-windows", windows=0):
         learn_table("lines", NAMES, [])

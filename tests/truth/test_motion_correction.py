@@ -7,12 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from livebode.core import PID, Block, InputError, Loop, Responses
+from livebode.core import PID, Block, LivebodeError, Loop, Responses, SignalError, SimulationError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from studies.motion import LINES, SETTINGS, corrected, judge
 from tests.axes import MULTISINE
+from tests.support.errors import refused
 
 
 def stroke(sigma: float = 0.0, seed: int = 1, seconds: float = 4.15, **options: object) -> tuple[BeltAxis, Block]:
@@ -120,25 +121,25 @@ def test_what_cannot_be_is_refused() -> None:
     def settings(**options: object) -> Settings:
         return Settings(**{"lines": LINES, "output": "y", "input": "u", "excitation": "w", "schedule": "x"} | options)
 
-    with pytest.raises(InputError, match="position"):
+    with refused(UsageError, "missing", argument="schedule"):
         MotionCorrection(settings(schedule=None), radius_m=0.019)
     for name, value in (("average", True), ("quantity", "sensitivity")):
-        with pytest.raises(InputError, match=f"{name}={value!r} cannot be corrected for motion; take"):
+        with refused(UsageError, "conflict", argument=name, value=value):
             MotionCorrection(settings(**{name: value}), radius_m=0.019)
-    with pytest.raises(InputError, match="describe the feedback"):
+    with refused(SimulationError, "loop-unsupported", key="loop.feedback"):
         MotionCorrection(settings(), radius_m=0.019, driven_by="excitation")
-    with pytest.raises(InputError, match="radius_m"):
+    with refused(UsageError, "out-of-range", argument="radius_m", value=0.0):
         MotionCorrection(settings(), radius_m=0.0)
-    with pytest.raises(InputError, match="two windows"):
+    with refused(UsageError, "out-of-range", argument="chunk_samples", value=500):
         MotionCorrection(settings(), radius_m=0.019, chunk_samples=500)
-    with pytest.raises(InputError, match="passes"):
+    with refused(UsageError, "out-of-range", argument="passes", value=0):
         MotionCorrection(settings(), radius_m=0.019, passes=0)
-    with pytest.raises(InputError, match="splines"):
+    with refused(UsageError, "out-of-range", argument="damping_splines", value=2):
         MotionCorrection(settings(), radius_m=0.019, damping_splines=2)
-    with pytest.raises(InputError, match="no samples"):
+    with refused(SignalError, "too-short"):
         MotionCorrection(settings(), radius_m=0.019).finish()
     filtered = PID(gain=0.2, derivative_time_s=0.1, rate_hz=4000)
-    with pytest.raises(InputError, match="can be simulated"):
+    with refused(SimulationError, "loop-unsupported", key="loop.feedback"):
         MotionCorrection(settings(loop=Loop(filtered)), radius_m=0.019, driven_by="excitation")
-    with pytest.raises(InputError, match="no channel"):
+    with pytest.raises(LivebodeError, match="no channel"):
         MotionCorrection(settings(), radius_m=0.019).process(Block(np.zeros((1, 10)), ("w",), 4000.0))

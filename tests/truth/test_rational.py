@@ -6,9 +6,10 @@ import control
 import numpy as np
 import pytest
 
-from livebode.core import InputError, Lines, Responses
+from livebode.core import FitError, Lines, Responses, UsageError
 from livebode.fitting import Grid, Rational, TwoMass, fit_rational, rational_of
 from livebode.fitting.hold import to_discrete
+from tests.support.errors import refused
 from tests.truth.test_fits import TRUTH, noisy
 
 RATE_HZ = 2000.0
@@ -85,16 +86,16 @@ def test_a_fit_of_too_low_an_order_says_so_by_epsilon() -> None:
 
 def test_what_cannot_be_is_refused_and_what_is_missing_is_no_response() -> None:
     good = noisy(held(), LINES, 1e-3, 2)
-    for options, says in (
-        ({"order": 0}, "order=0"),
-        ({"order": 3, "numerator_order": 3}, "numerator order 3"),
-        ({"order": 3, "method": "arx"}, "method='arx'"),
-        ({"order": 20}, "lines are too few"),
+    for argument, options in (
+        ("order", {"order": 0}),
+        ("order", {"order": 3, "numerator_order": 3}),
+        ("method", {"order": 3, "method": "arx"}),
     ):
-        few = good if "few" not in says else noisy(np.ones(7) + 0j, Lines.parse("20:140:20", 4000, 400), 0.1, 1)
-        with pytest.raises(InputError) as refused:
-            fit_rational(few, **options)
-        assert says in str(refused.value)
+        code = "out-of-range" if argument == "order" else "not-one-of"
+        with refused(UsageError, code, argument=argument, value=options[argument]):
+            fit_rational(good, **options)
+    with refused(FitError, "too-few-lines", lines=7):
+        fit_rational(noisy(np.ones(7) + 0j, Lines.parse("20:140:20", 4000, 400), 0.1, 1), order=20)
     valid = good.valid.copy()
     valid[0, 3:] = False
     found = fit_rational(Responses(**{**vars(good), "valid": valid}), order=3)

@@ -110,10 +110,13 @@ def ran(tmp_path: Path, columns: dict, *arguments: object) -> Result:
     ("arguments", "words"),
     [
         (("--excitation", "w", "--input", "u", "--output", "w"), "'w' is both the excitation and the output"),
-        (("--excitation", "w", "--input", "w", "--output", "y"), "take --estimator direct with that input alone"),
+        (
+            ("--excitation", "w", "--input", "w", "--output", "y"),
+            "to 'direct' and name that input alone",
+        ),
         (
             ("--excitation", "w", "--input", "u", "--output", "copy"),
-            "'w' (excitation) and 'copy' (output) hold",
+            "'w' (excitation) and 'copy' (output) have the same samples",
         ),
         (("--excitation", "moved", "--input", "u", "--output", "y"), "'moved' does not repeat like an excitation: 0"),
         (("--input", "noise", "--output", "y", "--estimator", "direct"), "'noise' is noise at all 3 lines"),
@@ -130,7 +133,7 @@ def test_wrong_roles_end_with_2(tmp_path: Path, arguments: tuple, words: str) ->
     refused = ran(tmp_path, columns, *arguments)
     assert (refused.code, refused.err.count("\n")) == (2, 1), refused
     assert words in refused.err
-    assert "--accept-roles" in refused.err
+    assert "tracking.accept_roles" in refused.err
     assert not (tmp_path / "run").exists()
 
 
@@ -139,7 +142,7 @@ def test_accepted_roles_run_and_the_record_says_what_was_suspected(tmp_path: Pat
     columns["copy"] = columns["w"]
     arguments = ("--excitation", "w", "--input", "u", "--output", "copy", "--accept-roles")
     done = ran(tmp_path, columns, *arguments)
-    assert (done.code, "hold the same samples" in done.err) == (0, True)
+    assert (done.code, "have the same samples" in done.err) == (0, True)
     assert events(tmp_path) == ["roles-doubtful"]
     assert json.loads((tmp_path / "run" / "run.json").read_text())["configuration"]["tracking"]["accept_roles"]
 

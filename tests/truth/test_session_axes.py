@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Lines
+from livebode.core import ConfigError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
+from livebode.session.configuration import axes_of
 from tests.command import livebode, signals, write_parquet
 from tests.peers.machine import Machine
 from tests.peers.peer import free_port
@@ -137,27 +138,37 @@ def test_recordings_beside_each_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("axes", "says"),
+    ("axes", "code", "facts", "place"),
     [
-        ("axes = 3", "no table of axes"),
-        ("[axes]", "no table of axes"),
-        ('[axes."../x"]\nsource.url = "udp://h:1"', "names a directory"),
-        ('[axes.x-2]\nsource.url = "udp://h:1"', "take 'x_2'"),
-        ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "nothing but capitals"),
-        ('[axes.x]\nsource.url = "udp://h:1"\nlines.windw = 3', "axis x: there is no setting 'lines.windw'"),
-        ("[axes.x]\nlines.window = 3", "axis x: 'source' is missing"),
-        (
-            '[axes.x]\nsource.url = "udp://h:1"\nfit.model = "two-masses"',
-            "axis x: [fit]: there is no model 'two-masses'",
-        ),
-        (
-            '[axes.x]\nsource.url = "udp://h:1"\nfit = {model = "rigid", fixed = {Jx = 1.0}}',
-            "no parameter 'Jx'",
-        ),
+        ("axes = 3", "axes-invalid", {"key": "axes"}, ""),
+        ("[axes]", "axes-invalid", {"key": "axes"}, ""),
+        ('[axes."../x"]\nsource.url = "udp://h:1"', "axis-name-invalid", {"value": "'../x'"}, ""),
+        ('[axes.x-2]\nsource.url = "udp://h:1"', "axis-name-invalid", {"value": "x-2"}, ""),
+        ('[axes.x]\nsource.url = "udp://h:1"\n[axes.X]\nsource.url = "udp://h:2"', "axis-name-invalid",
+         {"names": ["x", "X"]}, ""),
+        ('[axes.x]\nsource.url = "udp://h:1"\nlines.windw = 3', "key-unknown", {"key": "lines.windw"}, ", axis x"),
+        ("[axes.x]\nlines.window = 3", "key-missing", {"key": "source"}, ", axis x"),
+    ],
+)  # fmt: skip
+def test_axes_that_cannot_be(tmp_path: Path, axes: str, code: str, facts: dict, place: str) -> None:
+    path = tmp_path / "axes.toml"
+    with pytest.raises(ConfigError) as caught:
+        axes_of(f"{axes}\n{SHARED}".encode(), path, {})
+    error = caught.value
+    assert (error.code, error.place) == (f"config.{code}", f"{path}{place}")
+    assert facts.items() <= error.facts.items()
+    assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("fit", "says"),
+    [
+        ('fit.model = "two-masses"', "axis x: [fit]: there is no model 'two-masses'"),
+        ('fit = {model = "rigid", fixed = {Jx = 1.0}}', "no parameter 'Jx'"),
     ],
 )
-def test_axes_that_cannot_be(tmp_path: Path, axes: str, says: str) -> None:
-    (tmp_path / "axes.toml").write_text(f"{axes}\n{SHARED}")
+def test_a_fit_that_cannot_be_is_refused_before_anything_starts(tmp_path: Path, fit: str, says: str) -> None:
+    (tmp_path / "axes.toml").write_text(f'[axes.x]\nsource.url = "udp://h:1"\n{fit}\n{SHARED}')
     result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
     assert result.code == 2
     assert says in result.err

@@ -123,7 +123,7 @@ def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine) + silent) as running:
         running.tracked("x", 300)
         running.edit(one(machine) + silent.replace("3600", "1800"))
-        assert "axis z: it has sent no samples yet" in running.told("x", "configuration-refused").message
+        assert "axis z: the live source has sent no samples yet" in running.told("x", "configuration-refused").message
         running.edit(one(machine) + FIT + silent)
         running.tracked("x-2", 300)
         running.edit(one(machine) + FIT)

@@ -240,26 +240,3 @@ def test_samples_and_other_layouts_are_refused(record: Block) -> None:
     other = SpectraTracker(described(20), layout(quiet=()))
     with pytest.raises(InputError, match="other settings"):
         other.restore(tracker.snapshot())
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"signals": ()}, "spectra of no signal"),
-        ({"signals": (Channel("y"), Channel("y", "m"))}, "share a name"),
-        ({"values": (Channel("y", "deg"),)}, "share a name"),
-        ({"window": 2}, "window=2"),
-        ({"hop": 30}, "hop=30 neither divides the window of 400 samples nor is a multiple of it"),
-        ({"hop": 0}, "hop=0"),
-        ({"lines": ()}, "without a line"),
-        ({"lines": (4, 2)}, "not ascending"),
-        ({"lines": (2, 200)}, "bin 200 is not between"),
-        ({"quiet": (2,)}, "bin 2 is named as a line and as quiet"),
-        ({"subtracted": (1.0,)}, "as many constants"),
-        ({"subtracted": (1.0, float("nan"), 0.0)}, "not finite"),
-    ],
-)
-def test_layouts_that_cannot_be_are_refused(options: dict, message: str) -> None:
-    given = {"signals": SIGNALS, "values": (), "window": 400, "hop": 20, "lines": (2, 4)} | options
-    with pytest.raises(InputError, match=message):
-        SpectraLayout(**given)

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Lines
+from livebode.core import Lines, RecordingError
 from livebode.design import Waveform, write
 from livebode.excitation import multisine
+from livebode.session.designed import read_designed
 from livebode.structured_text import multisine as block_text
 from tests.command import livebode
 from tests.structured_text import Machine
+from tests.support.errors import refused
 
 LINES = Lines((1, 3, 7), 20, rate_hz=1000.0)
 PERIOD = multisine(LINES, [0.3, 0.2, 0.1], "random", seed=3)
@@ -90,14 +92,14 @@ def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("axis", "more", "said"),
     [
-        (RATED, ("--rate", 1000, "--amplitude", 1), "--rate says 1000 Hz, but source.rate_hz 2000 Hz"),
+        (RATED, ("--rate", 1000, "--amplitude", 1), "is 1000 Hz, but source.rate_hz 2000 Hz"),
         (AXIS, ("--rate", 4000, "--amplitude", 1), "makes 1000 Hz, but the samples come at 4000 Hz"),
-        (AXIS, ("--rate", 4000, FILE), "--rate says 4000 Hz, but the designed excitation 1000 Hz"),
-        (RATED, (FILE,), "the designed excitation says 1000 Hz, but source.rate_hz 2000 Hz"),
+        (AXIS, ("--rate", 4000, FILE), "is 4000 Hz, but the designed excitation 1000 Hz"),
+        (RATED, (FILE,), "the designed excitation is 1000 Hz, but source.rate_hz 2000 Hz"),
         (AXIS.replace("window = 20", "window = 40"), (FILE,), "lines.window is 40, but the design's period has 20"),
         (AXIS.replace("50, 150, 350", "50, 100"), (FILE,), "the design does not excite 100 Hz"),
-        (AXIS, (FILE, "--amplitude", 1), "give either --amplitude SIZE"),
-        (AXIS, ("--rate", 1000), "give either --amplitude SIZE"),
+        (AXIS, (FILE, "--amplitude", 1), "both or neither of amplitude and designed"),
+        (AXIS, ("--rate", 1000), "both or neither of amplitude and designed"),
         (AXIS, (FILE, "--limit", 0.1), "exceeds limit=0.1"),
         (AXIS, ("--rate", 0, "--amplitude", 1), "rate_hz=0.0 is not above 0"),
         (AXIS, ("--rate", 1000, "--amplitude", -0.3), "amplitude=-0.3 is not a finite number from"),
@@ -126,34 +128,39 @@ with io.BytesIO(archive(**WHOLE)) as whole, zipfile.ZipFile(whole) as members:
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    "data",
     [
-        (None, "could not be read: No such file"),
-        (b"", "is no .npz that"),
-        (b"t,w\n0,1\n", "is no .npz that"),
-        (CUT, "is no .npz that"),
-        (archive(samples=PERIOD), "is no .npz that"),
-        (archive(**WHOLE | {"facts": "[1, 2"}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": "[1, 2]"}), "is no .npz that"),
-        (archive(**WHOLE | {"samples": PERIOD + 1j}), "is no .npz that"),
-        (archive(**WHOLE | {"samples": PERIOD * np.nan}), "is no .npz that"),
-        (archive(**WHOLE | {"samples": PERIOD.astype(str)}), "is no .npz that"),
-        (archive(**WHOLE | {"samples": np.array([{}], object)}), "is no .npz that"),
-        (archive(**WHOLE | {"frequency_hz": np.array([50, 1e300])}), "is no .npz that"),
-        (archive(**WHOLE | {"rate_hz": np.zeros(1)}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": None})}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": "long"})}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": 1e300})}), "is no .npz that"),
-        (archive(**WHOLE | {"facts": json.dumps({"ramp_s": -5})}), "is no .npz that"),
+        b"",
+        b"t,w\n0,1\n",
+        CUT,
+        archive(samples=PERIOD),
+        archive(**WHOLE | {"facts": "[1, 2"}),
+        archive(**WHOLE | {"facts": "[1, 2]"}),
+        archive(**WHOLE | {"samples": PERIOD + 1j}),
+        archive(**WHOLE | {"samples": PERIOD * np.nan}),
+        archive(**WHOLE | {"samples": PERIOD.astype(str)}),
+        archive(**WHOLE | {"samples": np.array([{}], object)}),
+        archive(**WHOLE | {"frequency_hz": np.array([50, 1e300])}),
+        archive(**WHOLE | {"rate_hz": np.zeros(1)}),
+        archive(**WHOLE | {"facts": json.dumps({"ramp_s": None})}),
+        archive(**WHOLE | {"facts": json.dumps({"ramp_s": "long"})}),
+        archive(**WHOLE | {"facts": json.dumps({"ramp_s": 1e300})}),
+        archive(**WHOLE | {"facts": json.dumps({"ramp_s": -5})}),
     ],
 )
-def test_a_file_that_is_no_design_is_refused_in_a_sentence(data: bytes | None, said: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_design_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "mine.npz"
+    path.write_bytes(data)
+    with refused(RecordingError, "not-an-excitation", path=str(path)):
+        read_designed(path)
+
+
+def test_a_design_that_does_not_exist_is_refused_by_the_command(tmp_path: Path) -> None:
     (tmp_path / "axis.toml").write_text(AXIS)
     path = tmp_path / "mine.npz"
-    if data is not None:
-        path.write_bytes(data)
     done = livebode("plc", tmp_path / "axis.toml", "--limit", 2, "--excitation", path, "--out", tmp_path / "plc")
-    assert (done.code, said in " ".join(done.err.split())) == (2, True), done.err
+    assert (done.code, done.err.count("\n")) == (2, 1), done.err
+    assert f"there is no file {path}" in done.err
 
 
 def test_a_ramp_as_long_as_the_counter_holds_is_taken() -> None:

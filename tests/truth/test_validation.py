@@ -9,7 +9,7 @@ import pytest
 from scipy import linalg, signal
 
 from examples.closed_loop import RATE_HZ, Drive, Plant
-from livebode.core import Block, InputError, Lines, Loop, Response
+from livebode.core import Block, Lines, Loop, Response, SignalError
 from livebode.excitation import multisine
 from livebode.fitting import Fit, fit
 from livebode.fitting.transfer import Transfer
@@ -17,6 +17,7 @@ from livebode.validation import validate
 from livebode.validation.chain import respond
 from livebode.validation.correlation import correlation, own_correlation
 from livebode.validation.simulate import simulate
+from tests.support.errors import refused
 
 LINES = Lines.parse("20:140:5", RATE_HZ, 800)
 W = multisine(Lines.parse("20:140:20", RATE_HZ, 400))
@@ -229,11 +230,11 @@ def test_signals_logged_a_tick_apart_are_put_together() -> None:
 
 def test_what_cannot_be_judged_is_refused() -> None:
     columns = loop(20)[0]
-    with pytest.raises(InputError, match="record alike"):
+    with refused(SignalError, "rate-differs", rate_hz=1000.0, fit_rate_hz=RATE_HZ):
         validate(fitted(1e-6), Block(columns, CHANNELS, 1000.0), input="u", output="y")
-    with pytest.raises(InputError, match="finite ones in a row"):
+    with refused(SignalError, "too-short", samples=300):
         judged(fitted(1e-6), columns[:, :300])
     broken = columns.copy()
     broken[2, 5] = np.nan
-    with pytest.raises(InputError, match="finite ones in a row"):
+    with refused(SignalError, "not-finite"):
         judged(fitted(1e-6), broken)

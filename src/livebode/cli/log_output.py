@@ -95,7 +95,7 @@ def _opened(file: Path) -> logging.Handler:
         return _FileHandler(file, maxBytes=FILE_BYTES_MAX, backupCount=1, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise OutputError(
-            "not-writable",
+            "not-written",
             f"the log file {str(file)!r} cannot be opened: {error.strerror}",
             "check its directory and permissions",
             path=str(file),

@@ -1,6 +1,6 @@
 """What every floor above works with: samples, lines, responses, loops, events, errors."""
 
-from livebode.core.block import Block, Channel, missing_channel
+from livebode.core.block import Block, Channel, missing_channel, nearest_channel
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
     BaselineError,
@@ -71,6 +71,7 @@ __all__ = [
     "as_model",
     "counted",
     "missing_channel",
+    "nearest_channel",
     "rms",
     "rounded_down",
     "widened",

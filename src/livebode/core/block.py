@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.errors import InputError
+from livebode.core.errors import SignalError, UsageError
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Block:
 
     Raises
     ------
-    InputError
+    UsageError
         If names repeat, shapes disagree, or the rate is not a positive number.
 
     Examples
@@ -63,16 +63,40 @@ class Block:
     def __post_init__(self) -> None:
         data = np.asarray(self.data, dtype=np.float64).view()
         if data.ndim != 2:
-            raise InputError(f"a block's data has shape {data.shape}; give (channels, samples)")
+            raise UsageError(
+                "wrong-shape",
+                f"a block's data has shape {data.shape}",
+                "give (channels, samples)",
+                argument="data",
+                shape=list(data.shape),
+            )
         data.flags.writeable = False
         channels = tuple(c if isinstance(c, Channel) else Channel(c) for c in self.channels)
         names = [channel.name for channel in channels]
         if len(names) != len(data):
-            raise InputError(f"{len(names)} channel names for {len(data)} rows of data; give one for each row")
+            raise UsageError(
+                "wrong-shape",
+                f"{len(names)} channel names for {len(data)} rows of data",
+                "give one for each row",
+                argument="channels",
+                shape=list(data.shape),
+            )
         if repeated := sorted({name for name in names if names.count(name) > 1}):
-            raise InputError(f"channel name {repeated[0]!r} stands more than once; rename one of them")
+            raise UsageError(
+                "duplicate",
+                f"channel name {repeated[0]!r} is duplicated",
+                "rename one of the channels",
+                argument="channels",
+                value=repeated[0],
+            )
         if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(f"rate_hz={self.rate_hz} is not a positive number of samples per second")
+            raise UsageError(
+                "out-of-range",
+                f"rate_hz={self.rate_hz} is not a positive number of samples per second",
+                "specify the rate",
+                argument="rate_hz",
+                value=self.rate_hz,
+            )
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "channels", channels)
 
@@ -97,11 +121,17 @@ class Block:
         return self.origin_s + np.arange(self.start, self.stop) / self.rate_hz
 
     def index(self, name: str) -> int:
-        """Row of the channel `name`; InputError with the nearest name where it is missing."""
+        """Row of the channel `name`; SignalError with the nearest name where it is missing."""
         try:
             return self.names.index(name)
         except ValueError:
-            raise InputError(missing_channel(name, self.names)) from None
+            raise SignalError(
+                "channel-unknown",
+                f"there is no channel {name!r}",
+                nearest_channel(name, self.names),
+                channel=name,
+                allowed=list(self.names),
+            ) from None
 
     def cut(self, first: int, last: int) -> Block:
         """Samples at positions first … last − 1 of this block, without a copy."""
@@ -110,13 +140,22 @@ class Block:
 
 
 def missing_channel(name: str, names: Iterable[str]) -> str:
-    """The sentence for a channel that is not there, with the nearest name.
+    """The sentence for a channel that does not exist, with the nearest name.
 
     >>> missing_channel("iq_adX", ["iq_adx", "theta_mx"])
     "there is no channel 'iq_adX'; did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
+    """
+    return f"there is no channel {name!r}; {nearest_channel(name, names)}"
+
+
+def nearest_channel(name: str, names: Iterable[str]) -> str:
+    """The remedy for a channel that does not exist.
+
+    >>> nearest_channel("iq_adX", ["iq_adx", "theta_mx"])
+    "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
     """
     known = list(names)
     folded = {k.casefold(): k for k in known}
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
     hint = f"did you mean {folded[near[0]]!r}? " if near else ""
-    return f"there is no channel {name!r}; {hint}Channels: {', '.join(known) or 'none'}"
+    return f"{hint}Channels: {', '.join(known) or 'none'}"

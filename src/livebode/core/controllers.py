@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core.errors import InputError
+from livebode.core.errors import UsageError
 from livebode.core.model import Algebra
 
 Rule = Literal["backward", "forward", "trapezoidal", "continuous"]
@@ -59,14 +59,32 @@ class Timing(Algebra):
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(f"rate_hz={self.rate_hz} of a controller is not a positive number")
+            raise UsageError(
+                "out-of-range",
+                f"rate_hz={self.rate_hz} of a controller is not a positive number",
+                "specify how often it is computed per second",
+                argument="rate_hz",
+                value=self.rate_hz,
+            )
         if self.held_ticks < 1 or self.delay_ticks < 0:
-            raise InputError(
-                f"held_ticks={self.held_ticks}, delay_ticks={self.delay_ticks}: "
-                "a controller holds at least 1 tick and delays at least 0"
+            name, least = ("held_ticks", 1) if self.held_ticks < 1 else ("delay_ticks", 0)
+            value = getattr(self, name)
+            raise UsageError(
+                "out-of-range",
+                f"{name}={value} of a controller is less than {least}",
+                f"specify {least} or more",
+                argument=name,
+                value=value,
             )
         if self.hold not in ("zero-order", "none"):
-            raise InputError(f"hold={self.hold!r} is not known; choose 'zero-order' or 'none'")
+            raise UsageError(
+                "not-one-of",
+                f"hold={self.hold!r} is not supported",
+                "choose 'zero-order' or 'none'",
+                argument="hold",
+                value=self.hold,
+                allowed=["zero-order", "none"],
+            )
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         f = np.asarray(frequency_hz, dtype=np.float64)
@@ -90,7 +108,7 @@ class PID(Timing):
 
     Raises
     ------
-    InputError
+    UsageError
         If the integral time is not positive or the integrator rule is not known.
 
     Examples
@@ -109,10 +127,21 @@ class PID(Timing):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.integral_time_s > 0:
-            raise InputError(f"integral_time_s={self.integral_time_s} is not positive; leave it out for a P controller")
+            raise UsageError(
+                "out-of-range",
+                f"integral_time_s={self.integral_time_s} is not positive",
+                "leave it out for a P controller",
+                argument="integral_time_s",
+                value=self.integral_time_s,
+            )
         if self.integrator not in ("backward", "forward", "trapezoidal", "continuous"):
-            raise InputError(
-                f"integrator={self.integrator!r} is not known; choose backward, forward, trapezoidal or continuous"
+            raise UsageError(
+                "not-one-of",
+                f"integrator={self.integrator!r} is not supported",
+                "choose backward, forward, trapezoidal or continuous",
+                argument="integrator",
+                value=self.integrator,
+                allowed=["backward", "forward", "trapezoidal", "continuous"],
             )
 
     def law(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:

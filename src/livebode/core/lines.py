@@ -9,7 +9,7 @@ from math import ceil, floor, lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.errors import GridError, InputError
+from livebode.core.errors import GridError, UsageError
 
 # A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then holds a
 # whole number of periods to a millionth, and the leakage is below every other error.
@@ -62,15 +62,26 @@ class Lines:
             object.__setattr__(self, name, tuple(sorted(int(k) for k in getattr(self, name))))
         every = self.bins + self.quiet
         if not self.bins:
-            raise GridError("there is no line; give at least one")
+            raise GridError("no-line", "there is no line", "specify at least one")
         if len(set(every)) != len(every):
             twice = next(k for k in every if every.count(k) > 1)
-            raise GridError(f"bin {twice} ({twice * self.resolution_hz:g} Hz) is named more than once; name it once")
+            raise GridError(
+                "line-duplicated",
+                f"bin {twice} ({twice * self.resolution_hz:g} Hz) is duplicated",
+                "name it once",
+                bin=twice,
+                frequency_hz=twice * self.resolution_hz,
+            )
         for k in every:
             if not 0 < 2 * k < self.window:
                 raise GridError(
+                    "above-nyquist",
                     f"bin {k} ({k * self.resolution_hz:g} Hz) is not between 0 and the Nyquist frequency "
-                    f"{self.rate_hz / 2:g} Hz; choose lines inside"
+                    f"{self.rate_hz / 2:g} Hz",
+                    "choose lines between them",
+                    bin=k,
+                    frequency_hz=k * self.resolution_hz,
+                    nyquist_hz=self.rate_hz / 2,
                 )
 
     @classmethod
@@ -83,9 +94,9 @@ class Lines:
         Raises
         ------
         GridError
-            If a line is off the grid (the message has the nearest lines and the windows that would fit) or not
+            If a line is off the grid (the remedy has the nearest lines and the windows that would fit) or not
             below the Nyquist frequency.
-        InputError
+        UsageError
             If the text cannot be read.
 
         Examples
@@ -105,11 +116,14 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
         for f, k in zip(wanted, bins):
             if not 0 < f < Fraction(rate_hz) / 2:
                 raise GridError(
-                    f"the line {float(f):g} Hz is not between 0 and the Nyquist frequency {rate_hz / 2:g} Hz; "
-                    "choose lines inside"
+                    "above-nyquist",
+                    f"the line {float(f):g} Hz is not between 0 and the Nyquist frequency {rate_hz / 2:g} Hz",
+                    "choose lines between them",
+                    frequency_hz=float(f),
+                    nyquist_hz=rate_hz / 2,
                 )
             if abs(f / resolution_hz - k) > _ON_GRID_BINS:
-                raise GridError(_off_grid(f, wanted, rate_hz, window))
+                raise _off_grid(f, wanted, rate_hz, window)
         return cls.of_bins(bins, window, rate_hz)
 
     @classmethod
@@ -139,11 +153,23 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
 
 
 def check_window(window: int, rate_hz: float) -> None:
-    """GridError or InputError where no grid can be made of these."""
+    """GridError or UsageError where these give no grid."""
     if isinstance(window, bool) or not isinstance(window, (int, np.integer)) or not 3 <= window <= WINDOW_MAX:
-        raise GridError(f"{window=} is not a whole number of samples from 3 to {WINDOW_MAX}")
+        raise GridError(
+            "window-out-of-range",
+            f"{window=} is not a whole number of samples from 3 to {WINDOW_MAX}",
+            "choose a window in this range",
+            window=window,
+            window_max=WINDOW_MAX,
+        )
     if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+        raise UsageError(
+            "out-of-range",
+            f"{rate_hz=} is not a positive number of samples per second",
+            "specify the rate",
+            argument="rate_hz",
+            value=rate_hz,
+        )
 
 
 def _number(text: str) -> Fraction:
@@ -163,40 +189,61 @@ def _frequencies(item: str, text: str, rate_hz: float, window: int) -> list[Frac
     if len(parts) == 2 and item.startswith("k="):
         parts.append(Fraction(1))
     if len(parts) not in (1, 3):
-        raise InputError(
-            f"{item[:_SHOWN]!r} in lines {text[:_SHOWN]!r} cannot be read; write frequencies in Hz as "
-            "20:140:20 (start:stop:step, inclusive) or 35, joined by commas"
+        raise UsageError(
+            "unreadable",
+            f"{item[:_SHOWN]!r} in lines {text[:_SHOWN]!r} cannot be read",
+            "write frequencies in Hz as 20:140:20 (start:stop:step, inclusive) or 35, joined by commas",
+            argument="lines",
+            value=item[:_SHOWN],
         )
     if len(parts) == 1:
         return [parts[0] * unit]
     start, stop, step = parts
     if step <= 0 or stop < start or step > stop:
-        swapped = (
-            f"; did you mean {float(start):g}:{float(step):g}:{float(stop):g}?" if stop > 0 and start <= step else ""
-        )
-        raise InputError(
-            f"the range {item[:_SHOWN]!r} is no start:stop:step with start ≤ stop and 0 < step ≤ stop{swapped}"
+        exchanged = stop > 0 and start <= step
+        raise UsageError(
+            "out-of-range",
+            f"the range {item[:_SHOWN]!r} is not start:stop:step with start ≤ stop and 0 < step ≤ stop",
+            f"did you mean {float(start):g}:{float(step):g}:{float(stop):g}?" if exchanged else "correct it",
+            argument="lines",
+            value=item[:_SHOWN],
         )
     count = floor((stop - start) / step) + 1
     if count > _LINES_MAX:
-        raise InputError(f"the range {item[:_SHOWN]!r} has {count} lines, more than {_LINES_MAX}; take a larger step")
+        raise UsageError(
+            "too-many",
+            f"the range {item[:_SHOWN]!r} has {count} lines, more than {_LINES_MAX}",
+            "choose a larger step",
+            argument="lines",
+            count=count,
+            limit=_LINES_MAX,
+        )
     return [(start + i * step) * unit for i in range(count)]
 
 
-def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: int) -> str:
+def _off_grid(line: Fraction, wanted: list[Fraction], rate_hz: float, window: int) -> GridError:
     resolution = Fraction(rate_hz) / window
     position = line / resolution
     near = [k * resolution for k in (floor(position), ceil(position)) if 0 < 2 * k < window]
-    sentence = (
-        f"the line {float(line):g} Hz is not on the {float(resolution):g} Hz grid of window={window} at "
-        f"{rate_hz:g} Hz; the nearest {'lines are' if len(near) > 1 else 'line is'} "
-        f"{' and '.join(f'{float(f):.6g}' for f in near)} Hz"
+    nearest = (
+        f"the nearest {'lines are' if len(near) > 1 else 'line is'} {' and '.join(f'{float(f):.6g}' for f in near)} Hz"
     )
     # A rate of many digits must not hide the window; a line near 0 must not become 0, which every window fits.
     shares = [(f / Fraction(rate_hz)).limit_denominator(10**6) or f / Fraction(rate_hz) for f in wanted]
     unit = lcm(*(share.denominator for share in shares))
-    multiples = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
-    if unit > 100 * window:
-        return sentence + ", and no window of a useful length would fit them all"
-    which = "windows" if len(multiples) > 1 else "a window"
-    return f"{sentence}, and {which} of {' or '.join(map(str, multiples))} samples would fit"
+    fitting: list[int] = []
+    if unit <= 100 * window:  # a longer one is of no use
+        fitting = sorted({unit * m for m in (floor(window / unit), ceil(window / unit)) if m > 0})
+    which = "windows" if len(fitting) > 1 else "a window"
+    windows = f", and {which} of {' or '.join(map(str, fitting))} samples would fit"
+    return GridError(
+        "line-off",
+        f"the line {float(line):g} Hz is not on the {float(resolution):g} Hz grid of window={window} at {rate_hz:g} Hz",
+        nearest + (windows if fitting else ", and no window of a useful length would fit them all"),
+        frequency_hz=float(line),
+        resolution_hz=float(resolution),
+        window=window,
+        rate_hz=rate_hz,
+        nearest_hz=[float(f) for f in near],
+        windows=fitting,
+    )

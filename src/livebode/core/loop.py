@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core.errors import InputError
+from livebode.core.errors import UsageError
 from livebode.core.model import Model, as_model
 
 Logged = Literal["before", "after"]
@@ -35,8 +35,10 @@ class Loop:
 
     Raises
     ------
-    InputError
-        If the feedback or the entry has no frequency response, or a `logged` word is not known.
+    TypeError
+        If the feedback or the entry has no frequency response.
+    UsageError
+        If one of them has several inputs or outputs, or a `logged` word is not known.
     """
 
     feedback: Model | None = None
@@ -51,7 +53,14 @@ class Loop:
                 object.__setattr__(self, name, as_model(given))
         for name in ("input_logged", "excitation_logged", "output_logged"):
             if (word := getattr(self, name)) not in ("before", "after"):
-                raise InputError(f"{name}={word!r} is not known; choose 'before' or 'after' (the controller's update)")
+                raise UsageError(
+                    "not-one-of",
+                    f"{name}={word!r} is not supported",
+                    "choose 'before' or 'after' (the controller's update)",
+                    argument=name,
+                    value=word,
+                    allowed=["before", "after"],
+                )
 
     def advance_ticks(self, role: Literal["input", "excitation", "output"]) -> int:
         """Ticks by which the signal's spectrum is to be advanced so that all speak of one tick."""
@@ -61,9 +70,14 @@ class Loop:
         return -1 if role == "output" else 1
 
     def feedback_at(self, frequency_hz: ArrayLike) -> Complex:
-        """F at these frequencies; InputError where the Loop does not know its feedback."""
+        """F at these frequencies; UsageError where the Loop does not know its feedback."""
         if self.feedback is None:
-            raise InputError("the loop's feedback is not known; describe its controllers, or use the joint estimator")
+            raise UsageError(
+                "missing",
+                "the loop's feedback is missing",
+                "describe its controllers, or use the joint estimator",
+                argument="feedback",
+            )
         return self.feedback.response(frequency_hz)
 
     def entry_at(self, frequency_hz: ArrayLike) -> Complex:

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core.errors import InputError
+from livebode.core.errors import UsageError
 
 
 @runtime_checkable
@@ -85,17 +85,25 @@ def as_model(thing: object) -> Model:
 
     Raises
     ------
-    InputError
-        If it is none of these, has several inputs or outputs, or is discrete without a rate.
+    TypeError
+        If it is none of these.
+    UsageError
+        If it has several inputs or outputs, or is discrete without a rate.
     """
     if isinstance(thing, Model):
         return thing
     if isinstance(thing, (int, float)):
         return Gain(float(thing))
     if not (callable(thing) and hasattr(thing, "dt")):
-        raise InputError(f"{thing!r} has no frequency response; give a Model, a number or a python-control system")
+        raise TypeError(f"{thing!r} has no frequency response; give a Model, a number or a python-control system")
     if getattr(thing, "issiso", lambda: True)() is False:
-        raise InputError(f"{thing!r} has several inputs or outputs; give one of its transfer functions")
+        raise UsageError(
+            "wrong-shape",
+            f"the {type(thing).__name__} has several inputs or outputs",
+            "give one of its transfer functions",
+        )
     if thing.dt is True:
-        raise InputError("the system is discrete without a sample time; give it one (dt in seconds)")
+        raise UsageError(
+            "missing", "the discrete system has no sample time", "specify it (dt in seconds)", argument="dt"
+        )
     return _Control(thing)

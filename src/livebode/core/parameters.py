@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.errors import InputError
+from livebode.core.errors import UsageError
 from livebode.core.rows import joined
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,13 @@ _STEP = 1e-6
 def half_width(sigma: Floats, probability: float) -> Floats:
     """Half-width of the interval that holds a normal value with this probability: 1.96 sigma for 0.95."""
     if not 0 < probability < 1:
-        raise InputError(f"{probability=} is not between 0 and 1; 0.95 is usual")
+        raise UsageError(
+            "out-of-range",
+            f"{probability=} is not between 0 and 1",
+            "specify one such as 0.95",
+            argument="probability",
+            value=probability,
+        )
     from scipy.special import ndtri
 
     return np.asarray(sigma * float(ndtri(0.5 + probability / 2)))
@@ -83,13 +89,19 @@ class Parameters:
         return replace(self, **rows)
 
     def index(self, name: str) -> int:
-        """Column of a parameter; InputError with the known names where it is not there."""
+        """Column of a parameter; UsageError with the known names where it is not there."""
         if name not in self.names:
-            raise InputError(f"the model {self.model!r} has no parameter {name!r}; it has {', '.join(self.names)}")
+            raise UsageError(
+                "unknown-name",
+                f"the model {self.model!r} has no parameter {name!r}",
+                f"choose one of {', '.join(self.names)}",
+                value=name,
+                allowed=list(self.names),
+            )
         return self.names.index(name)
 
     def only(self, names: Sequence[str]) -> Parameters:
-        """Some of the parameters, in this order; InputError where one is not there."""
+        """Some of the parameters, in this order; UsageError where one is not there."""
         at = [self.index(name) for name in names]
         units = tuple(self.units[i] for i in at)
         covariance = self.covariance[:, at][:, :, at]
@@ -114,7 +126,7 @@ class Parameters:
 
         Raises
         ------
-        InputError
+        UsageError
             If the probability is not between 0 and 1.
         """
         return half_width(self.sigma, probability)
@@ -140,8 +152,13 @@ class Parameters:
 
     @classmethod
     def join(cls, parts: Sequence[Parameters]) -> Parameters:
-        """Parts of one run, in order, as one; InputError where they are of different models."""
+        """Parts of one run, in order, as one; UsageError where they are of different models."""
         if any((p.model, p.names, p.units) != (parts[0].model, parts[0].names, parts[0].units) for p in parts):
-            raise InputError("parameters of different models cannot be joined; fit one model")
+            raise UsageError(
+                "conflict",
+                "parameters of different models cannot be joined",
+                "fit one model",
+                models=sorted({p.model for p in parts}),
+            )
         rows = joined(parts, _PER_ROW, "parameters")
         return replace(parts[0], **rows)

@@ -9,7 +9,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core.errors import GridError, InputError
+from livebode.core.errors import ExtraError, GridError
 from livebode.core.lines import Lines
 from livebode.core.rows import joined
 
@@ -115,7 +115,13 @@ class Response:
         known = np.abs(np.asarray(self.lines.bins)[at] - bins) < 1e-6
         if not np.all(known):
             missing = float(wanted[~known].flat[0])
-            raise GridError(f"{missing:g} Hz is not a measured line; a measured response is not interpolated")
+            raise GridError(
+                "line-off",
+                f"{missing:g} Hz is not a measured line, and a measured response is not interpolated",
+                "choose a measured line",
+                frequency_hz=missing,
+                resolution_hz=self.lines.resolution_hz,
+            )
         return np.asarray(self.value[at])
 
     def to_control(self) -> Any:
@@ -123,7 +129,13 @@ class Response:
         try:
             import control
         except ImportError:
-            raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
+            raise ExtraError(
+                "not-installed",
+                "python-control is not installed",
+                "pip install 'livebode[control]'",
+                package="control",
+                extra="control",
+            ) from None
         omega = 2 * np.pi * self.lines.frequency_hz[self.valid]
         # `control.bode_plot` draws no system without a name.
         return control.frd(self.value[self.valid], omega, name=self.quantity)
@@ -215,6 +227,10 @@ class Responses(Sequence[Response]):
     def join(cls, parts: Sequence[Responses]) -> Responses:
         """Parts of one run, in order, as one; GridError where their lines differ."""
         if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
-            raise GridError("responses on different lines or of different quantities cannot be joined")
+            raise GridError(
+                "not-alike",
+                "responses on different lines or of different quantities cannot be joined",
+                "join responses of one run",
+            )
         rows = joined(parts, _PER_ROW, "responses")
         return replace(parts[0], **rows)

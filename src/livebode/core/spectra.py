@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core.block import Block, Channel
-from livebode.core.errors import GridError, InputError
+from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import WINDOW_MAX, Lines
 
 NOT_WHOLE, SPIKE = 1, 2
@@ -44,9 +44,11 @@ class SpectraLayout:
 
     Raises
     ------
-    InputError
-        If names repeat, there is no signal or no line, a bin is not between 0 and N/2 or stands out of order, or the
-        hop neither divides the window nor is a multiple of it.
+    UsageError
+        If names repeat, or there is no signal.
+    GridError
+        If there is no line, a bin is not between 0 and N/2 or out of order, or the hop neither divides the window nor
+        is a multiple of it.
 
     Examples
     --------
@@ -66,36 +68,76 @@ class SpectraLayout:
 
     def __post_init__(self) -> None:
         if not self.signals:
-            raise InputError("spectra of no signal; name at least one")
+            raise UsageError("missing", "the spectra have no signal", "name at least one", argument="signals")
         for named in (self.signals, self.values, self.channels):
             if len({channel.name for channel in named}) != len(named):
-                raise InputError("two channels of the spectra share a name; each needs its own, and one unit")
+                raise UsageError(
+                    "duplicate",
+                    "two channels of the spectra have the same name",
+                    "give each its own name, and one unit",
+                    argument="signals",
+                )
         object.__setattr__(self, "subtracted", self.subtracted or (0.0,) * len(self.signals))
         object.__setattr__(self, "differenced", self.differenced or (False,) * len(self.signals))
         if not len(self.subtracted) == len(self.differenced) == len(self.signals):
-            raise InputError(f"{len(self.signals)} signals need as many constants and as many words on differencing")
+            raise UsageError(
+                "wrong-shape",
+                f"{len(self.signals)} signals, but {len(self.subtracted)} subtracted constants and "
+                f"{len(self.differenced)} differencing flags",
+                "give one of each for each signal",
+                argument="subtracted",
+            )
         if not np.all(np.isfinite(self.subtracted)):
-            raise InputError(f"a constant that is subtracted is not finite: {self.subtracted}")
+            raise UsageError(
+                "not-finite",
+                f"a subtracted constant is not finite: {self.subtracted}",
+                "give finite numbers",
+                argument="subtracted",
+                value=list(self.subtracted),
+            )
         if not 3 <= self.window <= WINDOW_MAX:
-            raise GridError(f"window={self.window} is not a whole number of samples from 3 to {WINDOW_MAX}")
+            raise GridError(
+                "window-out-of-range",
+                f"window={self.window} is not a whole number of samples from 3 to {WINDOW_MAX}",
+                "choose a window in this range",
+                window=self.window,
+                window_max=WINDOW_MAX,
+            )
         if not 1 <= self.hop <= WINDOW_MAX or (self.window % self.hop and self.hop % self.window):
             raise GridError(
+                "hop-off",
                 f"hop={self.hop} neither divides the window of {self.window} samples nor is a multiple of it, so no "
-                "two spectra stand whole periods apart; take one that does"
+                "two spectra are a whole number of periods apart",
+                "choose one that does",
+                hop=self.hop,
+                window=self.window,
             )
         self._check_bins()
 
     def _check_bins(self) -> None:
         if not self.lines:
-            raise GridError("spectra without a line; give at least one")
+            raise GridError("no-line", "the spectra have no line", "specify at least one")
         for bins in (self.lines, self.quiet):
             if any(b <= a for a, b in pairwise(bins)):
-                raise GridError("bins of spectra are not ascending; put them in order, each once")
+                raise GridError(
+                    "bins-unordered",
+                    "bins of spectra are not ascending",
+                    "put them in order, each once",
+                    bins=list(bins),
+                )
         if twice := set(self.lines) & set(self.quiet):
-            raise GridError(f"bin {min(twice)} is named as a line and as quiet; name it once")
+            raise GridError(
+                "line-duplicated", f"bin {min(twice)} is both a line and quiet", "name it once", bin=min(twice)
+            )
         for k in self.bins:
             if not 0 < 2 * k < self.window:
-                raise GridError(f"bin {k} is not between 0 and half the window of {self.window}; choose bins inside")
+                raise GridError(
+                    "above-nyquist",
+                    f"bin {k} is not between 0 and half the window of {self.window}",
+                    "choose bins between them",
+                    bin=k,
+                    window=self.window,
+                )
 
     @property
     def bins(self) -> tuple[int, ...]:
@@ -113,11 +155,13 @@ class SpectraLayout:
         return Lines(self.lines, self.window, rate_hz, quiet)
 
     def columns(self, bins: Sequence[int], why: str) -> NDArray[np.intp]:
-        """Where these bins stand among the sums; InputError for one that is not sent, `why` it is needed."""
+        """Where these bins are among the sums; GridError for one that is not sent, `why` it is needed."""
         place = {k: i for i, k in enumerate(self.bins)}
         for k in bins:
             if k not in place:
-                raise InputError(f"{why} bin {k}, which the drive does not send; let it send that one too")
+                raise GridError(
+                    "bin-not-sent", f"{why} bin {k}, which the drive does not send", "let it send that one too", bin=k
+                )
         return np.array([place[k] for k in bins], dtype=np.intp)
 
 
@@ -150,9 +194,12 @@ class Spectra(Block):
         super().__post_init__()
         shape = (len(self.layout.signals), len(self), len(self.layout.bins))
         if self.sums.shape != shape or self.state.shape != shape[1:2]:
-            raise InputError(
-                f"sums of shape {self.sums.shape} and states of shape {self.state.shape} for {len(self)} spectra; "
-                f"give {shape} and {shape[1:2]}"
+            raise UsageError(
+                "wrong-shape",
+                f"sums of shape {self.sums.shape} and states of shape {self.state.shape} for {len(self)} spectra",
+                f"give {shape} and {shape[1:2]}",
+                argument="sums",
+                shape=list(self.sums.shape),
             )
 
     @property

@@ -60,7 +60,7 @@ class Subject:
         runs = [path for path in paths if path not in files]
         for found, what in ((files, "configurations"), (runs, "runs")):
             if len(found) > 1:
-                raise UsageError("conflict", f"{len(found)} {what} are given", "give one of them")
+                raise UsageError("too-many", f"{len(found)} {what} are given", "give one of them", argument="targets")
         return _read(files[0] if files else None, runs[0] if runs else None)
 
 

@@ -13,7 +13,7 @@ import pyarrow as pa
 from pyarrow.csv import CSVWriter, WriteOptions
 
 from livebode.arrow import from_numpy
-from livebode.core import InputError, Responses
+from livebode.core import RecordError, Responses
 from livebode.export.written import Written
 
 
@@ -27,7 +27,7 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
 
     Raises
     ------
-    InputError
+    RecordError
         If there are no responses.
     """
     rows = 0
@@ -41,7 +41,7 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
             writer.write_batch(batch)
             rows += len(part)
         if writer is None:
-            raise InputError("the run has no responses to export")
+            raise RecordError("no-responses", "the run has no responses to export", "see its events")
         writer.close()
     return Written(rows)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import pyarrow as pa
 
-from livebode.core import InputError, Responses
+from livebode.core import OutputError, Responses
 from livebode.export.delimited import write_csv
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
@@ -53,7 +53,7 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
 
     Raises
     ------
-    InputError
+    OutputError
         If something stands there that is not to be replaced or is no file, or the disk refuses. Nothing is left of
         what was written then, and what stood there still stands.
     """
@@ -67,12 +67,25 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
             partial.replace(path)
     except OSError as error:
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-        raise InputError(f"{str(path)!r} could not be written: {why}; nothing was left there") from None
+        raise OutputError(
+            "not-written",
+            f"{str(path)!r} could not be written: {why}; nothing was left there",
+            "make room, or choose another path",
+            path=str(path),
+            reason=why,
+            errno=error.errno,
+        ) from None
     return written
 
 
 def _check_free(path: Path, force: bool) -> None:
     if path.is_dir():
-        raise InputError(f"{str(path)!r} is a directory; name a file with --out")
+        raise OutputError("is-directory", f"{str(path)!r} is a directory", "choose the path of a file", path=str(path))
     if not force and (path.exists() or path.is_symlink()):
-        raise InputError(f"{str(path)!r} exists already; take another --out, or --force to replace it")
+        raise OutputError(
+            "exists",
+            f"{str(path)!r} exists already",
+            "choose another path, or replace it with force",
+            path=str(path),
+            argument="force",
+        )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.core import InputError, Responses
+from livebode.core import ExtraError, Responses
 from livebode.export.written import Written, whole
 
 if TYPE_CHECKING:
@@ -39,13 +39,19 @@ def to_xarray(responses: Responses, about: Mapping[str, Any] | None = None) -> x
 
     Raises
     ------
-    InputError
+    ExtraError
         If xarray is not installed.
     """
     try:
         import xarray
     except ImportError:
-        raise InputError("xarray is not installed; pip install 'livebode[xarray]'") from None
+        raise ExtraError(
+            "not-installed",
+            "xarray is not installed",
+            "pip install 'livebode[xarray]'",
+            package="xarray",
+            extra="xarray",
+        ) from None
     both, time = ("time_s", "frequency_hz"), "time_s"
     units = {"response": responses.unit, "sigma": responses.unit, "time_s": "s", "frequency_hz": "Hz"}
 
@@ -74,8 +80,12 @@ def write_netcdf(path: Path, parts: Iterable[Responses], about: Mapping[str, Any
 
     Raises
     ------
-    InputError
-        If xarray is not installed, there are no responses or too many (`VALUES_MAX`).
+    ExtraError
+        If xarray is not installed.
+    RecordError
+        If there are no responses.
+    OutputError
+        If there are more values than `VALUES_MAX`.
     """
     responses = whole(parts, "netcdf")
     dataset = to_xarray(responses, about)

@@ -25,8 +25,10 @@ def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
 
     Raises
     ------
-    InputError
-        If there are no responses or too many (`VALUES_MAX`).
+    RecordError
+        If there are no responses.
+    OutputError
+        If there are more values than `VALUES_MAX`.
     """
     from scipy.io import savemat
 

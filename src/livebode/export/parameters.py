@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from livebode.core import InputError
+from livebode.core import OutputError, RecordError
 from livebode.export.delimited import begin
 from livebode.export.matlab import VARIABLE
 from livebode.export.written import VALUES_MAX, Written
@@ -26,7 +26,7 @@ class ParameterTable:
 
     Raises
     ------
-    InputError
+    RecordError
         If the run has none, or the table cannot be read or lacks a column.
     """
 
@@ -39,13 +39,22 @@ class ParameterTable:
             any_ = True
             missing = [column for column in COLUMNS if column not in table.column_names]
             if missing:
-                raise InputError(
-                    f"the parameters of {str(self.run)!r} have no column {missing[0]!r}; they are not what a run wrote"
+                raise RecordError(
+                    "unexpected-content",
+                    f"the parameters of {str(self.run)!r} have no column {missing[0]!r}, which a run writes",
+                    "run the recording again",
+                    path=str(self.run),
+                    column=missing[0],
                 )
             schema = pa.schema([(c, pa.float64() if c in _NUMBERS else pa.string()) for c in COLUMNS])
             yield from table.select(list(COLUMNS)).cast(schema).to_batches()
         if not any_:
-            raise InputError(f"the run {str(self.run)!r} has no parameters: no model was fitted to its responses")
+            raise RecordError(
+                "no-parameters",
+                f"the run {str(self.run)!r} has no parameters: no model was fitted to its responses",
+                "fit one to its mean response, or run the recording again with a model",
+                path=str(self.run),
+            )
 
 
 def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
@@ -53,7 +62,7 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
 
     Raises
     ------
-    InputError
+    RecordError
         If there are none.
     """
     rows, writer = 0, None
@@ -63,7 +72,9 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
             writer.write_batch(part)
             rows += part.num_rows
         if writer is None:
-            raise InputError("the run has no parameters to export")
+            raise RecordError(
+                "no-parameters", "the run has no parameters to export", "run the recording again with a model"
+            )
         writer.close()
     return Written(rows)
 
@@ -73,8 +84,10 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
 
     Raises
     ------
-    InputError
-        If there are none or too many (`VALUES_MAX`).
+    RecordError
+        If there are none.
+    OutputError
+        If there are more than `VALUES_MAX`.
     """
     from scipy.io import savemat
 
@@ -82,12 +95,18 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
     for part in parts:
         kept.append(part)
         if sum(p.num_rows for p in kept) > VALUES_MAX:
-            raise InputError(
-                f"the run has more than {VALUES_MAX} parameters, too many for mat; csv takes them in parts"
+            raise OutputError(
+                "too-large",
+                f"the run has more than {VALUES_MAX} parameters, too many for a MATLAB file",
+                "export csv, which is written in parts",
+                format="mat",
+                limit=VALUES_MAX,
             )
     table = pa.Table.from_batches(kept) if kept else None
     if table is None or not table.num_rows:
-        raise InputError("the run has no parameters to export")
+        raise RecordError(
+            "no-parameters", "the run has no parameters to export", "run the recording again with a model"
+        )
     numbers = {name: table[name].to_numpy()[:, np.newaxis] for name in _NUMBERS}
     texts = {
         name: np.array(table[name].to_pylist(), dtype=object)[:, np.newaxis] for name in set(COLUMNS) - set(_NUMBERS)

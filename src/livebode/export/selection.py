@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from livebode.core import InputError, Response, Responses
+from livebode.core import Response, Responses, SignalError, UsageError
 
 
 def at(parts: Iterable[Responses], time_s: float) -> Response:
@@ -23,12 +23,16 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
 
     Raises
     ------
-    InputError
-        If the time is not finite, no line of any response is valid, or the nearest response stands farther off than
-        half a window: its window then does not hold the moment.
+    UsageError
+        If the time is not finite.
+    SignalError
+        If no line of any response is valid, or the nearest response is farther away than half a window: its window
+        then does not contain the time.
     """
     if not np.isfinite(time_s):
-        raise InputError(f"time {time_s} is not a moment; give seconds in the recording's clock")
+        raise UsageError(
+            "not-finite", f"{time_s=} is not finite", "give seconds in the recording's clock", argument="time_s"
+        )
     nearest: Response | None = None
     for part in parts:
         usable = np.flatnonzero(part.valid.any(axis=1))
@@ -38,11 +42,15 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
         if nearest is None or abs(found.time_s - time_s) < abs(nearest.time_s - time_s):
             nearest = found
     if nearest is None:
-        raise InputError("no response has a valid line; the run's events say why")
+        raise SignalError("no-valid-response", "no response has a valid line", "see the run's events for the reason")
     reach_s = nearest.lines.window / nearest.lines.rate_hz / 2
     if abs(nearest.time_s - time_s) > reach_s:
-        raise InputError(
-            f"no valid response stands within half a window ({reach_s:g} s) of {time_s:g} s; the nearest is at "
-            f"{nearest.time_s:.9g} s"
+        raise SignalError(
+            "no-response-there",
+            f"no valid response is within half a window ({reach_s:g} s) of {time_s:g} s",
+            f"take the nearest, at {nearest.time_s:.9g} s",
+            argument="time_s",
+            time_s=time_s,
+            nearest_s=nearest.time_s,
         )
     return nearest

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Response, Responses
+from livebode.core import ExtraError, Response, Responses, SignalError
 from livebode.export.written import Written
 
 _LABEL, _ID = 20, 80  # letters that the format has for a unit and for a line of text
@@ -35,13 +35,17 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
 
     Raises
     ------
-    InputError
-        If pyuff is not installed, or no response has two valid lines.
+    ExtraError
+        If pyuff is not installed.
+    SignalError
+        If no response has two valid lines.
     """
     try:
         import pyuff
     except ImportError:
-        raise InputError("pyuff is not installed; pip install 'livebode[uff]'") from None
+        raise ExtraError(
+            "not-installed", "pyuff is not installed", "pip install 'livebode[uff]'", package="pyuff", extra="uff"
+        ) from None
     functions = left_out = 0
     with path.open("wb") as file, TemporaryDirectory(prefix=f"{path.name}-", dir=path.parent) as folder:
         # pyuff reads a file anew after each set that it adds to it; sets may simply follow each other.
@@ -57,8 +61,11 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
                 raise _cause(error) from None
             file.write(Path(scratch).read_bytes())
     if not functions:
-        raise InputError(
-            f"no response has {_LINES_MIN} valid lines, which UFF 58 needs; csv and mat take a response with fewer"
+        raise SignalError(
+            "too-few-lines",
+            f"no response has {_LINES_MIN} valid lines, which UFF 58 needs",
+            "export csv or mat, which take a response with fewer",
+            lines_min=_LINES_MIN,
         )
     return Written(functions, left_out)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from livebode.core import InputError, Responses
+from livebode.core import OutputError, RecordError, Responses
 
 VALUES_MAX = 1 << 23
 """Most values (responses times lines) that a format takes which is not written in parts: some 2 GB of memory."""
@@ -23,18 +23,23 @@ def whole(parts: Iterable[Responses], format: str) -> Responses:
 
     Raises
     ------
-    InputError
-        If there are none, or they have more than `VALUES_MAX` values.
+    RecordError
+        If there are none.
+    OutputError
+        If they have more than `VALUES_MAX` values.
     """
     kept, values = [], 0
     for part in parts:
         values += part.value.size
         if values > VALUES_MAX:
-            raise InputError(
-                f"the run has more than {VALUES_MAX} values (responses times lines), too many to write as {format} "
-                "at once; export one response (--at TIME), their mean (--mean), or csv, which is written in parts"
+            raise OutputError(
+                "too-large",
+                f"the run has more than {VALUES_MAX} values (responses times lines), too many to write as {format}",
+                "export one response, their mean, or csv, which is written in parts",
+                format=format,
+                limit=VALUES_MAX,
             )
         kept.append(part)
     if not values:
-        raise InputError("the run has no responses to export")
+        raise RecordError("no-responses", "the run has no responses to export", "see its events")
     return Responses.join(kept)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.fitting.modal import chain_of, scan
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay, free_friction
 
@@ -42,11 +42,31 @@ class Chain(PhysicalModel):
 
     def __post_init__(self) -> None:
         if self.output not in ("velocity", "position"):
-            raise InputError(f"output={self.output!r} is not known; choose 'velocity' or 'position'")
+            raise UsageError(
+                "not-one-of",
+                f"output={self.output!r} is not known",
+                "choose 'velocity' or 'position'",
+                argument="output",
+                value=self.output,
+                allowed=["velocity", "position"],
+            )
         if self.side not in ("motor", "load"):
-            raise InputError(f"side={self.side!r} is not known; choose 'motor' or 'load'")
+            raise UsageError(
+                "not-one-of",
+                f"side={self.side!r} is not known",
+                "choose 'motor' or 'load'",
+                argument="side",
+                value=self.side,
+                allowed=["motor", "load"],
+            )
         if self.radius_m is not None and not (np.isfinite(self.radius_m) and self.radius_m > 0):
-            raise InputError(f"radius_m={self.radius_m} is not a positive number of metres per radian")
+            raise UsageError(
+                "out-of-range",
+                f"radius_m={self.radius_m} is not a positive number of metres per radian",
+                "give the radius of the pulley",
+                argument="radius_m",
+                value=self.radius_m,
+            )
 
     @property
     def arm(self) -> float:
@@ -141,7 +161,13 @@ class TwoMass(Chain):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.inertia_ratio is not None and not (np.isfinite(self.inertia_ratio) and self.inertia_ratio > 0):
-            raise InputError(f"inertia_ratio={self.inertia_ratio} is not a positive number")
+            raise UsageError(
+                "out-of-range",
+                f"inertia_ratio={self.inertia_ratio} is not a positive number",
+                "give the load's inertia by the motor's, or leave it out",
+                argument="inertia_ratio",
+                value=self.inertia_ratio,
+            )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

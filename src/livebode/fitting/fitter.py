@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, InputError, Lines, Parameters, Responses
+from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
@@ -51,8 +51,10 @@ class Fitter:
 
     Raises
     ------
-    InputError
-        If model, parameter names or bounds cannot be, or the band has too few lines.
+    UsageError
+        If model, parameter names or bounds cannot be.
+    FitError
+        If the band has too few lines.
 
     Examples
     --------
@@ -101,11 +103,18 @@ class Fitter:
 
         Raises
         ------
-        InputError
-            If the Responses are not of a plant, or on other lines than those before.
+        SignalError
+            If the Responses are not of a plant.
+        GridError
+            If they are on other lines than those before.
         """
         if responses.quantity != "plant":
-            raise InputError(f"a model is fitted to the plant, and these responses are of {responses.quantity!r}")
+            raise SignalError(
+                "wrong-quantity",
+                f"a model is fitted to the plant, and these responses are of {responses.quantity!r}",
+                "track the plant",
+                quantity=responses.quantity,
+            )
         use = self._prepare(responses.lines)
         parts = []
         first = 0
@@ -148,9 +157,9 @@ class Fitter:
 
     @property
     def grid(self) -> Grid:
-        """The lines of the band; InputError before the first responses, which bring them."""
+        """The lines of the band; RuntimeError before the first responses, which bring them."""
         if self._lines is None:
-            raise InputError("the fitter has seen no responses, so that its lines are not known; process some first")
+            raise RuntimeError("the fitter has seen no responses, so that its lines are not known; process some first")
         return self._delay.problem.grid
 
     def drain_events(self) -> list[Event]:
@@ -174,7 +183,7 @@ class Fitter:
 
         Raises
         ------
-        InputError
+        UsageError
             If the snapshot is damaged or belongs to other settings; the Fitter is then as it was.
         """
         try:
@@ -185,9 +194,20 @@ class Fitter:
             word, epsilon, delay = str(state["word"]), state["epsilon"], state["delay"]
             delay = {"taken": delay["taken"], "gains": [float(x) for x in delay["gains"]]}
         except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"the snapshot of {len(snapshot)} bytes is damaged ({error}); start afresh") from None
+            raise UsageError(
+                "unreadable",
+                f"the snapshot of {len(snapshot)} bytes is damaged ({error})",
+                "start without it",
+                argument="snapshot",
+                reason=str(error),
+            ) from None
         if owner != self._identity():
-            raise InputError("the snapshot belongs to a fitter with other settings; restore it into one with the same")
+            raise UsageError(
+                "conflict",
+                "the snapshot belongs to a fitter with other settings",
+                "restore it into one with the same settings",
+                argument="snapshot",
+            )
         self._seen, self._rows, self._start, self._next = seen, rows, start, after
         self._word, self._epsilon = word, epsilon
         self._delay.restore(delay)
@@ -205,14 +225,25 @@ class Fitter:
             problem = Problem(self.model, grid._replace(frequency_hz=grid.frequency_hz[use]), self._fixed, self._free)
             if 2 * np.count_nonzero(use) <= problem.size:
                 band = f"the band {low:g} … {high:g} Hz has" if self._band else "there are"
-                raise InputError(
+                raise FitError(
+                    "too-few-lines",
                     f"{band} {np.count_nonzero(use)} lines, too few for {problem.size} free parameters of "
-                    f"{self.model.name!r}; take more lines, or hold parameters"
+                    f"{self.model.name!r}",
+                    "take more lines, or hold parameters",
+                    lines=int(np.count_nonzero(use)),
+                    parameters=problem.size,
+                    model=self.model.name,
                 )
             self._lines, self._use = lines, use
             self._delay.begin(problem, may_free=DELAY not in self._fixed)
         elif lines != self._lines:
-            raise InputError("these responses are on other lines than those before; take a new Fitter")
+            raise GridError(
+                "not-alike",
+                "these responses are on other lines than those before",
+                "take a new Fitter for them",
+                bins=list(lines.bins),
+                window=lines.window,
+            )
         return self._use
 
     def _group(self, responses: Responses, use: NDArray[np.bool_]) -> Parameters:

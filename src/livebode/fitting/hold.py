@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import FitError
 from livebode.fitting.transfer import Transfer, roots
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,12 @@ def to_discrete(transfer: Transfer, rate_hz: float, delay_s: float = 0.0) -> tup
     (array([0.02]), array([ 1., -1.]))
     """
     if delay_s < 0:
-        raise InputError(f"{delay_s=:g} is negative: no discrete system answers before it is asked")
+        raise FitError(
+            "not-causal",
+            f"{delay_s=:g} is negative, and no discrete system responds before its input",
+            "hold the delay at 0",
+            delay_s=float(delay_s),
+        )
     poles = np.exp(transfer.poles() / rate_hz)
     at = np.concatenate([poles, np.ones(transfer.integrators)])
     ticks = delay_s * rate_hz
@@ -53,7 +58,7 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
 
     Raises
     ------
-    InputError
+    FitError
         If a pole lies on the negative real axis or at zero (no system in s has one there), or the numerator's degree is
         not below the denominator's. Poles that coincide, other than two at z = 1, cannot be told apart.
 
@@ -65,7 +70,14 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
     """
     n, d = (_trimmed(np.atleast_1d(np.asarray(x, dtype=np.float64))) for x in (numerator, denominator))
     if len(n) >= len(d):
-        raise InputError(f"a numerator of degree {len(n) - 1} over {len(d) - 1} acts at once; no hold samples to it")
+        raise FitError(
+            "not-proper",
+            f"a system of numerator degree {len(n) - 1} and denominator degree {len(d) - 1} responds without delay, "
+            "which no sampled system does",
+            "take a lower degree of the numerator",
+            numerator_degree=len(n) - 1,
+            denominator_degree=len(d) - 1,
+        )
     at = roots(d)
     resting = np.abs(at - 1) < np.sqrt(_AT_ONE)
     integrators = int(np.count_nonzero(resting))
@@ -75,7 +87,12 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
     moving = at[~resting]
     if np.any((moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))):
         bad = moving[(moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))][0].real
-        raise InputError(f"the pole z = {bad:.6g} has no counterpart in s; take another order, or a higher rate")
+        raise FitError(
+            "no-continuous-model",
+            f"the pole z = {bad:.6g} has no counterpart in s",
+            "take another order, or a higher rate",
+            pole=float(bad),
+        )
     poles = np.log(moving) * rate_hz
     held = np.concatenate([(moving - 1) / poles, np.ones(integrators)])
     parts = _parts(n, d[0], moving, integrators)

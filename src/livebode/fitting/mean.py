@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Responses
+from livebode.core import Responses, SignalError
 from livebode.fitting.line_verdicts import LineVerdicts
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
 
     Raises
     ------
-    InputError
+    SignalError
         If no line is ever valid, or there is a reason against each.
     """
     mean = RunningMean()
@@ -127,16 +127,18 @@ class RunningMean:
         self._first = min(self._first, int(part.first[0]))
 
     def response(self) -> Responses:
-        """The mean so far; InputError where no line was ever valid, or there is a reason against each."""
+        """The mean so far; SignalError where no line was ever valid, or there is a reason against each."""
         newest, verdict = self._newest, self._verdict
         if newest is None or verdict is None:
-            raise InputError("none of the responses is valid at any line; track more periods")
+            raise SignalError("no-valid-response", "none of the responses is valid at any line", "track more periods")
         known = newest.valid[0] if self.averages else self._pair.count > 0
         valid = known & ~verdict.against
         if not valid.any():
-            raise InputError(
+            raise SignalError(
+                "no-valid-response",
                 "no line is valid: what repeats with the excitation (distortion, hum of the mains, steps of a sensor) "
-                "is too large at each; the run's events give the reason for each line"
+                "is too large at each",
+                "see the run's events for the reason at each line",
             )
         return _without(newest, ~valid) if self.averages else self._mean_of_all(newest, verdict.distortion, valid)
 

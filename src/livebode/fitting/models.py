@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.fitting.chains import Rigid, TwoMass
 from livebode.fitting.physical import PhysicalModel
 from livebode.fitting.three_mass import ThreeMass
@@ -18,7 +18,7 @@ def model_named(name: str, **options: Any) -> PhysicalModel:
 
     Raises
     ------
-    InputError
+    UsageError
         If there is no such model, or it has no such option.
 
     Examples
@@ -27,10 +27,24 @@ def model_named(name: str, **options: Any) -> PhysicalModel:
     ('Js', 'mL', 'Keff', 'bs')
     """
     if name not in MODELS:
-        raise InputError(f"there is no model {name!r}; choose {', '.join(MODELS)}")
+        raise UsageError(
+            "unknown-name",
+            f"there is no model {name!r}",
+            f"choose {', '.join(MODELS)}",
+            argument="model",
+            value=name,
+            allowed=list(MODELS),
+        )
     given = {key: value for key, value in options.items() if value is not None}
     known = getattr(MODELS[name], "__dataclass_fields__", {})
     for key in given:
         if key not in known:
-            raise InputError(f"the model {name!r} does not take {key} = {given[key]!r}; leave it out")
+            raise UsageError(
+                "conflict",
+                f"the model {name!r} does not take {key} = {given[key]!r}",
+                "leave it out",
+                argument=key,
+                value=given[key],
+                model=name,
+            )
     return MODELS[name](**given)

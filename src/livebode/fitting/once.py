@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Parameters, Response, Responses
+from livebode.core import ExtraError, FitError, Parameters, Response, Responses
 from livebode.fitting.competing import Allowed, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.extended import WORDS
 from livebode.fitting.fitter import Fitter
@@ -126,7 +126,7 @@ class Fit:
 
         Raises
         ------
-        InputError
+        FitError
             If the fit failed.
         """
         f = np.asarray(frequency_hz, dtype=np.float64)
@@ -138,14 +138,22 @@ class Fit:
 
         Raises
         ------
-        InputError
-            If the fit failed, python-control is missing, or a negative delay is to become discrete.
+        FitError
+            If the fit failed, or a negative delay is to become discrete.
+        ExtraError
+            If python-control is not installed.
         """
         values = self._values()
         try:
             import control
         except ImportError:
-            raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
+            raise ExtraError(
+                "not-installed",
+                "python-control is not installed",
+                "pip install 'livebode[control]'",
+                package="control",
+                extra="control",
+            ) from None
         transfer = self.model.continuous(values)
         if discrete:
             late = float(values[self.model.names.index(DELAY)]) if DELAY in self.model.names else 0.0
@@ -165,7 +173,12 @@ class Fit:
 
     def _values(self) -> NDArray[np.float64]:
         if self.status != "ok":
-            raise InputError(f"there is no fit to evaluate: {self.sentence}")
+            raise FitError(
+                "not-fitted",
+                f"there is no fit to evaluate: {self.sentence}",
+                "give a fit that is valid",
+                status=self.status,
+            )
         return np.asarray(self.parameters.value[0])
 
 
@@ -188,7 +201,7 @@ def fit(
 
     Raises
     ------
-    InputError
+    UsageError, FitError
         If model, names, bounds or band cannot be, or the responses are not of a plant. A fit that fails is no error:
         its status says why, and its values are NaN.
 

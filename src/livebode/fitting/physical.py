@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 from livebode.fitting.transfer import Transfer
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,16 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if not (self.low <= self.start <= self.high and self.low < self.high and isfinite(self.start)):
-            raise InputError(f"parameter {self.name!r}: {self.start=:g} is not between {self.low:g} and {self.high:g}")
+            raise UsageError(
+                "out-of-range",
+                f"parameter {self.name!r}: start={self.start:g} is not between {self.low:g} and {self.high:g}",
+                "give a finite start within the bounds",
+                argument="start",
+                parameter=self.name,
+                value=self.start,
+                low=self.low,
+                high=self.high,
+            )
 
     @property
     def logarithmic(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, missing_channel
+from livebode.core import UsageError, missing_channel
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.physical import Grid, PhysicalModel
 
@@ -63,16 +63,38 @@ class Problem:
         fixed = dict(fixed or {})
         for name in (*fixed, *free):
             if name not in model.names:
-                raise InputError(_no_parameter(name, model))
+                raise UsageError(
+                    "unknown-name",
+                    f"the model {model.name!r} has no parameter {name!r}",
+                    _nearest(name, model),
+                    argument="fixed" if name in fixed else "free",
+                    value=name,
+                    allowed=list(model.names),
+                )
         self.model, self.grid = model, grid
         self.held = {p.name: p.held for p in model.parameters if p.held is not None and p.name not in free} | fixed
         self.free = np.array([name not in self.held for name in model.names])
         if not self.free.any():
-            raise InputError(f"every parameter of {model.name!r} is held; free at least one")
+            raise UsageError(
+                "conflict",
+                f"every parameter of {model.name!r} is held",
+                "free at least one",
+                argument="fixed",
+                model=model.name,
+            )
         chosen = [p for p, free_ in zip(model.parameters, self.free) if free_]
         for p in model.parameters:
             if (value := fixed.get(p.name)) not in (None, p.held) and not p.low <= value <= p.high:
-                raise InputError(f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}")
+                raise UsageError(
+                    "out-of-range",
+                    f"{p.name} = {value:g} is not between {p.low:g} and {p.high:g} {p.unit}",
+                    "hold it at a value within these bounds",
+                    argument="fixed",
+                    parameter=p.name,
+                    value=value,
+                    low=p.low,
+                    high=p.high,
+                )
         self._log = np.array([p.logarithmic for p in chosen])
         self._scale = np.array([1.0 if p.logarithmic else p.scale for p in chosen])
         self._unsized = np.array([p.unsized for p in chosen])
@@ -185,5 +207,5 @@ class Problem:
         return every[0], np.moveaxis((every[1:] - every[0]) / _STEP, 0, -1)
 
 
-def _no_parameter(name: str, model: PhysicalModel) -> str:
-    return missing_channel(name, model.names).replace("channel", "parameter", 1).replace("Channels", model.name)
+def _nearest(name: str, model: PhysicalModel) -> str:
+    return missing_channel(name, model.names).partition("; ")[2].replace("Channels", f"Parameters of {model.name!r}")

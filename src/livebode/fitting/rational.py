@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Parameters, Response, Responses
+from livebode.core import FitError, Parameters, Response, Responses, UsageError
 from livebode.core.parameters import OK
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.problem import Measured
@@ -51,8 +51,10 @@ def fit_rational(
 
     Raises
     ------
-    InputError
-        If the orders cannot be, or there are fewer lines than they need.
+    UsageError
+        If the orders cannot be.
+    FitError
+        If there are fewer lines than they need.
 
     Examples
     --------
@@ -68,15 +70,31 @@ def fit_rational(
     responses = measured if isinstance(measured, Responses) else Responses.of(measured)
     q, m = order, order - 1 if numerator_order is None else numerator_order
     if not (1 <= q <= _ORDER_MAX and 0 <= m < q):
-        raise InputError(
-            f"{order=} and numerator order {m} cannot be; take 1 ≤ order ≤ {_ORDER_MAX} and a lower numerator"
+        raise UsageError(
+            "out-of-range",
+            f"{order=} with numerator order {m} is not supported",
+            f"take an order from 1 to {_ORDER_MAX} and a lower one of the numerator",
+            argument="order",
+            value=order,
+            numerator_order=m,
         )
     if method not in ("levy", "sanathanan-koerner", "maximum likelihood"):
-        raise InputError(f"{method=} is not known; choose 'levy', 'sanathanan-koerner' or 'maximum likelihood'")
+        raise UsageError(
+            "not-one-of",
+            f"{method=} is not known",
+            "choose 'levy', 'sanathanan-koerner' or 'maximum likelihood'",
+            argument="method",
+            value=method,
+            allowed=["levy", "sanathanan-koerner", "maximum likelihood"],
+        )
     lines = responses.lines
     if 2 * len(lines) <= q + m + 1:
-        raise InputError(
-            f"{len(lines)} lines are too few for {q + m + 1} coefficients; take a lower order or more lines"
+        raise FitError(
+            "too-few-lines",
+            f"{len(lines)} lines are too few for {q + m + 1} coefficients",
+            "take a lower order or more lines",
+            lines=len(lines),
+            parameters=q + m + 1,
         )
     found, _ = measured_of(responses, np.ones(len(lines), dtype=bool))
     equations = _Equations(lines.z[:, np.newaxis] ** np.arange(q + 1), m + 1, found)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Parameters
+from livebode.core import ExtraError, Parameters
 from livebode.fitting.hold import to_continuous
 from livebode.fitting.transfer import Transfer
 
@@ -44,7 +44,13 @@ class Rational:
         try:
             import control
         except ImportError:
-            raise InputError("python-control is not installed; pip install 'livebode[control]'") from None
+            raise ExtraError(
+                "not-installed",
+                "python-control is not installed",
+                "pip install 'livebode[control]'",
+                package="control",
+                extra="control",
+            ) from None
         return control.tf(self.numerator, self.denominator, 1 / self.rate_hz)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import FitError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,7 +30,7 @@ class Transfer(NamedTuple):
 
         Raises
         ------
-        InputError
+        FitError
             If the numerator's degree is not below the denominator's, or there are more than two integrators.
         """
         n, d = ([np.asarray(c, dtype=np.float64) for c in part] for part in (numerator, denominator))
@@ -40,10 +40,14 @@ class Transfer(NamedTuple):
         while len(d) > 1 and not d[-1].any():
             d, integrators = d[:-1], integrators + 1
         if integrators > 2 or len(n) >= len(d) + integrators:
-            raise InputError(
+            raise FitError(
+                "not-proper",
                 f"a transfer function with numerator degree {len(n) - 1}, denominator degree "
-                f"{len(d) - 1 + integrators} and {integrators} integrators cannot be sampled; it must be strictly "
-                "proper, with at most two integrators"
+                f"{len(d) - 1 + integrators} and {integrators} integrators cannot be sampled",
+                "define one that is strictly proper, with at most two integrators",
+                numerator_degree=len(n) - 1,
+                denominator_degree=len(d) - 1 + integrators,
+                integrators=integrators,
             )
         return cls(_stacked(n), _stacked(d), integrators)
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.fitting.modal import QUALITY, scan
 from livebode.fitting.physical import Grid, Parameter, PhysicalModel, delay
 
@@ -43,7 +43,14 @@ class TwoMassGain(PhysicalModel):
 
     def __post_init__(self) -> None:
         if self.output not in ("velocity", "position"):
-            raise InputError(f"output={self.output!r} is not known; choose 'velocity' or 'position'")
+            raise UsageError(
+                "not-one-of",
+                f"output={self.output!r} is not known",
+                "choose 'velocity' or 'position'",
+                argument="output",
+                value=self.output,
+                allowed=["velocity", "position"],
+            )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]

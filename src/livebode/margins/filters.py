@@ -8,7 +8,7 @@ from math import atan, pi, sqrt, tan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.core.model import Algebra
 
 
@@ -43,8 +43,13 @@ class Biquad(Algebra):
         from scipy.signal import bilinear
 
         if not 0 < frequency_hz < rate_hz / 2:
-            raise InputError(
-                f"a filter at {frequency_hz:g} Hz cannot run at {rate_hz:g} Hz; it must lie below half the rate"
+            raise UsageError(
+                "out-of-range",
+                f"a filter at {frequency_hz:g} Hz cannot run at {rate_hz:g} Hz",
+                "choose a frequency below half the rate",
+                argument="frequency_hz",
+                value=frequency_hz,
+                rate_hz=rate_hz,
             )
         b, a = bilinear(numerator, denominator, fs=pi * frequency_hz / tan(pi * frequency_hz / rate_hz))
         return cls((float(b[0]), float(b[1]), float(b[2])), (float(a[1]), float(a[2])), rate_hz)
@@ -55,7 +60,7 @@ def notch(frequency_hz: float, depth_db: float, damping: float, rate_hz: float) 
 
     Raises
     ------
-    InputError
+    UsageError
         If the centre is not below half the rate.
 
     Examples
@@ -74,7 +79,7 @@ def low_pass(frequency_hz: float, rate_hz: float, damping: float = 1 / sqrt(2)) 
 
     Raises
     ------
-    InputError
+    UsageError
         If the frequency is not below half the rate.
 
     Examples
@@ -94,12 +99,17 @@ def notch_over(low_hz: float, high_hz: float, depth_db: float, least_damping: fl
 
     Raises
     ------
-    InputError
-        If the range does not lie below half the rate.
+    UsageError
+        If the range is not below half the rate.
     """
     if not 0 < low_hz <= high_hz < rate_hz / 2:
-        raise InputError(
-            f"a notch over {low_hz:g} … {high_hz:g} Hz cannot run at {rate_hz:g} Hz; it must lie below half"
+        raise UsageError(
+            "out-of-range",
+            f"a notch over {low_hz:g} … {high_hz:g} Hz cannot run at {rate_hz:g} Hz",
+            "choose a range below half the rate",
+            argument="high_hz",
+            value=high_hz,
+            rate_hz=rate_hz,
         )
     share = 10 ** (-depth_db / 20)
     low, high = tan(pi * low_hz / rate_hz), tan(pi * high_hz / rate_hz)  # as the bilinear transformation bends them

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Parameters
+from livebode.core import Parameters, UsageError
 from livebode.core.parameters import OK, half_width
 from livebode.core.rows import joined
 
@@ -84,9 +84,16 @@ class Margins:
         return np.asarray(self.value[:, self.index(name)])
 
     def index(self, name: str) -> int:
-        """Column of a margin; InputError with the known names where it is not one."""
+        """Column of a margin; UsageError with the known names where it is not one."""
         if name not in NAMES:
-            raise InputError(f"there is no margin {name!r}; choose from {', '.join(NAMES)}")
+            raise UsageError(
+                "unknown-name",
+                f"there is no margin {name!r}",
+                f"choose from {', '.join(NAMES)}",
+                argument="name",
+                value=name,
+                allowed=list(NAMES),
+            )
         return NAMES.index(name)
 
     def bound(self, probability: float = 0.95) -> Floats:
@@ -94,7 +101,7 @@ class Margins:
 
         Raises
         ------
-        InputError
+        UsageError
             If the probability is not between 0 and 1.
         """
         return half_width(self.sigma, probability)

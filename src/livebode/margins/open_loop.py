@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Loop, Model
+from livebode.core import FitError, Loop, Model
 from livebode.fitting import Grid, PhysicalModel
 from livebode.fitting.physical import Hold
 
@@ -39,8 +39,8 @@ class OpenLoop:
 
     Raises
     ------
-    InputError
-        If the loop does not say what feeds back.
+    FitError
+        If the loop has no feedback.
     """
 
     plant: PhysicalModel
@@ -51,7 +51,12 @@ class OpenLoop:
 
     def __post_init__(self) -> None:
         if self.loop.feedback is None:
-            raise InputError("margins need the loop's controllers; describe them under [loop] (docs/loop.md)")
+            raise FitError(
+                "loop-unknown",
+                "margins need the loop's controllers, and the loop has none",
+                "describe them under [loop] (docs/loop.md)",
+                key="loop",
+            )
 
     def at(self, values: Floats, frequency_hz: Floats) -> Complex:
         """L for values (rows, parameters) at frequencies (lines,) or (rows, lines): shape (rows, lines)."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Parameters
+from livebode.core import Parameters, UsageError
 from livebode.margins.crossings import Crossings, crossings, nearest_to_minus_one
 from livebode.margins.margins import EXTRAPOLATED, INTERPOLATED, NAMES, NONE, UNSTABLE, Margins
 from livebode.margins.open_loop import OpenLoop
@@ -39,7 +39,7 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
 
     Raises
     ------
-    InputError
+    UsageError
         If the band is not two ascending positive frequencies below half the rate.
 
     Examples
@@ -58,7 +58,14 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     """
     low, high = band_hz
     if not 0 < low <= high <= loop.rate_hz / 2:
-        raise InputError(f"{band_hz=} is not two ascending frequencies up to half the rate of {loop.rate_hz:g} Hz")
+        raise UsageError(
+            "out-of-range",
+            f"{band_hz=} is not two ascending frequencies up to half the rate of {loop.rate_hz:g} Hz",
+            "give the lowest and the highest frequency that the fits are valid for",
+            argument="band_hz",
+            value=[float(low), float(high)],
+            rate_hz=loop.rate_hz,
+        )
     found = _nothing(fits)
     rows = np.flatnonzero(fits.ok)
     for part in _parts(rows):

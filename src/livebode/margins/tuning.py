@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Parameters
+from livebode.core import FitError, Parameters, UsageError
 from livebode.margins.filters import Biquad, low_pass, notch_over
 from livebode.margins.margins import NAMES, Margins
 from livebode.margins.open_loop import OpenLoop
@@ -123,11 +123,19 @@ def tuning(
 
     Raises
     ------
-    InputError
-        If the target is not above 1, or no row holds a fit.
+    UsageError
+        If the target is not above 1.
+    FitError
+        If no row has a valid fit.
     """
     if not peak_sensitivity > 1:
-        raise InputError(f"{peak_sensitivity=} is not above 1, which no loop stays below; 2 is usual")
+        raise UsageError(
+            "out-of-range",
+            f"{peak_sensitivity=} is not above 1, the least that any loop has",
+            "2 is usual",
+            argument="peak_sensitivity",
+            value=peak_sensitivity,
+        )
     rows = _spread(fits)
     before = margins(rows, loop, band_hz)
     ms, bound = before.of("peak_sensitivity"), before.bound()[:, NAMES.index("peak_sensitivity")]
@@ -189,7 +197,12 @@ def _spread(fits: Parameters) -> Parameters:
     """Up to 32 rows that hold numbers, evenly spread over the schedule, or over the run without one."""
     good = np.flatnonzero(fits.ok)
     if not good.size:
-        raise InputError("no response could be fitted, so there is nothing to tune for; see the status of the fits")
+        raise FitError(
+            "not-fitted",
+            "no response could be fitted, so that there is no model to tune for",
+            "see the status of the fits",
+            rows=len(fits.ok),
+        )
     order = good[np.argsort(fits.schedule[good], kind="stable")] if np.isfinite(fits.schedule[good]).all() else good
     chosen = np.unique(np.rint(np.linspace(0, order.size - 1, _ROWS)).astype(int))
     return fits[np.asarray(order[chosen])]

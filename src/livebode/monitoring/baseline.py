@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import InputError, Lines
+from livebode.core import BaselineError, Lines
 from livebode.estimation import Settings
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.rows import PLACES, places
@@ -54,7 +54,7 @@ class Baseline:
     remark: str = ""
 
     def check(self, settings: Settings, corrected: bool = False) -> None:
-        """InputError where a run with these settings cannot be held against it."""
+        """BaselineError where a run with these settings cannot be compared with it."""
         mine, lines = self.lines, settings.lines
         signals = signals_of(settings)
         for name, learned, here in (
@@ -67,9 +67,13 @@ class Baseline:
             *((role, str(self.signals[role]), str(signals[role])) for role in signals),
         ):
             if learned != here:
-                raise InputError(
-                    f"the baseline was learned with {name} {learned}, and this run has {here}; take the same {name}, "
-                    "or learn a baseline from such runs"
+                raise BaselineError(
+                    "settings-differ",
+                    f"the baseline was learned with {name} {learned}, and this run has {here}",
+                    f"take the same {name}, or learn a baseline from such runs",
+                    setting=name,
+                    learned=learned,
+                    value=here,
                 )
         if self.machine is None:
             self._check_hop(settings.step)
@@ -80,12 +84,16 @@ class Baseline:
         return self.machine.covariates.names if self.machine is not None else ()
 
     def check_covariates(self, names: tuple[str, ...]) -> None:
-        """InputError where a run names other covariates than these; naming none takes them from here."""
+        """BaselineError where a run names other covariates than these; naming none takes them from here."""
         if names and set(names) != set(self.covariates):
             learned, here = (", ".join(some) or "no covariates" for some in (self.covariates, names))
-            raise InputError(
-                f"the baseline was learned with {learned}, and [monitoring] covariates of this run are {here}; take "
-                "the same, or learn a baseline from such runs"
+            raise BaselineError(
+                "settings-differ",
+                f"the baseline was learned with {learned}, and the covariates of this run are {here}",
+                "take the same in [monitoring] covariates, or learn a baseline from such runs",
+                setting="covariates",
+                learned=list(self.covariates),
+                value=list(names),
             )
 
     @property
@@ -102,14 +110,19 @@ class Baseline:
         window = self.lines.window
         known = len(self.places) >= PLACES or places(window, hop)[0] in self.places
         if not known or self.apart % max(window, hop):
-            raise InputError(
-                f"the baseline was learned with hop {self.hop}, and this run has {hop}, whose windows stand where the "
-                f"baseline knows none; take hop {self.hop}, or learn a baseline from such runs"
+            raise BaselineError(
+                "settings-differ",
+                f"the baseline was learned with hop {self.hop}, and this run has {hop}, whose windows are at places of "
+                "the period that were not learned",
+                f"take hop {self.hop}, or learn a baseline from such runs",
+                setting="hop",
+                learned=self.hop,
+                value=hop,
             )
 
     @classmethod
     def load(cls, path: Path) -> Baseline:
-        """The baseline in a file; InputError where it cannot be read or is none."""
+        """The baseline in a file; BaselineError where it cannot be read or is none."""
         from livebode.monitoring.baseline_file import load
 
         return load(path)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import BaselineError, Lines, LivebodeError, OutputError
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.baseline import ROLES, Baseline
 from livebode.monitoring.baseline_part import Part
@@ -26,6 +26,7 @@ from livebode.motion import Curve, MovingModel
 
 _FORMAT = "livebode baseline"
 _VERSION = 4
+_LEARN = "learn one from runs (livebode learn)"
 _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3}  # and their dimensions
 
 
@@ -44,7 +45,14 @@ def save(baseline: Baseline, path: Path) -> None:
             Path(name).unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise InputError(f"the baseline could not be written to {str(path)!r}: {error.strerror}") from None
+        raise OutputError(
+            "not-written",
+            f"the baseline could not be written to {str(path)!r}: {error.strerror}",
+            "make room, or choose another path",
+            path=str(path),
+            reason=error.strerror,
+            errno=error.errno,
+        ) from None
 
 
 def load(path: Path) -> Baseline:
@@ -52,19 +60,28 @@ def load(path: Path) -> Baseline:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(
-            f"there is no baseline {str(path)!r}; make one with `livebode learn RUN --out {path}`"
-        ) from None
+        raise BaselineError("absent", f"there is no baseline {str(path)!r}", _LEARN, path=str(path)) from None
     except OSError as error:
-        raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+        raise BaselineError(
+            "unreadable",
+            f"{str(path)!r} cannot be read: {error.strerror}",
+            "check its permissions",
+            path=str(path),
+            reason=error.strerror,
+        ) from None
     except ValueError as error:
-        raise InputError(f"{str(path)!r} is not a baseline: {error}") from None
+        raise BaselineError(
+            "not-a-baseline", f"{str(path)!r} is not a baseline: {error}", _LEARN, path=str(path), reason=str(error)
+        ) from None
     if not isinstance(data, dict) or data.get("format") != _FORMAT:
-        raise InputError(f"{str(path)!r} is not a baseline; make one with `livebode learn`")
+        raise BaselineError("not-a-baseline", f"{str(path)!r} is not a baseline", _LEARN, path=str(path))
     if data.get("version") != _VERSION:
-        raise InputError(
-            f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}"
-            "; learn it again"
+        raise BaselineError(
+            "version",
+            f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}",
+            "learn it again",
+            path=str(path),
+            version=data.get("version"),
         )
     return _baseline(Part(str(path), "", data))
 
@@ -94,9 +111,14 @@ def _baseline(data: Part) -> Baseline:
     window, rate_hz = part.whole("window"), part.number("rate_hz", 0)
     try:
         lines = Lines(bins, window, rate_hz, quiet)
-    except InputError as error:
-        raise InputError(
-            f"the baseline {data.file!r} is damaged: its lines cannot be ({error}); learn it again"
+    except LivebodeError as error:
+        raise BaselineError(
+            "damaged",
+            f"the baseline {data.file!r} is damaged: its lines cannot be a grid ({error.message})",
+            "learn it again",
+            path=data.file,
+            key="lines",
+            reason=error.message,
         ) from None
     tables = tuple(_table(table) for table in data.parts("tables"))
     if not tables:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import BaselineError
 
 
 @dataclass(frozen=True)
@@ -69,17 +69,19 @@ class Part:
 
     def value(self, name: str) -> Any:
         if not isinstance(self.data, dict):
-            raise InputError(f"the baseline {self.file!r} is damaged: {self.path[:-1]} is no table; learn it again")
+            raise self._damaged(self.path[:-1], "is not a table")
         if name not in self.data:
-            raise InputError(f"the baseline {self.file!r} is damaged: {self.path}{name} is missing; learn it again")
+            raise self._damaged(f"{self.path}{name}", "is missing")
         return self.data[name]
 
-    def wrong(self, name: str, why: str, value: Any = None) -> InputError:
+    def wrong(self, name: str, why: str, value: Any = None) -> BaselineError:
         shown = repr(self.data[name] if value is None else value)
         shown = shown if len(shown) <= 40 else shown[:37] + "…"
-        return InputError(
-            f"the baseline {self.file!r} is damaged: {self.path}{name} = {shown} is {why}; learn it again"
-        )
+        return self._damaged(f"{self.path}{name}", f"= {shown} is {why}")
+
+    def _damaged(self, key: str, why: str) -> BaselineError:
+        message = f"the baseline {self.file!r} is damaged: {key} {why}"
+        return BaselineError("damaged", message, "learn it again", path=self.file, key=key)
 
     def _typed(self, name: str, kind: type, words: str) -> Any:
         value = self.value(name)

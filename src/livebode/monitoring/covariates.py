@@ -8,7 +8,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import BaselineError
 
 Floats = NDArray[np.float64]
 
@@ -88,13 +88,15 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
 
     Raises
     ------
-    InputError
+    BaselineError
         If one has no value or, but for its noise, a constant one, or two are too strongly correlated.
     """
     if not len(value):
-        raise InputError(
-            f"no window of steady motion has a value of the covariates {', '.join(names)}; check these channels, or "
-            "leave them out of [monitoring] covariates"
+        raise BaselineError(
+            "covariate-unknown",
+            f"no window of steady motion has a value of the covariates {', '.join(names)}",
+            "check these channels, or leave them out of [monitoring] covariates",
+            channels=list(names),
         )
     low, high = value.min(axis=0), value.max(axis=0)
     # Of Gaussian differences, which the few steps from run to run hardly change.
@@ -103,16 +105,23 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
         rounding = _CONSTANT * max(abs(least), abs(most))
         if most - least <= max(rounding, _NOISE * own):
             what = f"{least:g}" if most - least <= rounding else f"{least:.6g} to {most:.6g}, no more than its noise,"
-            raise InputError(
-                f"the covariate {name!r} is {what} in all runs, so its influence cannot be learned; add runs at other "
-                "values, or leave it out of [monitoring] covariates"
+            raise BaselineError(
+                "covariate-constant",
+                f"the covariate {name!r} is {what} in all runs, so its influence cannot be learned",
+                "add runs at other values, or leave it out of [monitoring] covariates",
+                channel=name,
+                low=float(least),
+                high=float(most),
             )
     alike = np.abs(np.atleast_2d(np.corrcoef(value.T))) - np.eye(len(names))
     if alike.max() > _ALIKE:
         one, other = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
-        raise InputError(
-            f"the covariates {one!r} and {other!r} are too strongly correlated in these runs ({alike.max():.3f}); name "
-            "one of them in [monitoring] covariates"
+        raise BaselineError(
+            "covariates-correlated",
+            f"the covariates {one!r} and {other!r} are too strongly correlated in these runs ({alike.max():.3f})",
+            "name one of them in [monitoring] covariates",
+            channels=[one, other],
+            correlation=float(alike.max()),
         )
     n = len(names)
     return Covariates(names, value.mean(axis=0), low, high, np.zeros((4, n)), np.zeros((4, n, n)))

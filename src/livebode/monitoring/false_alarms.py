@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import isfinite, log
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 DEFAULT = "one in 30 days of motion"
 
@@ -34,7 +34,7 @@ def seconds_between(text: str) -> float:
 
     Raises
     ------
-    InputError
+    UsageError
         If the words cannot be read, or the time is not positive.
 
     Examples
@@ -47,12 +47,21 @@ def seconds_between(text: str) -> float:
     words = " ".join(text.lower().split())
     seconds = _plain(words)
     if seconds is None:
-        raise InputError(
-            f"false alarms {text!r} cannot be read; write for example 'one in 30 days of motion', 'once a year', "
-            "'2 per month' or a number of seconds"
+        raise UsageError(
+            "unreadable",
+            f"false alarms {text!r} cannot be read",
+            "write for example 'one in 30 days of motion', 'once a year', '2 per month' or a number of seconds",
+            argument="false_alarms",
+            value=text,
         )
     if not (isfinite(seconds) and 0 < seconds <= _MOST_S):
-        raise InputError(f"false alarms {text!r} are not a positive time; write for example {DEFAULT!r}")
+        raise UsageError(
+            "out-of-range",
+            f"false alarms {text!r} are not a positive time",
+            f"write for example {DEFAULT!r}",
+            argument="false_alarms",
+            value=text,
+        )
     return seconds
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, InputError, Lines
+from livebode.core import BaselineError, Block, Lines
 from livebode.monitoring.accuracy import Accuracy, accuracy
 from livebode.monitoring.between_runs import KNOWN, between_runs
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
@@ -62,8 +62,10 @@ def learn_machine(
 
     Raises
     ------
-    InputError
-        If the runs hold too little steady motion, no two masses fit them, or a covariate is constant.
+    BaselineError
+        If the runs hold too little steady motion, or a covariate is constant.
+    FitError
+        If no two masses fit them.
     """
     names = input, output, schedule, *covariates
     rows, speed, covariate = _first_look(runs, lines, names)
@@ -149,9 +151,14 @@ def _first_look(runs: Sequence[Run], lines: Lines, names: tuple[str, ...]) -> tu
     fastest = np.max(np.abs(speed), initial=0.0)
     use = np.flatnonzero((np.abs(speed) >= _SLOWEST * fastest) & np.all(np.abs(u) > 0, axis=1))
     if use.size < _ROWS_MIN or fastest == 0:
-        raise InputError(
+        raise BaselineError(
+            "too-few-windows",
             f"the runs hold {use.size} windows of steady motion along {names[2]!r}, less than the {_ROWS_MIN} that a "
-            "model of the moving machine needs; give longer runs, or a shorter window"
+            "model of the moving machine needs",
+            "give longer runs, or a shorter window",
+            channel=names[2],
+            windows=int(use.size),
+            windows_min=_ROWS_MIN,
         )
     known = covariate[use][np.isfinite(covariate[use]).all(axis=1)]
     use = use[np.argsort(centre[use], kind="stable")]
@@ -190,7 +197,13 @@ def _seen(run: Run, machine: Machine, lines: Lines, names: tuple[str, ...], offs
     parts = [source.process(stretch, offset) for block in run() for stretch in stretches.process(block)]
     parts += [source.process(stretch, offset) for stretch in stretches.finish()]
     if not parts:
-        raise InputError("a run is shorter than twelve windows; leave it out or give a longer one")
+        raise BaselineError(
+            "too-few-windows",
+            "a run is shorter than twelve windows",
+            "leave it out, or give a longer one",
+            windows_min=12,
+            window=lines.window,
+        )
     seen = Evidence.join(parts)
     return seen.rows(seen.judged)
 

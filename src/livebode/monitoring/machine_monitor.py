@@ -35,7 +35,7 @@ class MachineMonitor:
         self.detector = MachineDetector(machine, threshold(mean_s, lines.window / lines.rate_hz, charts))
 
     def process(self, block: Block, look: Look | None = None) -> list[Event]:
-        """Events of the windows that this Block completes; InputError where a channel is missing.
+        """Events of the windows that this Block completes; LivebodeError where a channel is missing.
 
         `look` is called with the Evidence of every stretch, to show or keep it.
         """

@@ -35,8 +35,10 @@ class Monitor:
 
     Raises
     ------
-    InputError
-        If the baseline was learned with other lines or signals, or the words cannot be read.
+    BaselineError
+        If the baseline was learned with other lines or signals.
+    UsageError
+        If `false_alarms` cannot be read.
     """
 
     def __init__(
@@ -124,7 +126,7 @@ class Monitor:
         return snapshots.pack(parts, self._owner())
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot of a Monitor with the same baseline and settings; InputError where it is another's."""
+        """Continue from a snapshot of a Monitor of the same baseline and settings; LivebodeError if it is not."""
         parts = snapshots.unpack(snapshot, self._owner())
         self._counts = {name: int(count) for name, count in parts["counts"].items()}
         if self._machine is not None:

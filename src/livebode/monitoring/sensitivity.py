@@ -82,6 +82,6 @@ class Replay:
 
     def _run(self, inertia_kg_m2: float, inputs: Floats) -> Floats:
         settings = self._settings | {"motor_inertia_kg_m2": inertia_kg_m2}
-        wrong = "the baseline's model does not stay finite under this torque; check its signals and units"
-        velocity = np.asarray(advance(settings, inputs, wrong)[1])
+        wrong = "the baseline's model does not stay finite under this torque"
+        velocity = np.asarray(advance(settings, inputs, wrong, "check its signals and units")[1])
         return late(velocity, self._delay_samples)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import BaselineError
 from livebode.monitoring.accuracy import STRETCH, Accuracy, accuracy
 from livebode.monitoring.rows import Rows
 from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, Table, cells
@@ -31,14 +31,19 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
 
     Raises
     ------
-    InputError
+    BaselineError
         If there are too few rows, or no cell has enough of them.
     """
     windows = sum(int(rows.ok.sum()) for rows in runs) // overlap
     if windows < 3 * WINDOWS_MIN:
-        raise InputError(
+        raise BaselineError(
+            "too-few-windows",
             f"the runs hold {windows} windows with valid {what} that do not overlap, less than the {3 * WINDOWS_MIN} "
-            "that a baseline needs; give longer runs"
+            "that a baseline needs",
+            "give longer runs",
+            quantity=what,
+            windows=windows,
+            windows_min=3 * WINDOWS_MIN,
         )
     rows = Rows.join(runs)
     rows = rows.some(rows.ok)
@@ -47,8 +52,12 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
     rows, cell = rows.some(inside), cell[inside]
     table = _moments(what, tuple(names), (low, step, still), bins, rows, cell, overlap)
     if not np.any(table.count >= WINDOWS_MIN):
-        raise InputError(
-            f"no bin of the schedule holds {WINDOWS_MIN} windows of {what}; give longer runs over the whole way"
+        raise BaselineError(
+            "too-few-windows",
+            f"no bin of the schedule holds {WINDOWS_MIN} windows of {what}",
+            "give longer runs over the whole way",
+            quantity=what,
+            windows_min=WINDOWS_MIN,
         )
     table = replace(table, accuracy=replace(table.accuracy, smallest=_smallest(table)))
     deviation, variance = table.deviation(rows, cell)

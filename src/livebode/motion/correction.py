@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Event, InputError, Responses
+from livebode.core import Block, Channel, Event, Responses, SignalError
 from livebode.estimation import Settings, Tracker, snapshots
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
@@ -78,8 +78,10 @@ class MotionCorrection:
 
     Raises
     ------
-    InputError
-        If a signal is not named, the quantity is not the plant, or the loop cannot be simulated.
+    UsageError
+        If a signal is not named, the quantity is not the plant, or a number is out of its range.
+    SimulationError
+        If the loop cannot be simulated.
 
     Examples
     --------
@@ -173,7 +175,7 @@ class MotionCorrection:
 
         Raises
         ------
-        InputError
+        LivebodeError
             As `Tracker.process`.
         """
         for name in self._names:
@@ -198,7 +200,7 @@ class MotionCorrection:
     def finish(self) -> Responses:
         """Responses of what is left, fitted as a short chunk; the next Block starts anew."""
         if not self._recorded:
-            raise InputError("there are no samples to finish; process a block first")
+            raise SignalError("too-short", "there are no samples to finish", "process a block first", samples=0)
         last = self._corrected(self._recorded.stop)
         self._recorded.forget()
         return last
@@ -216,7 +218,7 @@ class MotionCorrection:
 
         Raises
         ------
-        InputError
+        LivebodeError
             If the snapshot is damaged or belongs to other settings; the correction is then as it was.
         """
         parts = snapshots.unpack(snapshot, self._identity)

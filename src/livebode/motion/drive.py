@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import PID, Cascade, InputError, Loop
+from livebode.core import PID, Cascade, Loop, SimulationError
 from livebode.simulation.settings import Drive
 
 
@@ -13,7 +13,7 @@ def drive_of(loop: Loop, rate_hz: float) -> Drive:
 
     Raises
     ------
-    InputError
+    SimulationError
         If the feedback is not a P or PI velocity controller with backward integrator, alone or under a P position
         controller (a `Cascade`), if the excitation does not enter at the torque, or rates do not divide.
     """
@@ -36,16 +36,34 @@ def _controllers(loop: Loop) -> tuple[PID, PID | None]:
     cascade = given if isinstance(given, Cascade) else None
     feedback, position = (cascade.velocity, cascade.position) if cascade else (given, None)
     if not isinstance(feedback, PID) or not (position is None or isinstance(position, PID)):
-        raise InputError(
-            "the loop can be simulated with its controllers alone: describe the feedback as "
-            "Cascade(velocity=PID(...), position=PID(...)) or a PID on the velocity, or drive the model by 'torque'"
+        raise SimulationError(
+            "loop-unsupported",
+            f"a loop whose feedback is {type(given).__name__} cannot be simulated",
+            "describe the feedback as Cascade(velocity=PID(...), position=PID(...)) or a PID on the velocity, or drive "
+            "the model by 'torque'",
+            key="loop.feedback",
         )
     if feedback.derivative_time_s or (np.isfinite(feedback.integral_time_s) and feedback.integrator != "backward"):
-        raise InputError("only P and PI velocity controllers with a backward integrator can be simulated")
+        raise SimulationError(
+            "loop-unsupported",
+            "only P and PI velocity controllers with a backward integrator can be simulated",
+            "drive the model by 'torque'",
+            key="loop.feedback",
+        )
     if position is not None and (
         position.derivative_time_s or np.isfinite(position.integral_time_s) or position.delay_ticks
     ):
-        raise InputError("only P position controllers without a delay of their own can be simulated")
+        raise SimulationError(
+            "loop-unsupported",
+            "only P position controllers without a delay of their own can be simulated",
+            "drive the model by 'torque'",
+            key="loop.feedback",
+        )
     if loop.entry is not None:
-        raise InputError("only an excitation that is added to the torque reference can be simulated")
+        raise SimulationError(
+            "loop-unsupported",
+            "only an excitation that is added to the torque reference can be simulated",
+            "drive the model by 'torque'",
+            key="loop.entry",
+        )
     return feedback, position

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import FitError
 from livebode.fitting import two_masses
 from livebode.fitting.least_squares import minimise
 from livebode.fitting.windows import scan
@@ -59,7 +59,12 @@ class Fit:
         found, cost = scan(rows.value[order], rows.weight[order], self.z, self.rate_hz)
         good = np.isfinite(cost) & (cost <= 10 * np.median(cost))
         if np.count_nonzero(good) < 1:
-            raise InputError("no two masses fit these responses; check the lines, the signals and the loop")
+            raise FitError(
+                "no-model",
+                "no two masses fit these responses",
+                "check the lines, the signals and the loop",
+                rows=len(chosen),
+            )
         found, at = found[good], rows.position_m[order][good]
         low, high = float(rows.position_m.min()), float(rows.position_m.max())
         found[:, :2] = np.median(found[:, :2], axis=0)

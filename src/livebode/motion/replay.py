@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import shift
 
-from livebode.core import InputError
+from livebode.core import SimulationError
 from livebode.motion.model import MovingModel
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
@@ -91,11 +91,12 @@ def engine(model: MovingModel, drive: Drive, most: tuple[float, float]) -> dict[
     return engine_settings(axis) | {"position_m_min": -_ANYWHERE_M, "position_m_max": _ANYWHERE_M}
 
 
-def advance(settings: dict[str, Any], inputs: Floats, otherwise: str) -> Floats:
-    """What the Engine gives for inputs of shape (10, samples), from rest; InputError(otherwise) where it diverges."""
+def advance(settings: dict[str, Any], inputs: Floats, wrong: str, remedy: str) -> Floats:
+    """Outputs of the Engine for inputs of shape (10, samples), from rest; SimulationError where it diverges."""
     output = np.empty((3 + _STATES, inputs.shape[1]))
-    if Engine(settings, PLACE_M).advance(inputs, output) < inputs.shape[1]:
-        raise InputError(otherwise)
+    done = Engine(settings, PLACE_M).advance(inputs, output)
+    if done < inputs.shape[1]:
+        raise SimulationError("diverged", wrong, remedy, sample=int(done))
     return output
 
 
@@ -106,6 +107,6 @@ def _run(model: MovingModel, drive: Drive, w: Floats, position_m: Floats) -> tup
     inputs = np.zeros((INPUTS, w.size))
     inputs[0], inputs[2] = PLACE_M / model.radius_m, w
     inputs[4], inputs[5], inputs[6] = stiffness / most[0], damping / most[1], model.load_kg
-    wrong = "the fitted model does not stay in its loop; check the loop's description and the radius"
-    output = advance(engine(model, drive, most), inputs, wrong)
+    wrong = "the fitted model diverges in its loop"
+    output = advance(engine(model, drive, most), inputs, wrong, "check the loop's description and the radius")
     return output[0], output[1], output[6]

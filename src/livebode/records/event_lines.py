@@ -23,7 +23,7 @@ def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Itera
 
     Raises
     ------
-    InputError, OSError
+    RecordError, OSError
         If the file cannot be read.
     """
     sample, time_s, number = 0, 0.0, 0

@@ -11,7 +11,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-from livebode.core import InputError
+from livebode.core import RecordError
 
 _SAFE = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
 _SAFE |= getattr(os, "O_BINARY", 0)
@@ -22,7 +22,7 @@ def open_read(run: Path, name: str) -> BinaryIO:
 
     Raises
     ------
-    InputError
+    RecordError
         If it is no regular file, or reached through a link.
     OSError
         If it cannot be opened; FileNotFoundError where it is not there.
@@ -41,12 +41,18 @@ def open_read(run: Path, name: str) -> BinaryIO:
 
 
 def read_bytes(run: Path, name: str, size_bytes_max: int | None = None) -> bytes:
-    """All that a file of a run holds; InputError where it is longer than this."""
+    """All that a file of a run holds; RecordError where it is longer than this."""
     with open_read(run, name) as file:
         small = size_bytes_max is None or os.fstat(file.fileno()).st_size <= size_bytes_max
         data = file.read(-1 if size_bytes_max is None else size_bytes_max + 1) if small else b""
     if not small or (size_bytes_max is not None and len(data) > size_bytes_max):
-        raise InputError(f"{str(run / name)!r} is longer than {size_bytes_max} bytes; a run does not write that")
+        raise RecordError(
+            "too-large",
+            f"{str(run / name)!r} is longer than the {size_bytes_max} bytes that a run writes at most",
+            "move it away",
+            path=str(run / name),
+            limit_bytes=size_bytes_max,
+        )
     return data
 
 
@@ -56,14 +62,19 @@ def is_folder(path: Path) -> bool:
 
 
 def check_folder(run: Path, name: str) -> None:
-    """InputError where the directory of a run's file is a link, or a file."""
+    """RecordError where the directory of a run's file is a link, or a file."""
     folder = (run / name).parent
     if folder != run and os.path.lexists(folder) and not is_folder(folder):
-        raise InputError(f"{str(folder)!r} is not a directory of the run; remove it")
+        raise RecordError(
+            "not-own-file",
+            f"{str(folder)!r} is a link or a file, where a run has a directory",
+            "remove it",
+            path=str(folder),
+        )
 
 
 def check_own(run: Path, name: str) -> None:
-    """InputError where a file that is to be written is a link, no regular file, or has another name elsewhere."""
+    """RecordError where a file that is to be written is a link, no regular file, or has another name elsewhere."""
     check_folder(run, name)
     try:
         found = os.lstat(run / name)
@@ -73,5 +84,7 @@ def check_own(run: Path, name: str) -> None:
         raise _not_regular(run / name)
 
 
-def _not_regular(path: Path) -> InputError:
-    return InputError(f"{str(path)!r} is not a file of its own (a link, a pipe or a device); remove it")
+def _not_regular(path: Path) -> RecordError:
+    return RecordError(
+        "not-own-file", f"{str(path)!r} is not a regular file (a link, a pipe or a device)", "remove it", path=str(path)
+    )

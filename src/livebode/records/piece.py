@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.core import Event, InputError
+from livebode.core import Event, RecordError
 from livebode.records.inside import open_read
 from livebode.records.segments.damage import KIND
 
@@ -47,7 +47,7 @@ class Piece:
 
     Raises
     ------
-    InputError
+    RecordError
         If run.json says what a run does not write.
     """
 
@@ -59,7 +59,13 @@ class Piece:
                 self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
                 self._parts[-1]
         except (TypeError, LookupError, ValueError):
-            raise InputError(f"{str(run / 'run.json')!r} does not name the parts of {name} as a run does") from None
+            raise RecordError(
+                "unexpected-content",
+                f"{str(run / 'run.json')!r} does not name the parts of {name} as a run does",
+                "run the recording again",
+                path=str(run / "run.json"),
+                key=f"files.{name}",
+            ) from None
 
     def groups(self) -> list[int] | None:
         """The numbers of the row groups that are whole; None for all. Damaged ones are reported.

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.dataset as ds
 from pyarrow.fs import LocalFileSystem
 
-from livebode.core import Event, InputError
+from livebode.core import Event, ExtraError, UsageError
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.plain_json import to_json
@@ -62,13 +62,23 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
 
     Raises
     ------
-    InputError
-        If DuckDB is not installed, the query cannot be run, or the run cannot be read.
+    ExtraError
+        If DuckDB is not installed.
+    UsageError
+        If the query cannot be run.
+    RecordError
+        If the run cannot be read.
     """
     try:
         import duckdb
     except ImportError:
-        raise InputError("DuckDB is not installed; pip install 'livebode[query]'") from None
+        raise ExtraError(
+            "not-installed",
+            "DuckDB is not installed",
+            "pip install 'livebode[query]'",
+            package="duckdb",
+            extra="query",
+        ) from None
     with duckdb.connect(":memory:") as database:
         try:
             asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)
@@ -82,9 +92,20 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         except duckdb.Error as error:
             # Below the sentence stands the query again, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
-            raise InputError(f"the query cannot be run: {sentence} (this run has {_known(run)})") from None
+            tables = _known(run)
+            raise UsageError(
+                "query-rejected",
+                f"the query cannot be run: {sentence}",
+                f"query the tables of this run: {', '.join(tables)}",
+                argument="sql",
+                reason=sentence,
+                tables=tables,
+            ) from None
     if found is None:
-        raise InputError(f"the query is empty; write SQL on {_known(run)}")
+        tables = _known(run)
+        raise UsageError(
+            "missing", "the query is empty", f"write SQL on {', '.join(tables)}", argument="sql", tables=tables
+        )
     return found
 
 
@@ -108,8 +129,8 @@ def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
             raise
 
 
-def _known(run: Run) -> str:
-    return ", ".join(["events", "single_events", *run.files(_TABLES)])
+def _known(run: Run) -> list[str]:
+    return ["events", "single_events", *run.files(_TABLES)]
 
 
 def _show(run: Run, database: Any, asked: set[str]) -> None:

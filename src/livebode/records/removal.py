@@ -8,7 +8,7 @@ import re
 import stat
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.records.inside import is_folder
 from livebode.records.summary_file import read_summary
 
@@ -39,17 +39,25 @@ def foreign(run: Path) -> list[str]:
 
 
 def check_removable(path: Path) -> None:
-    """InputError where this is not an empty directory, or that of a run with nothing foreign in it."""
+    """RecordError where this is not an empty directory, or that of a run with nothing foreign in it."""
     if not is_folder(path) or (any(path.iterdir()) and not os.path.lexists(path / "run.json")):
-        raise InputError(f"{str(path)!r} is not the directory of a run, so --force leaves it; take another --out")
+        raise RecordError(
+            "not-a-run",
+            f"{str(path)!r} is not the directory of a run, so it is not replaced",
+            "choose another path",
+            path=str(path),
+        )
     if not any(path.iterdir()):
         return
     read_summary(path)
     if others := foreign(path):
         named = ", ".join(others[:_SHOWN]) + f" and {len(others) - _SHOWN} more" * (len(others) > _SHOWN)
-        raise InputError(
-            f"{str(path)!r} holds what livebode did not write, so --force leaves it: {named}; move that away, or take "
-            "another --out"
+        raise RecordError(
+            "foreign-files",
+            f"{str(path)!r} is not replaced, since it holds what livebode did not write: {named}",
+            "move that away, or choose another path",
+            path=str(path),
+            files=others,
         )
 
 

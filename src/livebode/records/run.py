@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
-from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, InputError, Lines, Responses
+from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, Lines, LivebodeError, RecordError, Responses
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
@@ -72,14 +72,25 @@ class Run:
 
         Raises
         ------
-        InputError
-            If no run left it, or run.json or the responses cannot be read.
+        RecordError
+            If no run wrote it, or run.json or the responses cannot be read.
+        GridError
+            If the lines in run.json cannot be a grid.
         """
         summary, damaged = read_summary(path)
         run = cls(path, summary, told=told)
         if wrong := what_is_wrong(summary):
-            raise InputError(f"{str(path / RUN)!r} is not what a run writes ({wrong}); run the recording again")
-        len(run.lines)  # or InputError
+            raise RecordError(
+                "unexpected-content",
+                f"{str(path / RUN)!r} is not what a run writes ({wrong})",
+                "run the recording again",
+                path=str(path / RUN),
+                reason=wrong,
+            )
+        try:
+            len(run.lines)
+        except LivebodeError as error:
+            raise error.at(str(path / RUN)) from None
         if damaged:
             run.tell(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
         return run
@@ -135,7 +146,13 @@ class Run:
         rest: pa.Table | None = None
         for part in tables:
             if part.schema.names not in (SCHEMA.names, [name for name in SCHEMA.names if name not in ADDED]):
-                raise InputError(f"the responses in {str(self.path)!r} have other columns than a run writes")
+                raise RecordError(
+                    "unexpected-content",
+                    f"the responses in {str(self.path)!r} have other columns than a run writes",
+                    "run the recording again",
+                    path=str(self.path),
+                    columns=part.schema.names,
+                )
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
                 table = piece if rest is None else pa.concat_tables([rest, piece])
@@ -144,7 +161,12 @@ class Run:
                 if whole:
                     yield self._responses(table.slice(0, whole), lines)
         if rest is not None and rest.num_rows:
-            raise InputError(f"the record in {str(self.path)!r} ends within a response; it is not what the run wrote")
+            raise RecordError(
+                "unexpected-content",
+                f"the record in {str(self.path)!r} ends within a response, which a run does not write",
+                "run the recording again",
+                path=str(self.path),
+            )
 
     def tables(
         self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
@@ -155,7 +177,7 @@ class Run:
 
         Raises
         ------
-        InputError
+        RecordError
             While iterating, if nothing can be read, or it holds what a run does not write. A part that is damaged is
             left out and noted in `damages`.
         """
@@ -166,7 +188,7 @@ class Run:
             elif (piece := self._piece(name)) is not None:
                 yield from (pa.Table.from_batches([batch]) for batch in piece.batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
-            raise InputError(f"{str(file)!r} cannot be read: {error}") from None
+            raise _unreadable(file, error) from None
 
     def _piece(self, name: str) -> Piece | None:
         """A table that is in one file; None where it was not recorded, or the file is gone, which is reported."""
@@ -195,7 +217,7 @@ class Run:
                 if segment.table in found and reading.whole(self.path, segment, self.tell) is not None:
                     found[segment.table].paths.append(self.path / segment.name)
         except (OSError, pa.ArrowException) as error:
-            raise InputError(f"the record in {str(self.path)!r} cannot be read: {error}") from None
+            raise _unreadable(self.path, error) from None
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
@@ -221,7 +243,7 @@ class Run:
         try:
             yield from event_lines.events(self.path, self.tell, finished=self.finished)
         except OSError as error:
-            raise InputError(f"{str(self.path / event_lines.NAME)!r} cannot be read: {error}") from None
+            raise _unreadable(self.path / event_lines.NAME, error) from None
 
     def each_event_and_damage(self) -> Iterator[Event]:
         """The same, and behind them what else was found damaged in what was read so far."""
@@ -242,3 +264,13 @@ class Run:
         per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
         named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
         return Responses(lines=lines, value=value, **per_line, **per_row, **named)
+
+
+def _unreadable(path: Path, error: Exception) -> RecordError:
+    return RecordError(
+        "unreadable",
+        f"{str(path)!r} cannot be read: {error}",
+        "check its permissions and the disk",
+        path=str(path),
+        reason=str(error),
+    )

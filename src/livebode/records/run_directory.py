@@ -16,7 +16,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.core import Event, InputError, Parameters, Responses
+from livebode.core import Event, Parameters, RecordError, Responses
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.piece import parts_of
 from livebode.records.removal import check_removable, remove
@@ -46,7 +46,7 @@ class RunDirectory:
 
     Raises
     ------
-    InputError
+    RecordError
         If something stands there and is not to be or must not be replaced, or the disk refuses to take it.
     """
 
@@ -124,9 +124,21 @@ class RunDirectory:
             return
         segments = (self.path / "open").is_dir()
         if not self._force and segments:
-            raise InputError(f"{str(self.path)!r} is kept in segments; --continue goes on with it, --force replaces it")
+            raise RecordError(
+                "exists",
+                f"{str(self.path)!r} exists already and is recorded in segments",
+                "continue that run, or replace it with force",
+                path=str(self.path),
+                argument="force",
+            )
         if not self._force:
-            raise InputError(f"{str(self.path)!r} exists already; take another --out, or --force to replace it")
+            raise RecordError(
+                "exists",
+                f"{str(self.path)!r} exists already",
+                "choose another path, or replace it with force",
+                path=str(self.path),
+                argument="force",
+            )
         check_removable(self.path)
         if segments:
             from livebode.records.segments.lock import Lock  # needs a POSIX system, as what left them did
@@ -152,9 +164,16 @@ class RunDirectory:
                     old.rmdir()
 
 
-def _disk_sentence(path: Path, error: OSError) -> InputError:
+def _disk_sentence(path: Path, error: OSError) -> RecordError:
     why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-    return InputError(f"the run could not be written to {str(path)!r}: {why}; nothing was left there")
+    return RecordError(
+        "not-written",
+        f"the run could not be written to {str(path)!r}: {why}; nothing was left there",
+        "make room, or choose another path",
+        path=str(path),
+        reason=why,
+        errno=error.errno,
+    )
 
 
 @contextmanager

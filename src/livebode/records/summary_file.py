@@ -9,17 +9,13 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.records.inside import read_bytes
 from livebode.records.plain_json import to_json
 
 RUN, COPY = "run.json", "run-copy.json"
 _SIZE_BYTES_MAX = 64 << 20
 _CHECKSUM = re.compile(r',\n  "crc32": "([0-9a-f]{8})"\n\}\n?\Z')
-
-
-class DamagedError(ValueError):
-    """The file is not what was written."""
 
 
 def to_document(summary: dict[str, Any]) -> bytes:
@@ -36,7 +32,7 @@ def to_document(summary: dict[str, Any]) -> bytes:
 
 
 def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
-    """The summary again, without its checksum; DamagedError where it is not what was written.
+    """The summary again, without its checksum; ValueError where it is not what was written.
 
     One without a checksum is taken where it need not be `checked`. What is null is as if it was not there.
 
@@ -44,24 +40,22 @@ def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
     {'found': {'rate_hz': 1000}}
     >>> from_document(to_document({"found": {"rate_hz": 1000}}).replace(b"1000", b"1001"))
     Traceback (most recent call last):
-    livebode.records.summary_file.DamagedError: its checksum is wrong
+    ValueError: its checksum is wrong
     """
     try:
         text = data.decode("utf-8")
         end = _CHECKSUM.search(text)
         if end is None and checked:
-            raise DamagedError("it has no checksum")
+            raise ValueError("it has no checksum")
         if end is not None:
             text = text[: end.start()] + "\n}"
             if f"{zlib.crc32(text.encode()):08x}" != end[1]:
-                raise DamagedError("its checksum is wrong")
+                raise ValueError("its checksum is wrong")
         found = json.loads(text)
     except RecursionError:
-        raise DamagedError("it is nested too deeply") from None
-    except ValueError as error:
-        raise error if isinstance(error, DamagedError) else DamagedError(str(error)) from None
+        raise ValueError("it is nested too deeply") from None
     if not isinstance(found, dict):
-        raise DamagedError("it is not an object")
+        raise ValueError("it is not an object")
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -70,19 +64,38 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
 
     Raises
     ------
-    InputError
+    RecordError
         If neither can be read, or this is not the directory of a run.
     """
     try:
-        data = read_bytes(run, RUN, _SIZE_BYTES_MAX)
         # An earlier livebode wrote neither a checksum nor a copy.
-        return from_document(data, checked=os.path.lexists(run / COPY)), ""
+        return _read(run, RUN, checked=os.path.lexists(run / COPY)), ""
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{str(run)!r} is not the directory of a run: it has no run.json") from None
-    except (OSError, ValueError) as error:
-        why = str(error)
+        raise RecordError(
+            "not-a-run",
+            f"{str(run)!r} is not the directory of a run: it has no run.json",
+            "name the directory of a run",
+            path=str(run),
+        ) from None
+    except RecordError as error:
+        first = error
+    except OSError as error:
+        path = str(run / RUN)
+        first = RecordError(
+            "unreadable", f"{path!r} cannot be read: {error}", "check its permissions", path=path, reason=str(error)
+        )
     try:
-        copy = from_document(read_bytes(run, COPY, _SIZE_BYTES_MAX))
-        return copy, f"{str(run / RUN)!r} is damaged ({why}); its copy {COPY} is read instead"
-    except (OSError, ValueError):
-        raise InputError(f"{str(run / RUN)!r} cannot be read: {why}") from None
+        return _read(run, COPY, checked=True), f"{first.message}; its copy {COPY} is read instead"
+    except (OSError, RecordError):
+        raise first from None
+
+
+def _read(run: Path, name: str, *, checked: bool) -> dict[str, Any]:
+    data = read_bytes(run, name, _SIZE_BYTES_MAX)
+    try:
+        return from_document(data, checked=checked)
+    except ValueError as error:
+        path = str(run / name)
+        raise RecordError(
+            "damaged", f"{path!r} is damaged: {error}", "restore it from a backup", path=path, reason=str(error)
+        ) from None

@@ -52,7 +52,7 @@ def averaged(run: Run) -> Averaged:
 
     Raises
     ------
-    InputError
+    SignalError, RecordError
         If no line is ever valid, or the run cannot be read.
     """
     mean, overview, counted = RunningMean(), Overview(), _Counted(run)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from livebode.core import PID, Cascade, Gain, InputError, Loop, Model, PositionPD, Quantity, counted
+from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted
 from livebode.session.toml_file import one_line, read_table, shortened
 from livebode.sources.live import SourceSettings, checked_address
 
@@ -117,15 +117,20 @@ class LoopSection(_Section):
     position_pd: PositionPDSection | None = None
 
     def build(self, rate_hz: float) -> Loop:
-        """The Loop that this describes, recorded at `rate_hz`; InputError where the parts do not make one."""
+        """The Loop that this describes, recorded at `rate_hz`; ConfigError where the parts do not make one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
             if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
                 held = counted(part.held_ticks, "tick")
-                raise InputError(
+                raise ConfigError(
+                    "rate-mismatch",
                     f"loop.{name} runs at {part.rate_hz:g} Hz and holds {held}, which makes "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the samples come at {rate_hz:g} Hz; held_ticks is "
-                    "their rate over the controller's"
+                    f"{part.rate_hz * part.held_ticks:g} Hz, but the samples come at {rate_hz:g} Hz",
+                    "set held_ticks to the rate of the samples over that of the controller",
+                    key=f"loop.{name}",
+                    rate_hz=rate_hz,
+                    controller_rate_hz=part.rate_hz,
+                    held_ticks=part.held_ticks,
                 )
         return Loop(
             feedback=self._feedback(),
@@ -138,13 +143,21 @@ class LoopSection(_Section):
     def _feedback(self) -> Model | None:
         if self.position_pd is not None:
             if self.velocity or self.position:
-                raise InputError(
-                    "loop.position_pd stands for the whole controller; leave out loop.velocity and .position"
+                raise ConfigError(
+                    "key-conflict",
+                    "loop.position_pd is the whole controller",
+                    "leave out loop.velocity and loop.position",
+                    key="loop.position_pd",
                 )
             return PositionPD(**self.position_pd.model_dump())
         if self.velocity is None:
             if self.position is not None:
-                raise InputError("loop.position needs loop.velocity inside it; describe the velocity controller too")
+                raise ConfigError(
+                    "incomplete",
+                    "loop.position needs loop.velocity inside it",
+                    "describe the velocity controller too",
+                    key="loop.velocity",
+                )
             return None
         velocity = PID(**self.velocity.model_dump())
         return velocity if self.position is None else Cascade(velocity, PID(**self.position.model_dump()))
@@ -154,11 +167,21 @@ class LoopSection(_Section):
             return None if self.entry_gain == 1.0 else Gain(self.entry_gain)
         if self.excitation_at == "velocity reference":
             if self.velocity is None:
-                raise InputError("excitation_at = 'velocity reference' needs loop.velocity; describe that controller")
+                raise ConfigError(
+                    "incomplete",
+                    "loop.excitation_at = 'velocity reference' needs loop.velocity",
+                    "describe that controller",
+                    key="loop.velocity",
+                )
             return self.entry_gain * PID(**self.velocity.model_dump())
         feedback = self._feedback()
         if feedback is None:
-            raise InputError("excitation_at = 'output' needs the loop's controllers; describe loop.velocity")
+            raise ConfigError(
+                "incomplete",
+                "loop.excitation_at = 'output' needs the loop's controllers",
+                "describe loop.velocity",
+                key="loop.velocity",
+            )
         return Gain(-self.entry_gain) * feedback
 
 
@@ -224,9 +247,11 @@ class Axis(_Section):
 
         Raises
         ------
-        InputError
+        ConfigError
             If the file cannot be read, is not TOML, or has an unknown key or a value out of range; the message names
             the key, the value and what is allowed.
+        SourceError
+            If the address of the source cannot be used.
         """
         return cls.of(read_table(path), str(path)).beside(path.parent)
 
@@ -236,9 +261,14 @@ class Axis(_Section):
         try:
             axis = cls.model_validate(data)
         except ValidationError as error:
-            raise InputError(f"{origin}: {_sentence(error)}") from None
+            raise _first_of(error).at(origin) from None
         if (axis.source.log is None) == (axis.source.url is None):
-            raise InputError(f"{origin}: [source] needs either a log or a url; 'source.log' is a recording")
+            raise ConfigError(
+                "key-conflict",
+                "[source] needs either a log or a url",
+                "set source.log for a recording, or source.url for a live source",
+                key="source",
+            ).at(origin)
         if axis.source.url is not None:
             checked_address(axis.source.url, axis.source)
         return axis
@@ -253,17 +283,21 @@ class Axis(_Section):
         return axis.model_copy(update={"monitoring": monitoring})
 
 
-def _sentence(error: ValidationError) -> str:
-    """The first thing that is wrong, with its place and value; what is missing last: a misspelt key leaves a gap."""
+def _first_of(error: ValidationError) -> ConfigError:
+    """The first thing that is wrong, with its key and value; what is missing last: a misspelt key leaves a gap."""
     first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
     # Behind a choice of types pydantic puts the name of the type that it tried.
     place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
-        return f"there is no setting {place!r}; {nearest(first['loc'])}"
+        return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":
-        return f"{place!r} is missing; add it"
-    value = "what it holds" if MAY_BE_SECRET & {str(part) for part in first["loc"]} else shortened(first["input"])
-    return f"{place} = {value} is not usable: {first['msg'].lower()}"
+        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
+    secret = MAY_BE_SECRET & {str(part) for part in first["loc"]}
+    value = "what it holds" if secret else shortened(first["input"])
+    facts = {"key": place} | ({} if secret else {"value": value})
+    return ConfigError(
+        "value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", "correct it", **facts
+    )
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:

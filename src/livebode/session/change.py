@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from livebode.core import Event, InputError
+from livebode.core import ConfigError, Event
 from livebode.session.axis import Axis, RecordSection
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline
@@ -42,26 +42,40 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
 
     Raises
     ------
-    InputError
+    LivebodeError
         Where the new one cannot be applied without losing samples, or does not fit the source.
     """
     if old == new:
         return None
     sections = tuple(name for name in type(new).model_fields if getattr(old, name) != getattr(new, name))
     if source is None and old.source.live:
-        raise InputError(
-            "it has sent no samples yet, against which its new configuration could be checked; wait for them and save "
-            "the file again, or take the axis out"
+        raise ConfigError(
+            "change-too-early",
+            "the live source has sent no samples yet with which the new configuration could be checked",
+            "wait for them and save the file again, or take the axis out",
+            key="source",
         )
     if source is None:
-        raise InputError("a recording is tracked as it was begun; end livebode and start it again")
+        raise ConfigError(
+            "change-needs-restart",
+            "the configuration of a recording cannot be changed while it is tracked",
+            "end livebode and start it again",
+            keys=list(sections),
+        )
     if "source" in sections:
-        raise InputError(
-            "[source] cannot be changed without losing samples; end livebode, or take the axis out and put it in again "
-            "under another name"
+        raise ConfigError(
+            "change-needs-restart",
+            "[source] cannot be changed without losing samples",
+            "end livebode, or take the axis out and put it in again under another name",
+            keys=["source"],
         )
     if "serve" in sections:
-        raise InputError("[serve] is the whole session's, and cannot be changed while it runs; end livebode first")
+        raise ConfigError(
+            "change-needs-restart",
+            "[serve] belongs to the whole session, and cannot be changed while it runs",
+            "end livebode first",
+            keys=["serve"],
+        )
     kept, before = new.record or RecordSection(), old.record or RecordSection()
     if sections == ("record",) and kept.samples == before.samples:
         return Change(sections, kept=kept)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import NOT_WHOLE, Block, InputError, Spectra, rms
+from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, rms
 from livebode.estimation import Settings
 from livebode.session.follower import Follower
 
@@ -72,25 +72,38 @@ class ChannelCheck:
         return float(max(squares / count - (total / count) ** 2, 0.0)) if count else 0.0
 
     def finish(self) -> None:
-        """InputError where a signal held no number, or always the same one."""
+        """SignalError where a signal held no number, or always the same one."""
         for name, value in self._unvaried.items():
             if np.isnan(value):
-                raise InputError(
-                    f"channel {name!r} is empty: none of its samples is a finite number; choose another one"
+                raise SignalError(
+                    "channel-empty",
+                    f"channel {name!r} is empty: none of its samples is a finite number",
+                    "choose another one",
+                    channel=name,
                 )
-            raise InputError(f"channel {name!r} is constant at {value:g}; choose one that carries the signal")
+            raise SignalError(
+                "channel-constant",
+                f"channel {name!r} is constant at {value:g}",
+                "choose one that carries the signal",
+                channel=name,
+                value=float(value),
+            )
 
 
 def check_length(samples: int | None, window: int) -> None:
-    """InputError where the recording is known to be shorter than the window."""
+    """SignalError where the recording is known to be shorter than the window."""
     if samples is not None and samples < window:
-        raise InputError(
-            f"the recording has {samples} samples, less than the window of {window}; take a shorter window or more data"
+        raise SignalError(
+            "too-short",
+            f"the recording has {samples} samples, less than the window of {window}",
+            "choose a shorter window, or record more",
+            samples=samples,
+            window=window,
         )
 
 
 def check_excitation(tracker: Follower, variance: float) -> None:
-    """InputError where a line has no excitation, or the excitation does not repeat from window to window.
+    """SignalError where a line has no excitation, or the excitation does not repeat from window to window.
 
     `variance` is that of the reference over the whole recording.
 
@@ -102,26 +115,39 @@ def check_excitation(tracker: Follower, variance: float) -> None:
     if np.isnan(power).all():
         return
     if 2 * power.max() <= POWERLESS_SHARE * variance * settings.lines.window**2:
-        raise InputError(
-            f"{name!r} has no power at {f[0]:g} Hz or any other of these lines; take --lines auto, or "
-            "`livebode inspect` to see what it holds"
+        raise SignalError(
+            "line-not-excited",
+            f"{name!r} has no power at {f[0]:g} Hz or any other of these lines",
+            "set lines.frequencies to 'auto', or look at the recording with `livebode inspect`",
+            channel=name,
+            frequency_hz=float(f[0]),
         )
     with np.errstate(divide="ignore"):
         level_db = 10 * np.log10(power / power.max()) if power.max() > 0 else np.full(power.shape, -np.inf)
     if np.any(level_db < _POWERLESS_DB):
         worst = int(np.argmin(level_db))
-        raise InputError(
-            f"{name!r} has no power at {f[worst]:g} Hz ({level_db[worst]:.0f} dB against its strongest line); "
-            "leave out that line, or take --lines auto"
+        raise SignalError(
+            "line-not-excited",
+            f"{name!r} has no power at {f[worst]:g} Hz ({-level_db[worst]:.0f} dB below its strongest line)",
+            "leave out that line, or set lines.frequencies to 'auto'",
+            channel=name,
+            frequency_hz=float(f[worst]),
         )
     if settings.method.reference != "excitation":
         return
     repeats = tracker.repeatability()
     if tracker.counts["samples"] >= _PERIODS_TO_JUDGE * settings.lines.window and np.any(repeats < _REPEATS):
         worst = int(np.nanargmin(repeats))
-        raise InputError(
+        raise SignalError(
+            "not-periodic",
             f"{name!r} does not repeat every {settings.lines.window} samples at {f[worst]:g} Hz "
-            f"({100 * repeats[worst]:.0f} % of its power does); leave out that line, or take --window auto"
+            f"({100 * repeats[worst]:.0f} % of its power does)",
+            "leave out that line, or set lines.window to 'auto'",
+            channel=name,
+            frequency_hz=float(f[worst]),
+            window=settings.lines.window,
+            key="lines.window",
+            repeating=float(repeats[worst]),
         )
 
 
@@ -132,7 +158,7 @@ _SPOILS = {
 
 
 def check_period(samples: np.ndarray, settings: Settings) -> None:
-    """InputError where the beginning of an excitation repeats after another number of samples than the window.
+    """SignalError where the beginning of an excitation repeats after another number of samples than the window.
 
     Over a window that is a sample off, every estimate is wrong by more than its bounds say, and looks healthy.
     """
@@ -143,8 +169,14 @@ def check_period(samples: np.ndarray, settings: Settings) -> None:
     differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
     best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
     if differences[window] > _ROUNDING and differences[best] < differences[window] / 2:
-        raise InputError(
-            f"{settings.excitation!r} repeats every {best} samples, not every {window}; take --window {best} or auto"
+        raise SignalError(
+            "wrong-period",
+            f"{settings.excitation!r} repeats every {best} samples, not every {window}",
+            f"set lines.window to {best} or 'auto'",
+            channel=settings.excitation,
+            key="lines.window",
+            period=best,
+            window=window,
         )
 
 
@@ -158,28 +190,48 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
 
 
 def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
-    """InputError with the reason where no response of the whole run is valid."""
+    """SignalError with the reason where no response of the whole run is valid."""
     counts, window = tracker.counts, tracker.settings.lines.window
     if responses and not valid and "spectra" in counts:
-        raise InputError(
+        raise SignalError(
+            "no-valid-response",
             f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
-            f"whole and {counts['spike']} hold a spike; see to the drive's samples, or let it take a shorter window"
+            f"whole and {counts['spike']} contain a spike",
+            "check the drive's samples, or let it use a shorter window",
+            reason="windows-not-whole",
+            responses=responses,
+            window=window,
         )
     if not responses or valid:
         return
     if judged := tracker.found().get("judged", {}).get("invalid_lines_hz"):
         lines = "; ".join(f"{kind} at {', '.join(f'{f:g}' for f in at)} Hz" for kind, at in judged.items())
-        raise InputError(
+        raise SignalError(
+            "no-valid-response",
             f"none of {responses} responses is valid, and lines are invalid by what repeats with the excitation: "
-            f"{lines}; see events.jsonl for what to do at each"
+            f"{lines}",
+            "see events.jsonl for what to do at each",
+            reason="lines-invalid",
+            responses=responses,
+            window=window,
         )
     spoiled = [f"{count} {words}" for kind, words in _SPOILS.items() if (count := counts.get(kind, 0))]
     if spoiled:
-        raise InputError(
+        raise SignalError(
+            "no-valid-response",
             f"none of {responses} responses is valid: no stretch of {window} samples has excitation and is free of the "
-            f"{', '.join(spoiled)}; take a shorter window, or look at the recording with `livebode inspect`"
+            f"{', '.join(spoiled)}",
+            "choose a shorter window, or look at the recording with `livebode inspect`",
+            reason="samples-spoiled",
+            responses=responses,
+            window=window,
         )
-    raise InputError(
+    raise SignalError(
+        "no-valid-response",
         f"none of {responses} responses is valid, although no sample is missing or left out: no window of {window} "
-        "samples has excitation at its lines; take other lines, or look at the recording with `livebode inspect`"
+        "samples has excitation at its lines",
+        "choose other lines, or look at the recording with `livebode inspect`",
+        reason="no-excitation",
+        responses=responses,
+        window=window,
     )

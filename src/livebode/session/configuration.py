@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from livebode.core import InputError
+from livebode.core import ConfigError, LivebodeError
 from livebode.session.axis import Axis
 from livebode.session.fits import check_fit
 from livebode.session.toml_file import parse_table, read_bytes, shortened
@@ -39,8 +39,10 @@ class ConfigurationFile:
 
         Raises
         ------
-        InputError
-            If it cannot be read, is not TOML, or an axis cannot be; the message names axis, key and value.
+        ConfigError
+            If it cannot be read, is not TOML, or an axis cannot be used; the message names axis, key and value.
+        LivebodeError
+            If a value cannot be used for another reason, such as the address of a source.
         """
         self._used = self._seen = read_bytes(self.path)
         return axes_of(self._used, self.path, self._over)
@@ -49,7 +51,7 @@ class ConfigurationFile:
         """Whether it is not what was read last, and is the same as a look ago: nobody is writing it just now."""
         try:
             data = read_bytes(self.path)
-        except InputError:
+        except ConfigError:
             return False  # an editor may be replacing it
         steady, self._seen = data == self._seen, data
         return steady and data != self._used
@@ -66,8 +68,8 @@ def axes_of(data: bytes, path: Path, over: Mapping[str, Mapping[str, Any]]) -> d
         if axis.fit is not None:
             try:
                 check_fit(axis.fit)
-            except InputError as error:
-                raise InputError(f"{origin}: [fit]: {error}") from None
+            except LivebodeError as error:
+                raise error.at(f"{origin}: [fit]") from None
         found[name] = axis
     return found
 
@@ -78,15 +80,30 @@ def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]
         return {"": dict(data)}
     axes = data["axes"]
     if not isinstance(axes, dict) or not axes or not all(isinstance(axis, dict) for axis in axes.values()):
-        raise InputError(f"{origin}: 'axes' is no table of axes; write [axes.NAME.source] and so on")
+        raise ConfigError(
+            "axes-invalid", "'axes' is not a table of axes", "write [axes.NAME.source] and so on", key="axes"
+        ).at(origin)
     if len(axes) > AXES_MAX:
-        raise InputError(f"{origin} has {len(axes)} axes, more than {AXES_MAX}; take several files")
+        raise ConfigError(
+            "axes-invalid",
+            f"there are {len(axes)} axes, more than {AXES_MAX}",
+            "use several files",
+            key="axes",
+            count=len(axes),
+            limit=AXES_MAX,
+        ).at(origin)
     shared = {key: value for key, value in data.items() if key != "axes"}
     for name in axes:
         _check_name(name, origin)
     folded = [name.casefold() for name in axes]
     if twice := [name for name in axes if folded.count(name.casefold()) > 1]:
-        raise InputError(f"{origin}: the axes {' and '.join(map(repr, twice[:2]))} differ in nothing but capitals")
+        raise ConfigError(
+            "axis-name-invalid",
+            f"the axes {' and '.join(map(repr, twice[:2]))} differ only in capitals",
+            "rename one of them",
+            key="axes",
+            names=twice[:2],
+        ).at(origin)
     return {name: merged(shared, axis) for name, axis in axes.items()}
 
 
@@ -106,12 +123,18 @@ def merged(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _check_name(name: str, origin: str) -> None:
     if not _NAME.fullmatch(name):
-        raise InputError(
-            f"{origin}: the axis {shortened(name)} names a directory; take up to 64 letters, digits, _ and -, "
-            "and a letter or digit first"
-        )
+        raise ConfigError(
+            "axis-name-invalid",
+            f"the axis {shortened(name)} cannot be the name of a directory",
+            "choose up to 64 letters, digits, _ and -, with a letter or digit first",
+            key="axes",
+            value=shortened(name),
+        ).at(origin)
     if _SUCCESSOR.fullmatch(name):
-        raise InputError(
-            f"{origin}: the axis {name!r} is called like a run that goes on from another; take "
-            f"{name.replace('-', '_')!r}"
-        )
+        raise ConfigError(
+            "axis-name-invalid",
+            f"the axis {name!r} has a name that is reserved for a run that continues another",
+            f"rename it {name.replace('-', '_')!r}",
+            key="axes",
+            value=name,
+        ).at(origin)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from livebode.core import Block, InputError
+from livebode.core import Block, RecordError
 from livebode.sources.live import LiveBlock, Position
 from livebode.sources.live.computer_clock import ClockReading
 
@@ -84,7 +84,9 @@ class StreamPosition:
     def restore(self, snapshot: bytes) -> None:
         """Check that the source continues where the record does."""
         if snapshot != self._state:
-            raise InputError("the record changed while its source was opened; run the same command again")
+            raise RecordError(
+                "changed-meanwhile", "the record changed while its source was opened", "run the same command again"
+            )
 
 
 def stream_position(run: Path) -> StreamPosition:

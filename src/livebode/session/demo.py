@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
@@ -26,10 +26,14 @@ _AMPLITUDE_N_M = 0.5  # per line; 3 N m at the peaks
 
 
 def check_seconds(seconds: float) -> None:
-    """InputError if a demo cannot be that long."""
+    """UsageError if a demo cannot be that long."""
     if not SECONDS_MIN <= seconds <= 3600:
-        raise InputError(
-            f"{seconds=:g} is not between {SECONDS_MIN:g} and 3600; the axis needs strokes before and after the loss"
+        raise UsageError(
+            "out-of-range",
+            f"{seconds=:g} is not between {SECONDS_MIN:g} and 3600",
+            "allow for strokes before and after the loss",
+            argument="seconds",
+            value=seconds,
         )
 
 
@@ -86,7 +90,7 @@ def demo(
 
     Raises
     ------
-    InputError
+    UsageError
         If `seconds` is not between 16 and 3600.
     """
     check_seconds(seconds)

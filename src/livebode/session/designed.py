@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, RecordingError
 from livebode.design import Waveform
 
 _RAMP_S_MAX = 3600.0
@@ -22,8 +22,8 @@ def read_designed(path: Path) -> Waveform:
 
     Raises
     ------
-    InputError
-        If the file cannot be read, or is none of those.
+    RecordingError
+        If the file cannot be read, or is not one of those.
     """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as held:
@@ -34,11 +34,23 @@ def read_designed(path: Path) -> Waveform:
         if max(bins) > samples.size or not 0 <= float(about.get("ramp_s", 0.0)) <= _RAMP_S_MAX:
             raise ValueError(bins, about)
         return Waveform(Lines.of_bins(bins, samples.size, rate), samples, dict(about))
+    except FileNotFoundError:
+        raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else str(error)
-        raise InputError(f"{str(path)!r} could not be read: {why}") from None
+        raise RecordingError(
+            "not-readable",
+            f"{str(path)!r} cannot be read: {why}",
+            "check the path and its permissions",
+            path=str(path),
+        ) from None
     except (ValueError, KeyError, TypeError, AttributeError, EOFError, ArithmeticError, zipfile.BadZipFile, zlib.error):
-        raise InputError(f"{str(path)!r} is no .npz that `livebode design` left; take its excitation.npz") from None
+        raise RecordingError(
+            "not-an-excitation",
+            f"{str(path)!r} is not an .npz file that `livebode design` wrote",
+            "choose its excitation.npz",
+            path=str(path),
+        ) from None
 
 
 def _reals(array: NDArray[np.generic]) -> NDArray[np.float64]:

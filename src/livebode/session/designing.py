@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from livebode.core import InputError
+from livebode.core import ConfigError, OutputError, UsageError
 from livebode.design import FORMATS, Design, axis_text, choose, write
 from livebode.records import to_json
 from livebode.session.experiment import Experiment
@@ -51,14 +51,26 @@ def design_experiment(
 
     Raises
     ------
-    InputError
-        If nothing can be chosen (see `choose`), a format is not known or forbids the name, something stands in the
-        directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
+    DesignError
+        If nothing can be chosen (see `choose`).
+    UsageError
+        If a format is not known or forbids the name.
+    ConfigError
+        If the recording cannot be named so.
+    OutputError
+        If something is in the directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
     """
     kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
     for kind in kinds or ():
         if kind not in FORMATS:
-            raise InputError(f"the format {kind!r} is not known; choose {', '.join(FORMATS)}")
+            raise UsageError(
+                "not-one-of",
+                f"the format {kind!r} is not supported",
+                f"choose {', '.join(FORMATS)}",
+                argument="suffixes",
+                value=kind,
+                allowed=list(FORMATS),
+            )
     _check_names(name, experiment.log)
     _check_free(directory, force)
     design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
@@ -91,8 +103,11 @@ def design_experiment(
             _check_free(directory, force)
             _put(partial, there, aside=Path(folder) / "before")
     except OSError as error:
-        raise InputError(
-            f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there"
+        raise OutputError(
+            "not-written",
+            f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there",
+            "check the disk and its permissions",
+            path=str(directory),
         ) from None
     return Designed(design, directory, files, left_out)
 
@@ -112,11 +127,29 @@ def _put(made: Path, there: Path, aside: Path) -> None:
 
 def _check_names(name: str, log: str) -> None:
     if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
-        raise InputError(f"the name {name!r} is none of a file; take letters, digits and underscores")
+        raise UsageError(
+            "invalid-name",
+            f"{name!r} cannot be the name of a file",
+            "choose letters, digits and underscores",
+            argument="name",
+            value=name,
+        )
     if not log.isprintable() or not Path(log).name:
-        raise InputError(f"log = {log!r} is no file of a recording; give one such as 'log.parquet'")
+        raise ConfigError(
+            "value-invalid",
+            f"log = {log!r} cannot be the file of a recording",
+            "specify one such as 'log.parquet'",
+            key="log",
+            value=log,
+        )
     if log in (_MARK, _AXIS, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
-        raise InputError(f"log = {log!r} is a file of the design; give the recording another name")
+        raise ConfigError(
+            "key-conflict",
+            f"log = {log!r} is a file of the design",
+            "give the recording another name",
+            key="log",
+            value=log,
+        )
 
 
 def _all_that_hold(window: int) -> list[str]:
@@ -128,12 +161,26 @@ def _check_free(directory: Path, force: bool) -> None:
     if not (directory.exists() or directory.is_symlink()):
         return
     if not force:
-        raise InputError(f"{str(directory)!r} exists already; take another --out, or --force to replace it")
+        raise OutputError(
+            "exists",
+            f"{str(directory)!r} exists already",
+            "choose another directory, or replace it with force",
+            path=str(directory),
+        )
     if directory.is_symlink() or not (directory / _MARK).is_file():
-        raise InputError(f"{str(directory)!r} is not what an earlier design left; take another --out")
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} is not the directory of an earlier design",
+            "choose another directory",
+            path=str(directory),
+        )
     if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / _MARK)):
-        raise InputError(
-            f"{str(directory)!r} also holds {others[0]!r}, which no design made; move it, or take another --out"
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} also contains {others[0]!r}, which no design wrote",
+            "move it, or choose another directory",
+            path=str(directory),
+            name=others[0],
         )
 
 

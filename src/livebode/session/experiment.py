@@ -12,10 +12,11 @@ from typing import Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.design import Bearable, Machine, Wish, belt_machine
 from livebode.session.axis import LoopSection, nearest
 from livebode.session.measured_axis import MeasuredAxis, MeasuredSection
+from livebode.session.toml_file import shortened
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 
 T = TypeVar("T")
@@ -51,19 +52,31 @@ class Experiment(BaseModel):
 
         Raises
         ------
-        InputError
-            If the file cannot be read, is not TOML, or a key or a value cannot be; the message names it.
+        ConfigError
+            If the file cannot be read, is not TOML, or a key or a value cannot be used; the message names it.
         """
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise InputError(f"there is no file {path}; check the name") from None
+            raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
         except OSError as error:
-            raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+            raise ConfigError(
+                "file-unreadable",
+                f"{str(path)!r} cannot be read: {error.strerror}",
+                "check the path and its permissions",
+                path=str(path),
+            ) from None
         except UnicodeDecodeError:
-            raise InputError(f"{str(path)!r} is not text; give the description of an experiment in TOML") from None
+            raise ConfigError(
+                "not-text",
+                f"{str(path)!r} is not text",
+                "give the description of an experiment in TOML",
+                path=str(path),
+            ) from None
         except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{str(path)!r} is not TOML: {error}") from None
+            raise ConfigError(
+                "not-toml", f"{str(path)!r} is not TOML: {error}", "correct it there", path=str(path)
+            ) from None
         wanted, above = data.get("excitation", {}), dict(over or {})
         if isinstance(wanted, dict):
             # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
@@ -82,11 +95,18 @@ class Experiment(BaseModel):
         try:
             found = cls.model_validate(data)
         except ValidationError as error:
-            raise InputError(f"{origin}: {_sentence(error)}") from None
+            raise _first_of(error).at(origin) from None
         if found.belt is not None and found.loop is not None:
-            raise InputError(f"{origin}: a [belt] axis has its loop in [belt.drive]; leave out [loop]")
+            raise ConfigError(
+                "key-conflict", "a [belt] axis has its loop in [belt.drive]", "leave out [loop]", key="loop"
+            ).at(origin)
         if (found.belt is None) == (found.measured is None):
-            raise InputError(f"{origin}: describe either a [belt] axis by its constants, or one that was [measured]")
+            raise ConfigError(
+                "key-conflict",
+                "the machine is described by both or neither of [belt] and [measured]",
+                "describe either a [belt] axis by its constants, or one that was [measured]",
+                key="belt",
+            ).at(origin)
         return found
 
     def wish(self) -> Wish:
@@ -112,10 +132,20 @@ class Experiment(BaseModel):
         if self.belt is None:
             return None
         if unknown := [name for name in self.belt if name not in _BELT]:
-            raise InputError(f"there is no [belt.{unknown[0]}]; {_near(unknown[0], _BELT)}")
+            raise ConfigError(
+                "key-unknown",
+                f"there is no [belt.{unknown[0]}]",
+                _near(unknown[0], _BELT),
+                key=f"belt.{unknown[0]}",
+            )
         parts = {name: _made(_BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
         if "strokes" in parts and "standstill" in parts:
-            raise InputError("[belt.strokes] and [belt.standstill] exclude each other; leave one out")
+            raise ConfigError(
+                "key-conflict",
+                "[belt.strokes] and [belt.standstill] exclude each other",
+                "leave one out",
+                key="belt.standstill",
+            )
         motion = parts.pop("strokes", None) or parts.pop("standstill", None) or Standstill()
         return BeltAxis(motion=motion, **parts)
 
@@ -156,7 +186,12 @@ class Experiment(BaseModel):
     def signal_names(self) -> dict[str, str]:
         """[signals] of the axis.toml; those of the simulated axis or of the run where nothing is said."""
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
-            raise InputError(f"there is no signals.{unknown[0]}; {_near(unknown[0], (*_SIGNALS, 'schedule'))}")
+            raise ConfigError(
+                "key-unknown",
+                f"there is no signals.{unknown[0]}",
+                _near(unknown[0], (*_SIGNALS, "schedule")),
+                key=f"signals.{unknown[0]}",
+            )
         if self.belt is None:
             own = self._measured_axis.signal_names()
         else:
@@ -164,9 +199,21 @@ class Experiment(BaseModel):
         names = own | self.signals
         for role, name in names.items():
             if not name or not name.isprintable():
-                raise InputError(f"signals.{role} = {name!r} names no channel; give the recording's name of it")
+                raise ConfigError(
+                    "value-invalid",
+                    f"signals.{role} = {name!r} cannot be the name of a channel",
+                    "specify its name in the recording",
+                    key=f"signals.{role}",
+                    value=name,
+                )
             if twins := [other for other in names if other != role and names[other] == name]:
-                raise InputError(f"signals.{role} and signals.{twins[0]} are both {name!r}; they are two channels")
+                raise ConfigError(
+                    "key-conflict",
+                    f"signals.{role} and signals.{twins[0]} are both {name!r}",
+                    "name two channels",
+                    key=f"signals.{role}",
+                    value=name,
+                )
         return names
 
     def tracking(self) -> dict[str, Any]:
@@ -174,18 +221,26 @@ class Experiment(BaseModel):
         return {} if self.belt is not None else self._measured_axis.tracking()
 
 
-def _sentence(error: ValidationError) -> str:
-    """The first thing that is wrong, with its place and value."""
+def _first_of(error: ValidationError) -> ConfigError:
+    """The first thing that is wrong, with its key and value."""
     first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo is why the other is missing
     place = ".".join(map(str, first["loc"]))
     if first["type"] == "extra_forbidden":
         if first["loc"][0] == "loop":
-            return f"there is no {place!r}; {nearest(first['loc'])}"
-        known = MeasuredSection if first["loc"][0] == "measured" else Experiment
-        return f"there is no {place!r}; {_near(place.split('.')[-1], known.model_fields)}"
+            meant = nearest(first["loc"])
+        else:
+            known = MeasuredSection if first["loc"][0] == "measured" else Experiment
+            meant = _near(place.split(".")[-1], known.model_fields)
+        return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
     if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
-        return f"{place!r} is missing; add it"
-    return f"{place} = {first['input']!r} is not usable: {_plain(first['msg'])}"
+        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
+    return _unusable(place, first["input"], first["msg"])
+
+
+def _unusable(key: str, value: Any, why: str) -> ConfigError:
+    shown = shortened(value)
+    message = f"{key} = {shown} is not usable: {_plain(why)}"
+    return ConfigError("value-invalid", message, "correct it", key=key, value=shown)
 
 
 def _plain(why: str) -> str:
@@ -194,16 +249,17 @@ def _plain(why: str) -> str:
 
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
-    """The dataclass from plain data; InputError for a key it has not, or a value of another type."""
+    """The dataclass from plain data; ConfigError for a key it has not, or a value of another type."""
     known = get_type_hints(kind)
     for name, value in given.items():
         if name not in known:
-            raise InputError(f"there is no {section}.{name}; {_near(name, known)}")
+            raise ConfigError(
+                "key-unknown", f"there is no {section}.{name}", _near(name, known), key=f"{section}.{name}"
+            )
         try:
             TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
         except ValidationError as error:
-            why = _plain(error.errors()[0]["msg"])
-            raise InputError(f"{section}.{name} = {value!r} is not usable: {why}") from None
+            raise _unusable(f"{section}.{name}", value, error.errors()[0]["msg"]) from None
     return kind(**given)
 
 

@@ -121,7 +121,7 @@ def fitter_of(section: FitSection, unit: str) -> Fitter:
 
 
 def check_fit(section: FitSection) -> None:
-    """InputError where nothing that is measured could let this model be fitted; of "auto" the unit decides later."""
+    """LivebodeError where nothing that is measured could let this model be fitted; of "auto" the unit decides later."""
     if section.model != "auto":
         fitter_of(section, "")
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
-from livebode.core import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.core import Block, Channel, Event, LivebodeError, Parameters, Responses, SignalError
 from livebode.estimation import response_unit
 from livebode.fitting import Fit
 from livebode.records import RunDirectory
@@ -195,7 +195,7 @@ class Tracking:
         return stop, self._origin_s + stop / self._follower.settings.lines.rate_hz
 
     def follow(self) -> None:
-        """Every Block through the pipeline into the record; InputError where there is none."""
+        """Every Block through the pipeline into the record; SignalError where there is none."""
         fits = self.pipeline.fits
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
         self.to.audience.share(self._overview)
@@ -225,7 +225,7 @@ class Tracking:
             self._step(partial(self._follower.process, block))
             self.to.progress(self._follower.counts["samples"], self.source.samples)
         if not self._tally.stop:
-            raise InputError("the recording holds no samples")
+            raise SignalError("empty", "the recording has no samples", "choose another one")
 
     def _watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """The same Blocks, which are checked and monitored on the way."""
@@ -275,7 +275,7 @@ class Tracking:
         """Write what was found on the way to run.json, now and at the end."""
         self._found_on_the_way |= found
         if not isinstance(self.recorder, RunDirectory):
-            with suppress(InputError):  # where the disk is full, the end of the run writes it
+            with suppress(LivebodeError):  # where the disk is full, the end of the run writes it
                 self.recorder.renew(**found)
 
     def _step(self, step: Callable[[], Responses | None]) -> None:
@@ -340,12 +340,12 @@ class Tracking:
 
         Raises
         ------
-        InputError
+        SignalError
             Where the signals mean nothing. In segments they are kept if there are responses, and an event says it.
         """
         try:
             self._judge(hand_out=not handed_over)
-        except InputError as error:
+        except LivebodeError as error:
             if self._kept is None or not (self._tally.responses or self._goes_on or continued_in):
                 raise
             # What was recorded stays, and says what is wrong with it.
@@ -367,7 +367,7 @@ class Tracking:
             self._done["continued_in"] = continued_in
 
     def _judge(self, *, hand_out: bool) -> None:
-        """Hand out what is held back at the end; InputError where the responses mean nothing."""
+        """Hand out what is held back at the end; SignalError where the responses mean nothing."""
         follower, tally = self._follower, self._tally
         window = follower.settings.lines.window
         tally.check.finish()

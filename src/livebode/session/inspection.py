@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Block, InputError, Lines
+from livebode.core import Block, Lines, LivebodeError
 from livebode.estimation.settings import nearest_hop
 from livebode.excitation import Excitation, recognise
 from livebode.session.plan import LIVE_RESPONSES_PER_S, beginning
@@ -103,7 +103,7 @@ def inspect(
     input: str | None = None,
     lines: tuple[str, int] | None = None,
 ) -> Inspection:
-    """Read a recording and say what it holds; InputError where it cannot be read or nothing repeats in it.
+    """Read a recording and say what it holds; LivebodeError where it cannot be read or nothing repeats in it.
 
     With lines (a text and the window) hum is looked for in `output` and `input` where there is no excitation.
     """
@@ -131,7 +131,7 @@ def inspect(
         try:
             w = beginning(log, excitation)
             found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
-        except InputError as error:
+        except LivebodeError as error:
             if quiet is None:
                 raise
             unrecognised = str(error)

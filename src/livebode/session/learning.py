@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Block, InputError
+from livebode.core import BaselineError, Block, LivebodeError
 from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table, places
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
@@ -27,11 +27,13 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
 
     Raises
     ------
-    InputError
-        If a run cannot be read, runs do not fit each other, or they hold too little.
+    RecordError
+        If a run cannot be read.
+    BaselineError
+        If runs do not fit each other, or they contain too little.
     """
     if not paths:
-        raise InputError("there is no run to learn from; name at least one run directory")
+        raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
     runs = [Run.open(path) for path in paths]
     axes = [_axis(run) for run in runs]
     _check_once(runs, axes)
@@ -47,9 +49,12 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         tables.append(_parameters(runs, axes[0].fit))
     machine, remark = _machine(runs, axes, say)
     if machine is None and (covariates := axes[0].monitoring.covariates):
-        raise InputError(
+        raise BaselineError(
+            "covariates-without-machine",
             f"covariates ({', '.join(covariates)}) need a model of the moving machine, and these runs give none: "
-            f"{remark}. Leave them out of [monitoring] to learn tables alone"
+            f"{remark}",
+            "leave them out of [monitoring] to learn tables alone",
+            channels=list(covariates),
         )
     return Baseline(
         lines,
@@ -68,12 +73,19 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
 def _axis(run: Run) -> Axis:
     configuration = said(run.summary)
     if "source" not in configuration:
-        raise InputError(f"{str(run.path)!r} is not the run of a machine; learn from what `livebode run` leaves")
+        raise BaselineError(
+            "run-not-of-machine",
+            f"{str(run.path)!r} is not the run of a machine",
+            "learn from what `livebode run` writes",
+            path=str(run.path),
+        )
     axis = Axis.of(configuration, str(run.path / "run.json"))
     if axis.tracking.average:
-        raise InputError(
-            f"{str(run.path)!r} was made with --average, so that each response holds those before it; learn from a "
-            "run of the same recording without it"
+        raise BaselineError(
+            "run-averaged",
+            f"{str(run.path)!r} was created with tracking.average, so that each response contains those before it",
+            "learn from a run of the same recording without it",
+            path=str(run.path),
         )
     return axis
 
@@ -84,9 +96,12 @@ def _check_once(runs: list[Run], axes: list[Axis]) -> None:
     for run, axis in zip(runs, axes):
         for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
             if thing is not None and thing in seen:
-                raise InputError(
-                    f"{str(run.path)!r} holds the same as {str(seen[thing].path)!r}, which was given before it; "
-                    "name each recording once"
+                raise BaselineError(
+                    "run-repeated",
+                    f"{str(run.path)!r} contains the same as {str(seen[thing].path)!r}, which was given before it",
+                    "name each recording once",
+                    path=str(run.path),
+                    other=str(seen[thing].path),
                 )
         seen |= {thing: run for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()) if thing}
 
@@ -102,8 +117,13 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
         ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
     ):
         if one != other:
-            raise InputError(
-                f"{str(run.path)!r} has other {name} than {str(first.path)!r}; learn from runs that were made alike"
+            raise BaselineError(
+                "runs-differ",
+                f"{str(run.path)!r} has other {name} than {str(first.path)!r}",
+                "learn from runs with the same configuration",
+                path=str(run.path),
+                other=str(first.path),
+                what=name,
             )
 
 
@@ -158,7 +178,7 @@ def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> t
             ),
             "",
         )
-    except InputError as error:
+    except LivebodeError as error:
         return None, str(error)
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from livebode.core import Event, InputError
+from livebode.core import Event, LivebodeError
 from livebode.core.clock import moments_by
 from livebode.session import successors
 from livebode.session.axis import Axis, RecordSection
@@ -37,7 +37,7 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
 
     Raises
     ------
-    InputError
+    LivebodeError
         Where the configuration cannot be, the machine refuses, or the run was ended before samples came.
     """
     orders = orders or Orders()
@@ -144,7 +144,7 @@ class _Succession:
             try:
                 with moments_by(self._relation.clock), leaving:
                     tracking.finish()
-            except InputError as error:
+            except LivebodeError as error:
                 _logger.error("%s: %s", tracking.to.directory, error)
                 self._to.tell(Event("record-unfinished", *tracking.position, str(error)))
 

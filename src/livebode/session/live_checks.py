@@ -86,7 +86,7 @@ class LiveChecks:
             return
         if self._roles:
             for one in suspicions(by_role, settings):
-                yield Event("roles-doubtful", start, _time_s(block, start), one.message)
+                yield Event("roles-doubtful", start, _time_s(block, start), one.sentence)
         if self._transient and (periods := transient_periods(signals, settings)):
             yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
         self._roles = self._transient = False

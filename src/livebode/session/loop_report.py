@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import InputError, Loop, Parameters, Responses
+from livebode.core import FitError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.margins import (
     Margins,
@@ -107,8 +107,10 @@ def loop_of_run(
 
     Raises
     ------
-    InputError
-        If nobody says what feeds back, or no model could be fitted.
+    UsageError
+        If the loop's feedback is missing.
+    FitError
+        If no model could be fitted.
     """
     run = Run.open(directory)
     own_words = said(run.summary)
@@ -124,7 +126,12 @@ def loop_of_run(
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
     """The report of a fit, and of the responses that it is of."""
     if fit.status != "ok":
-        raise InputError(f"margins need a fit, and there is none: {fit.sentence}")
+        raise FitError(
+            "not-fitted",
+            f"margins need a fit, and there is none: {fit.sentence}",
+            "fit another model",
+            models=[fit.model.name],
+        )
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
     fits, mean = fit.parameters, mean_response(responses)
     fitted_to = fit.measured if fit.measured is not None else mean

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.design import Machine, MeasuredResponse, measured_machine
 from livebode.design.machine import MOTION_KEYS
 from livebode.design.measured import Output
@@ -46,8 +46,10 @@ class MeasuredAxis:
 
     Raises
     ------
-    InputError
-        If there is no such run, the loop acts on another output than the run has, or the excitation is no torque.
+    RecordError
+        If there is no such run.
+    ConfigError
+        If the loop acts on another output than the run has, or the excitation is not a torque.
     """
 
     def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
@@ -59,9 +61,12 @@ class MeasuredAxis:
     def machine(self) -> Machine:
         """The Machine of the run's mean response."""
         if self._loop.excitation_at != "plant input":
-            raise InputError(
-                f"loop.excitation_at = {self._loop.excitation_at!r}, where an excitation is no torque; design for "
-                "'plant input'"
+            raise ConfigError(
+                "value-invalid",
+                f"loop.excitation_at = {self._loop.excitation_at!r}, where an excitation is not a torque",
+                "design for 'plant input'",
+                key="loop.excitation_at",
+                value=self._loop.excitation_at,
             )
         told, rate_hz = self._section, self._run.lines.rate_hz
         motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
@@ -91,16 +96,24 @@ class MeasuredAxis:
         unit = self._run.found.get("unit", "")
         own = output_of(unit)
         if own and self._section.output and self._section.output != own:
-            raise InputError(
-                f"measured.output = {self._section.output!r}, but the run's plant is in {unit}; leave it out"
+            raise ConfigError(
+                "value-mismatch",
+                f"measured.output = {self._section.output!r}, but the run's plant is in {unit}",
+                "leave it out",
+                key="measured.output",
+                value=self._section.output,
+                unit=unit,
             )
         acts_on: Output = "position" if self._loop.position_pd is not None else "velocity"
         output = self._section.output or own or acts_on
         if output != acts_on and self._loop.build(self._run.lines.rate_hz).feedback is not None:
             other = "loop.velocity" if acts_on == "position" else "loop.position_pd"
-            raise InputError(
-                f"the run's output is a {output}, and its loop as described acts on a {acts_on}; describe {other}, or "
-                f"track the {acts_on}"
+            raise ConfigError(
+                "value-mismatch",
+                f"the run's output is a {output}, and its loop as described acts on a {acts_on}",
+                f"describe {other}, or track the {acts_on}",
+                key=other,
+                value=output,
             )
         return output
 

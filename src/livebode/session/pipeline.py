@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from livebode.core import InputError, missing_channel
+from livebode.core import LivebodeError, SignalError, nearest_channel
 from livebode.session.axis import Axis
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
@@ -38,18 +38,24 @@ class Pipeline:
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
-        """What the axis asks for behind its follower, with or without `samples`; InputError where it cannot be."""
+        """What the axis asks for behind its follower, with or without `samples`; LivebodeError where it cannot be."""
         settings = follower.settings
         return cls(follower, Fits.of(axis.fit, settings.loop), make_watching(axis, settings, samples=samples), axis)
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
-        """The same for a machine that sends, whose channels and rate are known; InputError where they do not fit."""
+        """The same for a machine that sends, whose channels and rate are known; LivebodeError where they do not fit."""
         pipeline = cls.of(axis, live_follower(axis, source.rate_hz, source.spectra), samples=source.spectra is None)
         names = [channel.name for channel in source.channels]
         for name in pipeline.channels:
             if name not in names:
-                raise InputError(missing_channel(name, names))
+                raise SignalError(
+                    "channel-unknown",
+                    f"there is no channel {name!r}",
+                    nearest_channel(name, names),
+                    channel=name,
+                    allowed=names,
+                )
         return pipeline
 
     @property
@@ -78,7 +84,7 @@ class Pipeline:
         """
         try:
             self.follower.restore(before.follower.snapshot())
-        except InputError:
+        except LivebodeError:
             return False
         if self._same(before, "signals", "tracking", "loop", "motion"):
             if self.fits and before.fits and self._same(before, "fit"):

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from livebode.core import Block, InputError, Lines, SpectraLayout
+from livebode.core import Block, ConfigError, Lines, SignalError, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.settings import nearest_hop
 from livebode.session.axis import Axis
@@ -30,7 +30,7 @@ class Recorded(Protocol):
 
 
 def make_follower(axis: Axis, log: Log) -> Follower:
-    """A Tracker for this recording, or with [motion] a MotionCorrection; InputError where they do not fit."""
+    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError where they do not fit."""
     return _follower(axis, make_settings(axis, log))
 
 
@@ -41,9 +41,11 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
         return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if frequencies == "auto" or window == "auto":
-        raise InputError(
-            "lines or window are 'auto', which needs a recording to look at first; give lines.frequencies and "
-            "lines.window for a live source"
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', which needs a recording to look at first",
+            "set lines.frequencies and lines.window for a live source",
+            key="lines",
         )
     lines = Lines.parse(frequencies, rate_hz, window)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
@@ -58,9 +60,14 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
     chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
     if chunk_samples < 2 * settings.lines.window:
-        raise InputError(
+        raise ConfigError(
+            "value-invalid",
             f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
-            f"{settings.lines.window}; take the duration of a stroke"
+            f"{settings.lines.window}",
+            "set it to the duration of a stroke",
+            key="motion.chunk_s",
+            value=axis.motion.chunk_s,
+            window=settings.lines.window,
         )
     return MotionCorrection(
         settings, radius_m=axis.motion.radius_m, chunk_samples=chunk_samples, driven_by=axis.motion.driven_by
@@ -68,7 +75,7 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 
 def make_settings(axis: Axis, log: Log) -> Settings:
-    """The tracker's settings for this recording; InputError where they do not fit it or each other."""
+    """The tracker's settings for this recording; LivebodeError where they do not fit it or each other."""
     settings = _settings(axis, log.rate_hz, _lines(axis, log))
     if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
         check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
@@ -122,7 +129,12 @@ def _lines(axis: Axis, log: Log) -> Lines:
         return Lines.parse(frequencies, log.rate_hz, window)
     reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
     if reference is None:
-        raise InputError("lines or window are 'auto', but no excitation is named to find them from; name its channel")
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', but no excitation is named to find them in",
+            "name its channel",
+            key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
+        )
     # Its statistics take half a second to import, which a run with known lines is spared.
     from livebode.excitation import recognise
 
@@ -132,9 +144,14 @@ def _lines(axis: Axis, log: Log) -> Lines:
     if frequencies != "auto":
         return Lines.parse(frequencies, log.rate_hz, window)
     if window % found.period:
-        raise InputError(
-            f"the excitation repeats every {found.period} samples, which does not divide the {window=}; "
-            f"take a multiple of {found.period}, or --window auto"
+        raise SignalError(
+            "wrong-period",
+            f"the excitation repeats every {found.period} samples, which does not divide the {window=}",
+            f"set lines.window to a multiple of {found.period}, or to 'auto'",
+            channel=reference,
+            key="lines.window",
+            period=found.period,
+            window=window,
         )
     times = window // found.period
     return Lines(
@@ -161,7 +178,7 @@ def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarr
 
 
 def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
-    """What speaks against the roles of the channels, in sentences; InputError where it is certain and not accepted."""
+    """What speaks against the roles of the channels, in sentences; SignalError where it is certain and not accepted."""
     names = {role: name for role in ROLES if (name := settings.channel(role))}
     samples = min(_LOOKED_AT, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
     channels = list(dict.fromkeys(names.values()))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, SignalError
 from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
 from livebode.session.plan import beginnings
 from livebode.sources import Log
@@ -57,7 +57,7 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
 
     Raises
     ------
-    InputError
+    SignalError
         If that stretch is shorter than two seconds.
     """
     names = list(dict.fromkeys([*signals, *([excitation] if excitation else [])]))
@@ -70,9 +70,14 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
         silent[1:] &= (w[1:] == w[:-1]) & np.isfinite(w[1:])
     first, stop = _longest(silent)
     if excitation and stop - first < SECONDS_MIN * lines.rate_hz:
-        raise InputError(
-            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most; hum is looked for in two "
-            "seconds or more without excitation: record these, or leave out --lines"
+        raise SignalError(
+            "pause-too-short",
+            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most, and hum is looked for in "
+            f"{SECONDS_MIN:g} s or more without excitation",
+            "record such a pause, or leave out the lines",
+            channel=excitation,
+            pause_s=float((stop - first) / lines.rate_hz),
+            limit_s=float(SECONDS_MIN),
         )
     found = find_hum({name: rows[name][first:stop] for name in dict.fromkeys(signals)}, lines.rate_hz)
     f = lines.frequency_hz

@@ -25,7 +25,7 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
 
     Raises
     ------
-    InputError
+    LivebodeError
         For anything in the recording or the configuration that cannot be; nothing is left in the directory then, or in
         segments all that was recorded so far.
     StoppedError

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import SignalError
 from livebode.estimation import Settings
 from livebode.estimation.estimators import Role
 from livebode.session.role_shapes import direct, lags, limit, mean_deg, sized, slope, wide
@@ -19,7 +19,8 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROLES: tuple[Role, ...] = ("excitation", "input", "output")
-_ACCEPT = "to keep these roles, set tracking.accept_roles or give --accept-roles"
+_OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name that input alone"
+_ACCEPT = "to keep these roles, set tracking.accept_roles"
 # What repeats of an excitation's variance: all of a command, next to nothing of an axis that moves.
 _REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
 _WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer say nothing of noise
@@ -34,22 +35,36 @@ _LOOP_DOUBTFUL, _LOOP_WRONG, _SIGMAS = 0.1, 0.5, 5.0
 
 @dataclass(frozen=True)
 class Suspicion:
-    """One sentence with what was measured, what it suggests and the remedy, and whether that is certain."""
+    """What was measured and suggests, what to do about it, whether that is certain, and of which channels it is."""
 
     message: str
+    remedy: str
     certain: bool
+    channels: tuple[str | None, ...]
+
+    @property
+    def sentence(self) -> str:
+        """Message and remedy."""
+        return f"{self.message}; {self.remedy}"
 
 
 def check_distinct(settings: Settings) -> None:
-    """InputError where two roles that the estimator tells apart have the same channel."""
+    """SignalError where two roles that the estimator tells apart have the same channel."""
     for one, other in combinations(ROLES, 2):
         name = settings.channel(one)
         if name is None or name != settings.channel(other):
             continue
         open_loop = (one, other) == ("excitation", "input")
         if not (open_loop and settings.method.reference == "input"):
-            remedy = "for an open loop take --estimator direct with that input alone" if open_loop else "name another"
-            raise InputError(f"{name!r} is both the {one} and the {other}; {remedy}; {_ACCEPT}")
+            remedy = _OPEN_LOOP if open_loop else "name another"
+            raise SignalError(
+                "role-shared",
+                f"{name!r} is both the {one} and the {other}",
+                f"{remedy}; {_ACCEPT}",
+                channel=name,
+                roles=[one, other],
+                key="tracking.accept_roles",
+            )
 
 
 def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspicion]:
@@ -79,7 +94,8 @@ def _copies(signals: Mapping[Role, Floats], settings: Settings) -> Iterator[Susp
             names = f"{settings.channel(one)!r} ({one}) and {settings.channel(other)!r} ({other})"
             certain = other == "output"
             remedy = "name the channel of the machine's output" if certain else "right only where nothing feeds back"
-            yield Suspicion(f"{names} hold the same samples; {remedy}; {_ACCEPT}", certain)
+            both = settings.channel(one), settings.channel(other)
+            yield Suspicion(f"{names} have the same samples", f"{remedy}; {_ACCEPT}", certain, both)
 
 
 def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
@@ -88,9 +104,10 @@ def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
         return None
     return Suspicion(
         f"{settings.excitation!r} does not repeat like an excitation: "
-        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance returns every {settings.lines.window} samples; "
+        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance returns every {settings.lines.window} samples",
         f"name the channel of the signal that is added, or look for it with `livebode inspect`; {_ACCEPT}",
         spectra.repeating < _REPEATING_MIN,
+        (settings.excitation,),
     )
 
 
@@ -107,9 +124,10 @@ def _answering_excitation(spectra: RoleSpectra) -> Suspicion | None:
     role: Role = "input" if "input" in slopes else "output"
     return Suspicion(
         f"{settings.excitation!r} looks like an answer of the machine, not like an excitation: it falls with "
-        f"f^{own:.1f}, and {settings.channel(role)!r} over it rises with f^{slopes[role]:.1f}; name the channel of the "
-        f"signal that is added; {_ACCEPT}",
+        f"f^{own:.1f}, and {settings.channel(role)!r} over it rises with f^{slopes[role]:.1f}",
+        f"name the channel of the signal that is added; {_ACCEPT}",
         outputs,
+        (settings.excitation,),
     )
 
 
@@ -122,9 +140,10 @@ def _noise_as_input(spectra: RoleSpectra) -> Suspicion | None:
         return None
     return Suspicion(
         f"{settings.input!r} is noise at all {len(returning)} lines: at most {100 * returning.max():.2g} % of its "
-        f"power repeats every {settings.lines.window} samples, so that a window leaks; name the input that is excited, "
-        f"or estimate with livebode.welch in Python; {_ACCEPT}",
+        f"power repeats every {settings.lines.window} samples, so that a window leaks",
+        f"name the input that is excited, or estimate with livebode.welch in Python; {_ACCEPT}",
         True,
+        (settings.input,),
     )
 
 
@@ -155,7 +174,7 @@ def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
     if shown is None:
         return None
     names = f"{settings.input!r} as input and {settings.output!r} as output look exchanged"
-    return Suspicion(f"{names}: {shown}; exchange them; {_ACCEPT}", certain)
+    return Suspicion(f"{names}: {shown}", f"exchange them; {_ACCEPT}", certain, (settings.input, settings.output))
 
 
 def _upper(spectra: RoleSpectra, role: Role) -> Complex:
@@ -182,9 +201,10 @@ def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
         return None
     return Suspicion(
         f"the description of the loop contradicts {settings.input!r}: at {f[worst]:g} Hz it predicts "
-        f"{abs(quotient[worst]):.3g} times the measured input, so the indirect estimate is off by that; check the "
-        f"gains and units in [loop], or take --estimator joint; {_ACCEPT}",
+        f"{abs(quotient[worst]):.3g} times the measured input, so the indirect estimate is off by that",
+        f"check the gains and units in [loop], or set tracking.estimator to 'joint'; {_ACCEPT}",
         bool(away[worst] > _LOOP_WRONG),
+        (settings.input,),
     )
 
 
@@ -201,17 +221,25 @@ def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
             reference = spectra.settings.channel(spectra.settings.method.reference)
             return Suspicion(
                 f"{spectra.settings.channel(role)!r} ({role}) does not answer to {reference!r} at any line: their "
-                f"coherence over {spectra.windows} windows is at most {coherence.max():.2g}; name another channel, or "
-                "raise the amplitude",
+                f"coherence over {spectra.windows} windows is at most {coherence.max():.2g}",
+                "name another channel, or raise the amplitude",
                 False,
+                (spectra.settings.channel(role),),
             )
     return None
 
 
 def check_roles(signals: Mapping[Role, Floats], settings: Settings, *, accepted: bool) -> list[str]:
-    """What is suspected, in sentences; InputError where it is certain, unless the roles are `accepted`."""
+    """What is suspected, in sentences; SignalError where it is certain, unless the roles are `accepted`."""
     found = suspicions(signals, settings)
-    certain = [one.message for one in found if one.certain]
+    certain = [one for one in found if one.certain]
     if certain and not accepted:
-        raise InputError(certain[0])
-    return [one.message for one in found]
+        worst = certain[0]
+        raise SignalError(
+            "role-wrong",
+            worst.message,
+            worst.remedy,
+            channels=[name for name in worst.channels if name],
+            key="tracking.accept_roles",
+        )
+    return [one.sentence for one in found]

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.session.axis import FitSection, LoopSection
 
 _SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}
@@ -20,7 +20,7 @@ def said(summary: dict[str, Any]) -> dict[str, Any]:
 
     Raises
     ------
-    InputError
+    RecordError
         If a section that is used again is not what a run writes.
     """
     found = dict(_kept(summary.get("configuration", {})))
@@ -30,8 +30,11 @@ def said(summary: dict[str, Any]) -> dict[str, Any]:
         except ValidationError as error:
             wrong = error.errors()[0]
             place = ".".join(map(str, (name, *wrong["loc"])))
-            raise InputError(
-                f"the configuration in run.json is not what a run writes ({place}: {wrong['msg']})"
+            raise RecordError(
+                "unexpected-content",
+                f"the configuration in run.json is not what a run writes ({place}: {wrong['msg']})",
+                "check who changed the file",
+                key=place,
             ) from None
     return found
 

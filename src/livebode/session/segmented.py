@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Block, Channel, Event, InputError, Parameters, Responses
+from livebode.core import Block, Channel, Event, Parameters, RecordError, Responses
 from livebode.core.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
@@ -167,7 +167,7 @@ class SegmentedRun:
 
         Raises
         ------
-        InputError
+        RecordError
             At the end, if the disk does not take the last ones.
         """
         for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
@@ -218,7 +218,12 @@ class SegmentedRun:
             for picture in self.partial.iterdir():
                 os.replace(picture, self.path / picture.name)
         except OSError as error:
-            raise InputError(f"the pictures could not be written to {str(self.path)!r}: {why(error)}") from None
+            raise RecordError(
+                "not-written",
+                f"the pictures could not be written to {str(self.path)!r}: {why(error)}",
+                "check the disk and its permissions",
+                path=str(self.path),
+            ) from None
         finally:
             shutil.rmtree(self.partial, ignore_errors=True)
         last = self._store.last
@@ -254,9 +259,11 @@ class SegmentedRun:
         before = Run.open(self.path, self._found_damaged).summary
         now = json.loads(to_json(self._summary))
         if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
-            raise InputError(
-                f"the unfinished run in {str(self.path)!r} was begun with another configuration; "
-                "take that one again, another --out, or --force to replace it"
+            raise RecordError(
+                "configuration-differs",
+                f"the unfinished run in {str(self.path)!r} was started with another configuration",
+                "use that one again, choose another directory, or replace the run with force",
+                path=str(self.path),
             )
         for name, part in self._parts.items():
             part.restore(states[name])
@@ -278,7 +285,7 @@ def _identity(summary: Mapping[str, Any]) -> list[Any]:
 
 
 def make_way(path: Path) -> None:
-    """Remove the run that stands there; InputError where something else stands there."""
+    """Remove the run that is there; RecordError where something else is there."""
     if not os.path.lexists(path):
         return
     check_removable(path)
@@ -286,6 +293,11 @@ def make_way(path: Path) -> None:
     try:
         remove(path)
     except OSError as error:
-        raise InputError(f"the run in {str(path)!r} cannot be removed: {why(error)}") from None
+        raise RecordError(
+            "not-removable",
+            f"the run in {str(path)!r} cannot be removed: {why(error)}",
+            "check its permissions",
+            path=str(path),
+        ) from None
     finally:
         lock.release()

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from livebode.core import Event, InputError
+from livebode.core import ConfigError, Event, LivebodeError
 from livebode.session.axis import Axis
 from livebode.session.axis_thread import AxisThread
 from livebode.session.change import Change, change_of
@@ -110,7 +110,7 @@ class Session:
                 return
             self._postponed = ""
             changes = self._checked(axes)
-        except (InputError, MemoryError) as error:
+        except (LivebodeError, MemoryError) as error:
             why = str(error) or "there is not enough memory for it"
             self._say("configuration-refused", f"the configuration is refused, and the one before it stays: {why}")
             return
@@ -133,17 +133,22 @@ class Session:
             self._say("configuration-postponed", message, record=False)
 
     def _checked(self, axes: Axes) -> dict[str, Change | None]:
-        """What each axis that runs is told; InputError where one of them cannot go on so."""
+        """What each axis that runs is told; LivebodeError where one of them cannot continue so."""
         changes: dict[str, Change | None] = {}
         if ("" in axes) != ("" in self.threads):
-            raise InputError("one axis does not become several while it runs; end livebode and start it again")
+            raise ConfigError(
+                "change-needs-restart",
+                "one axis cannot become several while it runs",
+                "end livebode and start it again",
+                keys=["axes"],
+            )
         for name, thread in self.threads.items():
             if name not in axes or not thread.alive:
                 continue
             try:
                 changes[name] = change_of(thread.axis, axes[name], thread.orders.source)
-            except InputError as error:
-                raise InputError(f"axis {name}: {error}" if name else str(error)) from None
+            except LivebodeError as error:
+                raise (error.at(f"axis {name}") if name else error) from None
         return changes
 
     def _apply(self, axes: Axes, changes: Mapping[str, Change | None]) -> None:

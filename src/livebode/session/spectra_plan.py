@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
-from livebode.core import InputError, Lines, SpectraLayout
+from livebode.core import ConfigError, Lines, SpectraLayout
 from livebode.session.axis import Axis
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
-    """The lines of the spectra; InputError where the configuration says others, or asks for what needs samples."""
+    """The lines of the spectra; ConfigError where the configuration has others, or asks for what needs samples."""
     frequencies, window, hop = axis.lines.frequencies, axis.lines.window, axis.tracking.hop
     if axis.motion is not None:
-        raise InputError(
-            "[motion] drives its model with samples, and the drive sends spectra; leave it out, or send samples"
+        raise ConfigError(
+            "needs-samples",
+            "[motion] drives its model with samples, and the drive sends spectra",
+            "leave it out, or send samples",
+            key="motion",
         )
     if axis.record is not None and axis.record.samples:
-        raise InputError("record.samples keeps samples, and the drive sends spectra; leave it out, or send samples")
+        raise ConfigError(
+            "needs-samples",
+            "record.samples records samples, and the drive sends spectra",
+            "leave it out, or send samples",
+            key="record.samples",
+        )
     if window not in ("auto", layout.window):
-        raise InputError(f"lines.window is {window}, and the drive's is {layout.window}; take that, or leave it out")
+        raise _differs("lines.window", window, layout.window)
     if hop not in (None, layout.hop):
-        raise InputError(f"tracking.hop is {hop}, and the drive's is {layout.hop}; take that, or leave it out")
+        raise _differs("tracking.hop", hop, layout.hop)
     lines = layout.at(rate_hz)
     if frequencies != "auto" and Lines.parse(frequencies, rate_hz, layout.window).bins != layout.lines:
         f = ", ".join(f"{x:g}" for x in lines.frequency_hz[:20])
         more = f" … ({len(lines)} lines)" if len(lines) > 20 else ""
-        raise InputError(
-            f"lines.frequencies are {frequencies!r}, and the drive's are {f}{more} Hz; take those, or leave them out"
-        )
+        raise _differs("lines.frequencies", frequencies, f"{f}{more} Hz")
     return lines
+
+
+def _differs(key: str, value: int | str | None, sent: int | str) -> ConfigError:
+    message = f"{key} = {value!r}, but the drive sends {sent}"
+    return ConfigError("value-mismatch", message, "use that, or leave it out", key=key, value=value, allowed=sent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.records.summary_file import read_summary
 
 
@@ -55,5 +55,5 @@ def _number(path: Path, first: Path) -> int:
 def _summary(path: Path) -> dict[str, Any]:
     try:
         return read_summary(path)[0]
-    except InputError:
+    except LivebodeError:
         return {}

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from livebode.core import InputError
+from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
 _SHOWN = 120
@@ -14,37 +14,52 @@ _TEXT_MAX, _LINES_MAX, _DEPTH_MAX, _INTEGER_MAX = 500, 20_000, 12, 1 << 63
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """What is in a TOML file; InputError where it cannot be read, is not TOML, or is longer than 1 MiB."""
+    """What is in a TOML file; ConfigError where it cannot be read, is not TOML, or is longer than 1 MiB."""
     return parse_table(read_bytes(path), str(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file as it is, at most a byte more than may be; InputError where it cannot be read."""
+    """The file as it is, at most a byte more than may be; ConfigError where it cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(FILE_BYTES_MAX + 1)
     except FileNotFoundError:
-        raise InputError(f"there is no file {path}; check the name") from None
+        raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
-        raise InputError(f"{str(path)!r} cannot be read: {error.strerror}") from None
+        raise ConfigError(
+            "file-unreadable",
+            f"{str(path)!r} cannot be read: {error.strerror}",
+            "check the path and its permissions",
+            path=str(path),
+        ) from None
 
 
 def parse_table(data: bytes, origin: str) -> dict[str, Any]:
     """What is in the text of a TOML file; `origin` names it in messages."""
     if len(data) > FILE_BYTES_MAX:
-        raise InputError(f"{origin!r} is longer than {FILE_BYTES_MAX} bytes; is it a configuration?")
+        raise ConfigError(
+            "file-too-long",
+            f"{origin!r} is longer than {FILE_BYTES_MAX} bytes",
+            "check that it is a configuration",
+            path=origin,
+            limit_bytes=FILE_BYTES_MAX,
+        )
     try:
         found = tomllib.loads(data.decode("utf-8"))
         _check_texts(found, "", origin, 0)
         return found
     except UnicodeDecodeError:
-        raise InputError(f"{origin!r} is not text; give a configuration in TOML, or a recording") from None
+        raise ConfigError(
+            "not-text", f"{origin!r} is not text", "give a configuration in TOML, or a recording", path=origin
+        ) from None
     except RecursionError:
-        raise InputError(f"{origin!r} is not a configuration: its values are nested too deeply") from None
-    except InputError:
+        raise _too_deep(origin) from None
+    except LivebodeError:
         raise
     except ValueError as error:  # also a number of more digits than Python reads
-        raise InputError(f"{origin!r} is not TOML: {one_line(str(error))}") from None
+        raise ConfigError(
+            "not-toml", f"{origin!r} is not TOML: {one_line(str(error))}", "correct it there", path=origin
+        ) from None
 
 
 def shortened(value: Any) -> str:
@@ -66,9 +81,18 @@ def one_line(text: str) -> str:
     return shown if len(text) <= 2 * _SHOWN else shown[: 2 * _SHOWN] + "…"
 
 
+def _too_deep(origin: str) -> ConfigError:
+    return ConfigError(
+        "nested-too-deeply",
+        f"{origin!r} is not a configuration: its values are nested too deeply",
+        "check the file",
+        path=origin,
+    )
+
+
 def _check_texts(value: Any, place: str, origin: str, depth: int) -> None:
     if depth > _DEPTH_MAX:
-        raise InputError(f"{origin!r} is not a configuration: its values are nested too deeply")
+        raise _too_deep(origin)
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_text(key, f"a key in [{place}]" if place else "a key", origin)
@@ -79,12 +103,29 @@ def _check_texts(value: Any, place: str, origin: str, depth: int) -> None:
     elif isinstance(value, str):
         _check_text(value, place, origin)
     elif isinstance(value, int) and abs(value) >= _INTEGER_MAX:  # TOML's own limit; Python cannot even print some
-        raise InputError(f"{origin}: {place} is a whole number of {value.bit_length()} bits, more than 63; correct it")
+        raise ConfigError(
+            "value-invalid",
+            f"{place} is a whole number of {value.bit_length()} bits, more than 63",
+            "correct it",
+            key=place,
+        ).at(origin)
 
 
 def _check_text(text: str, place: str, origin: str) -> None:
     long = _LINES_MAX if place.endswith("frequencies") else _TEXT_MAX
     if len(text) > long:
-        raise InputError(f"{origin}: {place} has {len(text)} letters, more than {long}")
+        raise ConfigError(
+            "value-invalid",
+            f"{place} has {len(text)} letters, more than {long}",
+            "shorten it",
+            key=place,
+            limit=long,
+        ).at(origin)
     if not text.isprintable():
-        raise InputError(f"{origin}: {place} = {shortened(text)} has a letter that cannot be printed; leave it out")
+        raise ConfigError(
+            "value-invalid",
+            f"{place} = {shortened(text)} has a letter that cannot be printed",
+            "leave it out",
+            key=place,
+            value=shortened(text),
+        ).at(origin)

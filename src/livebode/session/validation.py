@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import Block, InputError
+from livebode.core import Block, FitError, RecordError, SignalError, UsageError
 from livebode.records import Run
 from livebode.session.axis import Axis, FitSection
 from livebode.session.fits import fit_run
@@ -33,17 +33,32 @@ def validate_run(
 
     Raises
     ------
-    InputError
-        If the recording lacks a channel or has no stretch that is long enough, or no model could be fitted.
+    RecordError
+        If the run does not name the channels that are needed.
+    RecordingError, SignalError, UsageError
+        If the recording lacks a channel or has no stretch that is long enough.
+    FitError
+        If no model could be fitted.
     """
     own_words = said(Run.open(directory).summary)
     if "signals" not in own_words:
-        raise InputError(f"{str(directory)!r} does not say which channels it was made of; make it with `livebode run`")
+        raise RecordError(
+            "not-tracked",
+            f"{str(directory)!r} does not name the channels that it was computed from",
+            "create it with `livebode run`",
+            path=str(directory),
+        )
     axis = Axis.of({key: own_words[key] for key in ("source", "signals", "loop") if key in own_words}, str(directory))
     named = {role: name for role, name in (channels or {}).items() if name}
     signals = axis.signals.model_copy(update=named)
     if signals.input is None:
-        raise InputError("the run names no plant input u, which a model is driven by; run again with --input CHANNEL")
+        raise RecordError(
+            "not-tracked",
+            "the run names no plant input u, which a model is driven by",
+            "run again with signals.input",
+            path=str(directory),
+            role="input",
+        )
     notes = _freshness(own_words["source"].get("log"), log)
     opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
     there = {c.name for c in opened.channels} | set(opened.aliases)
@@ -56,7 +71,14 @@ def validate_run(
         notes.append(f"gaps or samples that are not finite: the longest clean stretch, {len(block)} of {recorded}")
     if samples is not None:
         if samples > len(block):
-            raise InputError(f"{samples=} is more than the {len(block)} clean ones in a row; take fewer")
+            raise UsageError(
+                "out-of-range",
+                f"{samples=} is more than the {len(block)} clean ones in a row",
+                "choose fewer",
+                argument="samples",
+                value=samples,
+                limit=len(block),
+            )
         block = block.cut(len(block) - samples, len(block))
     loop = axis.loop.build(block.rate_hz)
     roles = {"input": signals.input, "output": signals.output, "excitation": signals.excitation}
@@ -64,7 +86,7 @@ def validate_run(
     judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
     refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
     if not judged:
-        raise InputError("; ".join(refused))
+        raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[fit.model.name for fit in fits])
     return judged, notes + refused
 
 
@@ -92,6 +114,12 @@ def clean_stretch(opened: Log, names: list[str]) -> tuple[Block, int]:
             if last < len(block):
                 now = []
     if not best:
-        raise InputError(f"{str(opened.path)!r} holds no finite sample of {', '.join(names)}; choose another recording")
+        raise SignalError(
+            "no-clean-samples",
+            f"{str(opened.path)!r} has no sample at which {', '.join(names)} are all finite",
+            "choose another recording",
+            path=str(opened.path),
+            channels=names,
+        )
     data = np.concatenate([b.data for b in best], axis=1)
     return Block(data, best[0].channels, best[0].rate_hz, best[0].start), recorded

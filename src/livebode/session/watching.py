@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from livebode.core import Block, Event, InputError, Parameters, Responses
+from livebode.core import Block, Event, Parameters, RecordError, Responses
 from livebode.estimation import Settings
 from livebode.session.axis import Axis, MonitoringSection
 
@@ -63,10 +63,14 @@ class Watching:
         return len(said).to_bytes(4, "little") + said + (self._monitor.snapshot() if self._monitor is not None else b"")
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot under the same baseline; InputError where it is another's."""
+        """Continue from a snapshot under the same baseline; RecordError where it is another's."""
         rest = 4 + int.from_bytes(snapshot[:4], "little")
         if (self._monitor is None) != (len(snapshot) == rest):
-            raise InputError("the run was begun with another baseline or none; go on with that, or take another --out")
+            raise RecordError(
+                "baseline-differs",
+                "the run was started with another baseline or none",
+                "continue with that one, or choose another directory",
+            )
         if self._monitor is not None:
             self._monitor.restore(snapshot[rest:])
         self._alarms = json.loads(snapshot[4:rest])
@@ -78,7 +82,7 @@ class Watching:
 
 
 def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Watching:
-    """For these settings; InputError where the baseline cannot be read or does not fit.
+    """For these settings; BaselineError where the baseline cannot be read or does not fit.
 
     Without `samples` its tables judge alone, for the model of the machine needs them.
     """

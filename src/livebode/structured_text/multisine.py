@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, rounded_down
+from livebode.core import UsageError, rounded_down
 from livebode.structured_text.names import check_name
 from livebode.structured_text.text import array, check_rate, comment, real, section
 
@@ -112,9 +112,9 @@ def multisine(
 
     Raises
     ------
-    InputError
-        If the period is not one of 2 to 16384 finite samples, is silence or exceeds the limit, or the name is none that
-        Structured Text takes.
+    UsageError
+        If the period is not one of 2 to 16384 finite samples, is silence or exceeds the limit, or Structured Text does
+        not take the name.
 
     Examples
     --------
@@ -124,15 +124,33 @@ def multisine(
     check_name(name, "function block")
     samples = _checked(period)
     if not (np.isfinite(limit) and limit > 0):
-        raise InputError(f"{limit=} is no finite number above 0; give the most that drive and machine bear")
+        raise UsageError(
+            "out-of-range",
+            f"{limit=} is not a finite number above 0",
+            "give the limit of drive and machine",
+            argument="limit",
+            value=limit,
+        )
     check_rate(rate_hz)
     if not 1 <= ramp_periods <= RAMP_PERIODS_MAX:
-        raise InputError(f"{ramp_periods=} is not from 1 to {RAMP_PERIODS_MAX} periods; 1 is enough for most axes")
+        raise UsageError(
+            "out-of-range",
+            f"{ramp_periods=} is not from 1 to {RAMP_PERIODS_MAX} periods",
+            "1 is enough for most axes",
+            argument="ramp_periods",
+            value=ramp_periods,
+        )
     peak = float(np.max(np.abs(samples)))
     if peak > limit:
-        raise InputError(
-            f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}; "
-            f"scale it by at most {rounded_down(limit / peak * _BELOW):g}, or raise the limit"
+        scale = rounded_down(limit / peak * _BELOW)
+        raise UsageError(
+            "conflict",
+            f"the excitation's peak of {peak:.6g} exceeds {limit=:.6g}",
+            f"scale it by at most {scale:g}, or raise the limit",
+            argument="limit",
+            value=limit,
+            peak=peak,
+            scale_max=scale,
         )
     chunks = [samples[i : i + _LOADED_AT_ONCE] for i in range(0, len(samples), _LOADED_AT_ONCE)]
     return (
@@ -155,15 +173,31 @@ def multisine(
 def _checked(period: ArrayLike) -> NDArray[np.float64]:
     samples = np.asarray(period, dtype=np.float64)
     if samples.ndim != 1 or not 2 <= len(samples) <= PERIOD_MAX:
-        raise InputError(
-            f"a period of shape {samples.shape} is not one of 2 to {PERIOD_MAX} samples; "
-            "give one period, at a lower rate or with lines further apart"
+        raise UsageError(
+            "wrong-shape",
+            f"a period of shape {samples.shape} is not one of 2 to {PERIOD_MAX} samples",
+            "give one period, at a lower rate or with lines further apart",
+            argument="period",
+            shape=list(samples.shape),
+            samples_max=PERIOD_MAX,
         )
     if not np.all(np.isfinite(samples)):
         bad = int(np.flatnonzero(~np.isfinite(samples))[0])
-        raise InputError(f"sample {bad} of the period is {samples[bad]}; give finite numbers")
+        raise UsageError(
+            "not-finite",
+            f"sample {bad} of the period is {samples[bad]}",
+            "give finite numbers",
+            argument="period",
+            sample=bad,
+        )
     if (peak := float(np.max(np.abs(samples)))) < SMALLEST:
-        raise InputError(f"the period is nowhere larger than {peak}; give an excitation")
+        raise UsageError(
+            "out-of-range",
+            f"the period is nowhere larger than {peak}",
+            "give an excitation",
+            argument="period",
+            value=peak,
+        )
     return samples
 
 

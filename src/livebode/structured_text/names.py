@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 NAME_LENGTH_MAX = 32
 """Characters that every controller tells apart."""
@@ -56,12 +56,20 @@ def check_name(name: str, what: str) -> None:
 
     Raises
     ------
-    InputError
-        For a keyword, a character that is no ASCII letter, digit or underscore, a digit in front, two underscores in a
-        row or one at the end, or more than 32 characters; with the nearest name that would do.
+    UsageError
+        For a keyword, a character that is not an ASCII letter, digit or underscore, a digit in front, two underscores
+        in a row or one at the end, or more than 32 characters; with the nearest name that is allowed.
     """
     if problem := _problem(name):
-        raise InputError(f"{what} {name!r} {problem} in Structured Text; {as_name(name)} would do")
+        nearest = as_name(name)
+        raise UsageError(
+            "invalid-name",
+            f"{what} {name!r} {problem} in Structured Text",
+            f"take {nearest}",
+            value=name,
+            element=what,
+            nearest=nearest,
+        )
 
 
 def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> None:
@@ -73,9 +81,14 @@ def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> N
         low = name.lower()
         if low in own or low in before:
             other = f"the same as {before[low]!r}" if low in before else "a name that the generated text needs itself"
-            raise InputError(
-                f"{what} {name!r} is {other} in Structured Text, which knows no case; "
-                f"{as_name(name, [*own, *names])} would do"
+            nearest = as_name(name, [*own, *names])
+            raise UsageError(
+                "duplicate",
+                f"{what} {name!r} is {other} in Structured Text, which ignores case",
+                f"take {nearest}",
+                value=name,
+                element=what,
+                nearest=nearest,
             )
         before[low] = name
 

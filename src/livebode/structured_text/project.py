@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 from livebode.structured_text.multisine import multisine
 from livebode.structured_text.names import check_names
 from livebode.structured_text.ring import LENGTH, ring_block, ring_type
@@ -77,14 +77,21 @@ class Project:
 
         Raises
         ------
-        InputError
+        UsageError
             As `multisine`, `sliding_dft`, `ring_type` and `ring_block` do; or where the excitation or a tracked signal
             is no channel, or has a name that the program needs itself.
         """
         check_signals((self.excitation, *self.tracked), self.counter)
         for name in (self.excitation, *self.tracked):
             if name not in self.channels:
-                raise InputError(f"there is no channel {name!r}; known here: {', '.join(self.channels)}")
+                raise UsageError(
+                    "unknown-name",
+                    f"there is no channel {name!r}",
+                    f"choose from {', '.join(self.channels)}",
+                    argument="excitation" if name == self.excitation else "tracked",
+                    value=name,
+                    allowed=list(self.channels),
+                )
         check_names(self.columns, "channel", _OWN)
         rate_hz = self.lines.rate_hz
         return {
@@ -121,7 +128,7 @@ class Project:
 
 
 def check_signals(names: Iterable[str], counter: str = COUNTER) -> None:
-    """InputError for a signal by whose name MAIN calls something of its own: the counter would go out as torque."""
+    """UsageError for a signal by whose name MAIN calls something of its own: the counter would go out as torque."""
     check_names(list(dict.fromkeys(names)), "signal", (*_OWN, counter))
 
 

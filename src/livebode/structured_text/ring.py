@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from livebode.core import InputError, counted
+from livebode.core import UsageError, counted
 from livebode.structured_text.names import check_name, check_names
 from livebode.structured_text.text import array, check_bytes, check_rate, comment, real, section
 
@@ -45,8 +45,8 @@ def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str 
 
     Raises
     ------
-    InputError
-        If a number is out of its range, the ring needs more than 8 MiB, or the name is none that Structured Text takes.
+    UsageError
+        If a number is out of its range, the ring needs more than 8 MiB, or Structured Text does not take the name.
     """
     check_name(name, "type")
     _check_size(channels, length)
@@ -92,8 +92,8 @@ def ring_block(
 
     Raises
     ------
-    InputError
-        If a name is none that Structured Text takes, or the ring is too large.
+    UsageError
+        If Structured Text does not take a name, or the ring is too large.
     """
     check_name(name, "function block")
     check_name(type_name, "type")
@@ -119,9 +119,19 @@ def ring_block(
 
 def _check_size(channels: int, length: int) -> None:
     if not 1 <= channels <= CHANNELS_MAX:
-        raise InputError(
-            f"a ring of {counted(channels, 'channel')} is not one of 1 to {CHANNELS_MAX}; take a ring for each few"
+        raise UsageError(
+            "out-of-range",
+            f"a ring of {counted(channels, 'channel')} is not one of 1 to {CHANNELS_MAX}",
+            "take several rings",
+            argument="channels",
+            value=channels,
         )
     if length < 2:
-        raise InputError(f"a ring of {length=} samples is too short; take at least 2, better {LENGTH}")
+        raise UsageError(
+            "out-of-range",
+            f"a ring of {length=} samples is too short",
+            f"take at least 2, better {LENGTH}",
+            argument="length",
+            value=length,
+        )
     check_bytes(_HEADER_BYTES, 8 * channels, length, f"a ring of {counted(channels, 'channel')}")

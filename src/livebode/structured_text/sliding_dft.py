@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import factorial
 from typing import Literal
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 from livebode.structured_text.names import check_name, check_names
 from livebode.structured_text.text import Declared, array, check_bytes, comment, real, section
 
@@ -141,8 +141,8 @@ def sliding_dft(
 
     Raises
     ------
-    InputError
-        If a name is none that Structured Text takes, there is no channel or more than 16, or the window needs more than
+    UsageError
+        If Structured Text does not take a name, there is no channel or more than 16, or the window needs more than
         8 MiB.
 
     Examples
@@ -153,9 +153,22 @@ def sliding_dft(
     """
     check_name(name, "function block")
     if phase not in ("fixed", "window"):
-        raise InputError(f"{phase=} is not known; take 'fixed' or 'window'")
+        raise UsageError(
+            "not-one-of",
+            f"{phase=} is not known",
+            "take 'fixed' or 'window'",
+            argument="phase",
+            value=phase,
+            allowed=["fixed", "window"],
+        )
     if not 1 <= len(channels) <= CHANNELS_MAX:
-        raise InputError(f"channels {list(channels)} are not 1 to {CHANNELS_MAX} names; take a block for each few")
+        raise UsageError(
+            "out-of-range",
+            f"channels {list(channels)} are not 1 to {CHANNELS_MAX} names",
+            "take several blocks",
+            argument="channels",
+            value=list(channels),
+        )
     bins, window = len(lines), lines.window
     outputs, own = _outputs(len(channels), bins), _own(len(channels), bins, window, phase)
     check_names(channels, "channel", [name, *(v for names, _, _ in (*outputs, *own) for v in names.split(", "))])

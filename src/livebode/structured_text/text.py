@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import isfinite
 
-from livebode.core import InputError, counted
+from livebode.core import UsageError, counted
 
 BYTES_MAX = 8 << 20
 """Most memory of one block or ring: what livebode reads from a PLC, and more than most PLCs leave free."""
@@ -50,16 +50,28 @@ def array(*lengths: int, of: str = "LREAL") -> str:
 
 
 def check_rate(rate_hz: float) -> None:
-    """InputError for what is no rate of a task."""
+    """UsageError for what is not the rate of a task."""
     if not (isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not above 0; give the cycles of the task per second")
+        raise UsageError(
+            "out-of-range",
+            f"{rate_hz=} is not above 0",
+            "give the cycles of the task per second",
+            argument="rate_hz",
+            value=rate_hz,
+        )
 
 
 def check_bytes(fixed: int, each: int, count: int, what: str) -> None:
-    """InputError where `fixed` + `each`·`count` bytes are more than a PLC has; `what` names that which is counted."""
+    """UsageError where `fixed` + `each`·`count` bytes are more than a PLC has; `what` names that which is counted."""
     needed = fixed + each * count
     if needed > BYTES_MAX:
-        raise InputError(
-            f"{what} of {counted(count, 'sample')} takes {needed} bytes of the PLC, more than {BYTES_MAX}; "
-            f"take at most {counted((BYTES_MAX - fixed) // each, 'sample')}"
+        most = (BYTES_MAX - fixed) // each
+        raise UsageError(
+            "too-large",
+            f"{what} of {counted(count, 'sample')} takes {needed} bytes of the PLC, more than {BYTES_MAX}",
+            f"take at most {counted(most, 'sample')}",
+            samples=count,
+            samples_max=most,
+            size_bytes=needed,
+            limit_bytes=BYTES_MAX,
         )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import FitError, SignalError
 from livebode.fitting import Fit
 from livebode.fitting.physical import DELAY
 from livebode.fitting.transfer import Transfer
@@ -57,17 +57,27 @@ def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
 
     Raises
     ------
-    InputError
-        If the fit failed, or there are fewer samples than ten times what is to be found.
+    FitError
+        If the fit failed.
+    SignalError
+        If there are fewer samples than ten times what is to be found.
     """
     if fit.status != "ok":
-        raise InputError(f"there is no fit to simulate: {fit.sentence}")
+        raise FitError(
+            "not-fitted", f"there is no fit to simulate: {fit.sentence}", "give a fit that is valid", status=fit.status
+        )
     values, sigma = fit.parameters.value[0], fit.parameters.sigma[0]
     ticks = _parts(fit, values)[1] * fit.rate_hz
     known = slice(max(0, _whole(ticks)), len(u) - max(0, _whole(-ticks)))
     own = _unforced(fit, values, known.stop - known.start)
     if len(own) < 10 * own.shape[1]:
-        raise InputError(f"{len(own)} samples are too few to judge a model by; give at least {10 * own.shape[1]}")
+        raise SignalError(
+            "too-short",
+            f"{len(own)} samples are too few to validate a model with",
+            f"give at least {10 * own.shape[1]}",
+            samples=len(own),
+            samples_min=10 * own.shape[1],
+        )
     # A constant input makes only motions that are fitted anyway, and its mean makes the largest numbers.
     u = u - np.mean(u)
     forced = _forced(fit, values, u)[known]

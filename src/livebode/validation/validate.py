@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, InputError, Loop
+from livebode.core import Block, Loop, SignalError
 from livebode.fitting import Fit
 from livebode.validation.correlation import SMALL, Correlation, correlation, own_correlation
 from livebode.validation.simulate import Simulated, simulate
@@ -187,20 +187,24 @@ def validate(
 
     Raises
     ------
-    InputError
-        If the block's rate is not the fit's, it is too short or not finite, or the fit failed.
+    SignalError
+        If the block's rate is not that of the fit, it is too short or not finite, or a signal is constant.
+    FitError
+        If the fit failed.
     """
     if abs(block.rate_hz / fit.rate_hz - 1) > 1e-6:
-        raise InputError(f"the model is of {fit.rate_hz:g} Hz and the recording has {block.rate_hz:g} Hz; record alike")
+        raise SignalError(
+            "rate-differs",
+            f"the model was fitted at {fit.rate_hz:g} Hz, and the recording has {block.rate_hz:g} Hz",
+            "record at the rate of the model",
+            rate_hz=block.rate_hz,
+            fit_rate_hz=fit.rate_hz,
+        )
     loop = loop or Loop()
     names = {"input": input, "output": output} | ({"excitation": excitation} if excitation else {})
     signals = _aligned({role: block[name] for role, name in names.items()}, loop)
     count = len(signals["input"])
-    if count < 10 * lags or not all(np.isfinite(x).all() for x in signals.values()):
-        raise InputError(f"{count} samples with {lags} lags: give at least {10 * lags} finite ones in a row")
-    still = [names[role] for role, x in signals.items() if np.ptp(x) == 0]
-    if still:
-        raise InputError(f"{', '.join(map(repr, still))} does not move, which tells nothing of a model; record it live")
+    _check(signals, names, count, lags)
     found = simulate(fit, signals["input"], signals["output"])
     signals = {role: x[found.known] for role, x in signals.items()}
     matrix, measured = _correlated(fit), found.without(signals["output"])
@@ -244,3 +248,33 @@ def _correlated(fit: Fit) -> Floats:
     sigma = fit.parameters.sigma[0]
     unit = np.where(sigma > 0, sigma, 1.0)
     return np.asarray(fit.parameters.covariance[0] / np.outer(unit, unit))
+
+
+def _check(signals: dict[str, Floats], names: dict[str, str], count: int, lags: int) -> None:
+    """SignalError for signals that no model can be validated with."""
+    if count < 10 * lags:
+        raise SignalError(
+            "too-short",
+            f"{count} samples are too few for {lags} lags",
+            f"give at least {10 * lags} in a row",
+            samples=count,
+            samples_min=10 * lags,
+        )
+    for role, x in signals.items():
+        if not np.isfinite(x).all():
+            raise SignalError(
+                "not-finite",
+                f"channel {names[role]!r} has samples that are not finite",
+                f"give at least {10 * lags} finite ones in a row",
+                channel=names[role],
+                role=role,
+            )
+    for role, x in signals.items():
+        if np.ptp(x) == 0:
+            raise SignalError(
+                "channel-constant",
+                f"channel {names[role]!r} is constant, which validates no model",
+                "record it while the excitation is on",
+                channel=names[role],
+                role=role,
+            )

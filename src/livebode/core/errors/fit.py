@@ -12,4 +12,12 @@ class FitError(LivebodeError):
     """A model cannot be fitted, or what follows from a fit (margins, validation) cannot be computed."""
 
     area: ClassVar[str] = "fit"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "loop-unknown": "Margins need the controllers of the loop, which are not described.",
+        "no-continuous-model": "The discrete model has no counterpart in continuous time.",
+        "no-model": "No model of the machine fits the responses.",
+        "not-causal": "A model with a negative delay has no discrete counterpart.",
+        "not-fitted": "The fit failed, so that there is no model to use.",
+        "not-proper": "The numerator's degree is too high, or there are too many integrators.",
+        "too-few-lines": "There are too few lines for the parameters of the model.",
+    }

@@ -12,4 +12,10 @@ class OutputError(LivebodeError):
     """A file that was asked for cannot be written."""
 
     area: ClassVar[str] = "output"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "exists": "The file or directory exists already, and is replaced only on request.",
+        "is-directory": "The path of the file is a directory.",
+        "not-replaceable": "The directory contains something else than an earlier output, and is not replaced.",
+        "not-written": "The system refuses to write the output.",
+        "too-large": "There are more values than can be written in this format.",
+    }

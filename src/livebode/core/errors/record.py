@@ -12,4 +12,24 @@ class RecordError(LivebodeError):
     """A run's directory cannot be read, written or continued."""
 
     area: ClassVar[str] = "record"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "baseline-differs": "The unfinished run was started with another baseline, or with none.",
+        "changed-meanwhile": "The run's record changed while its source was opened.",
+        "configuration-differs": "The unfinished run was started with another configuration.",
+        "damaged": "A file of the run is not as it was written, or incomplete, and cannot be read.",
+        "exists": "The directory of the run exists already.",
+        "finished": "The run is finished and cannot be continued.",
+        "foreign-files": "The directory has files that livebode did not write, so it is neither used nor replaced.",
+        "locked": "Another process records in this directory.",
+        "no-parameters": "The run has no fitted parameters.",
+        "no-responses": "The run has no responses.",
+        "not-a-run": "The path is not the directory of a run.",
+        "not-continuable": "The run has no whole journal to continue from.",
+        "not-own-file": "A link, a pipe or a device is where a run has a regular file or a directory.",
+        "not-removable": "The run cannot be removed.",
+        "not-tracked": "The run does not name the channels that are needed.",
+        "not-written": "The system refuses to write the run.",
+        "too-large": "A file of the run is larger than a run writes it.",
+        "unexpected-content": "A file of the run is whole, but contains what a run does not write.",
+        "unreadable": "The system or a library cannot read a file of the run.",
+    }

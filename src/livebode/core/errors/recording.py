@@ -27,6 +27,7 @@ class RecordingError(LivebodeError):
         "line-ragged": "A line of a table has another number of cells than the others.",
         "line-too-long": "A line of a table is longer than any line of a recording.",
         "not-a-file": "The path is a directory, a pipe or a device.",
+        "not-an-excitation": "The file is not an excitation that `livebode design` wrote.",
         "not-found": "There is no such file.",
         "not-readable": "The operating system refuses to read the file.",
         "rate-conflict": "The given sampling rate contradicts the file.",

@@ -12,4 +12,23 @@ class SignalError(LivebodeError):
     """The samples do not fit what was asked: no excitation, no period, too short, channels with the wrong role."""
 
     area: ClassVar[str] = "signal"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "channel-constant": "A channel is constant.",
+        "channel-empty": "A channel has no finite sample.",
+        "channel-unknown": "There is no channel of this name.",
+        "empty": "There are no samples.",
+        "line-not-excited": "The excitation has no power at a line.",
+        "no-clean-samples": "There is no stretch without gaps and non-finite samples that is long enough.",
+        "no-response-there": "No valid response is near this time.",
+        "no-valid-response": "No response is valid at any line.",
+        "not-finite": "A channel has samples that are not finite.",
+        "not-periodic": "The excitation does not repeat from window to window.",
+        "pause-too-short": "There is no stretch without excitation that is long enough to look for hum.",
+        "rate-differs": "The samples have another rate than is needed.",
+        "role-shared": "Two roles that the estimator needs apart have the same channel.",
+        "role-wrong": "The samples of a channel contradict the role that it was given.",
+        "too-few-lines": "The responses have too few valid lines.",
+        "too-short": "There are too few samples.",
+        "wrong-period": "The excitation repeats after another number of samples than the window.",
+        "wrong-quantity": "The responses are of another quantity than the one that is needed.",
+    }

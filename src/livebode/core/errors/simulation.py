@@ -12,4 +12,7 @@ class SimulationError(LivebodeError):
     """A machine with these parameters cannot be simulated."""
 
     area: ClassVar[str] = "simulation"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "diverged": "The simulated machine does not stay finite.",
+        "loop-unsupported": "A loop of this form cannot be simulated.",
+    }

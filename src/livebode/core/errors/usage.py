@@ -13,7 +13,17 @@ class UsageError(LivebodeError):
 
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {
-        "duplicate": "A name is given twice where each may be given once.",
+        "conflict": "Two arguments, or an argument and what it is used with, do not go together.",
+        "duplicate": "A name or value is given twice where it may be given once.",
+        "invalid-name": "A name has a form that is not allowed.",
         "missing": "A required argument is missing or empty.",
+        "not-finite": "An argument has a value that is not a finite number.",
+        "not-one-of": "An argument is not one of the allowed values.",
         "out-of-range": "The value is outside the range of the argument.",
+        "query-rejected": "The database rejects the SQL of a query.",
+        "too-large": "What the arguments ask for needs more memory than there is.",
+        "too-many": "There are more values than the argument allows.",
+        "unknown-name": "There is nothing of this name; the allowed names are given.",
+        "unreadable": "The text or data of an argument cannot be read.",
+        "wrong-shape": "An array or list does not have the shape that is needed.",
     }

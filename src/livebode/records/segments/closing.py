@@ -6,7 +6,7 @@ import errno
 import os
 import threading
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.records.segments.manifest import Segment
 from livebode.records.segments.shelf import Shelf
 
@@ -37,7 +37,7 @@ class Closing:
         self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
         self._thread.start()
 
-    def result(self) -> tuple[list[Segment], OSError | InputError | None]:
+    def result(self) -> tuple[list[Segment], OSError | LivebodeError | None]:
         """Wait for the end: the segments that were removed, and why a journal could not be turned.
 
         It and those behind it are tried again with the next `begin`.
@@ -45,7 +45,7 @@ class Closing:
         self.wait()
         gone, error = self._gone, self._error
         self._gone, self._error = [], None
-        if error is not None and not isinstance(error, OSError | InputError):
+        if error is not None and not isinstance(error, OSError | LivebodeError):
             raise error
         return gone, error
 

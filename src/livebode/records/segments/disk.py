@@ -7,7 +7,7 @@ import errno
 import os
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.records.inside import check_own
 
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
@@ -20,7 +20,7 @@ _WORDS = {
 }
 
 
-def why(error: OSError | InputError) -> str:
+def why(error: OSError | LivebodeError) -> str:
     """What the system says of a failure, in words.
 
     >>> why(OSError(errno.ENOSPC, "No space left on device"))
@@ -72,7 +72,7 @@ class AppendFile:
 
     Raises
     ------
-    InputError
+    RecordError
         If it is a link or no regular file.
     """
 

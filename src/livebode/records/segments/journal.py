@@ -14,7 +14,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory
@@ -125,7 +125,7 @@ class Journal:
 
         Raises
         ------
-        InputError
+        RecordError
             If its frames are whole, and what they hold is not what a run writes.
         OSError
             If it cannot be read.
@@ -134,7 +134,12 @@ class Journal:
         try:
             return cls()._over(frames(data), after)
         except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
-            raise InputError(f"{str(run / name_of(number))!r} does not hold what a run writes; move it away") from None
+            raise RecordError(
+                "unexpected-content",
+                f"{str(run / name_of(number))!r} does not hold what a run writes",
+                "move it away",
+                path=str(run / name_of(number)),
+            ) from None
 
     def _over(self, found: Iterator[Frame], after: Callable[[], Commit | None]) -> Journal:
         tables: dict[int, tuple[str, pa.Schema]] = {}
@@ -206,7 +211,7 @@ class Journal:
 
 
 def _whole(run: Path, name: str) -> bytes:
-    """All of a journal, which grows without a bound while no segment can be closed; InputError for one with holes.
+    """All of a journal, which grows without a bound while no segment can be closed; RecordError for one with holes.
 
     What is read is at most in proportion to what the disk holds: a journal may come from anybody.
     """
@@ -214,9 +219,14 @@ def _whole(run: Path, name: str) -> bytes:
         about = os.fstat(file.fileno())
         held_bytes = 512 * getattr(about, "st_blocks", 0)
         if about.st_size > max(_SPARSE_BYTES_MAX, _SPARSE_RATIO * held_bytes):
-            raise InputError(
-                f"{str(run / name)!r} is {about.st_size} bytes long, of which the disk holds {held_bytes}; "
-                "a run does not write that; move it away"
+            raise RecordError(
+                "too-large",
+                f"{str(run / name)!r} is {about.st_size} bytes long, of which the disk holds {held_bytes}; a run does "
+                "not write that",
+                "move it away",
+                path=str(run / name),
+                size_bytes=about.st_size,
+                held_bytes=held_bytes,
             )
         return file.read(about.st_size)
 

@@ -6,7 +6,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import RecordError
 
 
 class Lock:
@@ -14,7 +14,7 @@ class Lock:
 
     Raises
     ------
-    InputError
+    RecordError
         If another process holds it.
     """
 
@@ -24,8 +24,11 @@ class Lock:
             fcntl.flock(self._directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(self._directory)
-            raise InputError(
-                f"another process records in {str(directory)!r}; end it first, or take another --out"
+            raise RecordError(
+                "locked",
+                f"another process records in {str(directory)!r}",
+                "end it first, or choose another path",
+                path=str(directory),
             ) from None
 
     def release(self) -> None:

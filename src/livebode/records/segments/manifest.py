@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Event, InputError
+from livebode.core import Event, RecordError
 from livebode.records.inside import read_bytes
 from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of
@@ -145,12 +145,18 @@ class Manifest:
         return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
 
     def check(self, run: Path, journals: Sequence[int]) -> None:
-        """InputError where lines are missing that were written once: what they name would be forgotten.
+        """RecordError where lines are missing that were written once: what they name would be forgotten.
 
         `journals` are the numbers of those that are there.
         """
         if not self.broken and min(journals, default=0) > max(self.closed, default=0) + 1:
-            raise InputError(f"{str(run / NAME)!r} is damaged after byte {self.length}; restore it")
+            raise RecordError(
+                "damaged",
+                f"{str(run / NAME)!r} is damaged after byte {self.length}",
+                "restore it from a backup",
+                path=str(run / NAME),
+                offset_bytes=self.length,
+            )
 
 
 def name_of(table: str, number: int) -> str:

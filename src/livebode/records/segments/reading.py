@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.core import Event, InputError
+from livebode.core import Event, RecordError
 from livebode.records.inside import is_folder
 from livebode.records.segments import journal
 from livebode.records.segments.damage import KIND, event_of
@@ -56,7 +56,7 @@ def waiting_events(run: Path) -> list[Any]:
     """Events of an unfinished run, as plain data, that its newest commit holds since they are in no line yet."""
     try:
         commit = last_commit(run)
-    except (InputError, OSError):  # `parts` reports it
+    except (RecordError, OSError):  # `parts` reports it
         return []
     return [] if commit is None else list(commit.waiting)
 
@@ -75,7 +75,7 @@ def tables(
 
     Raises
     ------
-    InputError
+    RecordError
         If the record holds what a run does not write.
     OSError
         If something cannot be read.
@@ -112,7 +112,9 @@ def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
         if segment not in Manifest.read(run).segments:
             return None  # it was removed since we looked
         why = "it is gone"
-    except (InputError, OSError) as error:
+    except RecordError as error:
+        why = error.message
+    except OSError as error:
         why = str(error)
     lost = f"{segment.rows} rows of {segment.table} of samples {segment.first_sample} to {segment.last_sample}"
     details = {
@@ -136,7 +138,7 @@ def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Jour
         return Journal.read(run, number, lambda: None if following is None else following.first)
     except FileNotFoundError:  # it was closed since we looked
         return Journal()
-    except InputError as error:
+    except RecordError as error:
         tell(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
         return Journal()
 

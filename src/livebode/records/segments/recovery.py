@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.records.removal import foreign, remove
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal
@@ -39,7 +39,7 @@ def recover(run: Path) -> Found | None:
 
     Raises
     ------
-    InputError
+    RecordError
         If it holds something else, or a run that is finished, or one that has no whole commit.
     OSError
         If it cannot be read.
@@ -48,7 +48,13 @@ def recover(run: Path) -> Found | None:
         _clear(run)
         return None
     if not (run / manifest.NAME).exists() or read_summary(run)[0].get("record", {}).get("finished", True):
-        raise InputError(f"the run in {str(run)!r} is finished; take another --out, or --force to replace it")
+        raise RecordError(
+            "finished",
+            f"the run in {str(run)!r} is finished",
+            "choose another path, or replace it with force",
+            path=str(run),
+            argument="force",
+        )
     found = Manifest.read(run)
     found.check(run, journal.numbers(run))
     sweep(run, found)
@@ -70,12 +76,23 @@ def recover(run: Path) -> Found | None:
             sealed = [*left, number, *damaged]
             return Found(found, sealed[-1] + 1, None, read.commit, sealed, torn)
         return Found(found, number, read.length, read.commit, left, torn)
-    raise InputError(f"the run in {str(run)!r} has no whole journal left to go on from; take another --out")
+    raise RecordError(
+        "not-continuable",
+        f"the run in {str(run)!r} has no whole journal left to continue from",
+        "choose another path",
+        path=str(run),
+    )
 
 
 def _clear(run: Path) -> None:
-    """Take away what a run left that was killed while it was begun; InputError where anything else is there."""
+    """Take away what a run left that was killed while it was begun; RecordError where anything else is there."""
     ours = {manifest.NAME, EVENTS, journal.FOLDER, f".{RUN}.partial"}
     if strange := sorted({path.name for path in run.iterdir()} - ours) or foreign(run):
-        raise InputError(f"{str(run)!r} holds {strange[0]!r} and no run; take another --out")
+        raise RecordError(
+            "foreign-files",
+            f"{str(run)!r} holds {strange[0]!r} and no run",
+            "choose another path",
+            path=str(run),
+            files=strange,
+        )
     remove(run, itself=False)

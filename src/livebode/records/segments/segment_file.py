@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from livebode.core import InputError
+from livebode.core import RecordError
 from livebode.records.inside import open_read
 from livebode.records.segments.manifest import Segment
 
@@ -23,7 +23,7 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
 
     Raises
     ------
-    InputError
+    RecordError
         If it is not what the manifest says, or holds more than a segment does.
     OSError
         If it cannot be read.
@@ -31,26 +31,51 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
     with open_read(run, segment.name) as file:
         status = os.fstat(file.fileno())
         if status.st_size != segment.size_bytes:
-            raise InputError(f"it has {status.st_size} bytes, where the manifest says {segment.size_bytes}")
+            raise RecordError(
+                "damaged",
+                f"it has {status.st_size} bytes, where the manifest says {segment.size_bytes}",
+                "restore it from a backup",
+                path=str(run / segment.name),
+                size_bytes=status.st_size,
+            )
         data = file.read(segment.size_bytes)
     key = (segment.sha256, status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     if key not in _verified:
         if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
-            raise InputError("its checksum is not that of the manifest")
+            raise RecordError(
+                "damaged",
+                "its checksum is not that of the manifest",
+                "restore it from a backup",
+                path=str(run / segment.name),
+            )
         if len(_verified) >= _VERIFIED_MAX:
             _verified.clear()
         _verified.add(key)
     try:
         file = pq.ParquetFile(pa.BufferReader(data))
     except pa.ArrowException as error:
-        raise InputError(f"it is not Parquet ({error})") from None
+        raise RecordError(
+            "damaged", f"it is not Parquet ({error})", "restore it from a backup", path=str(run / segment.name)
+        ) from None
     _check_size(file.metadata, segment)
     return file
 
 
 def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
     if about.num_rows != segment.rows:
-        raise InputError(f"it has {about.num_rows} rows, where the manifest says {segment.rows}")
+        raise RecordError(
+            "damaged",
+            f"it has {about.num_rows} rows, where the manifest says {segment.rows}",
+            "restore it from a backup",
+            path=segment.name,
+            rows=about.num_rows,
+        )
     size_bytes = sum(about.row_group(group).total_byte_size for group in range(about.num_row_groups))
     if max(about.num_rows * about.num_columns, size_bytes // 8) > _VALUES_MAX:
-        raise InputError(f"its {about.num_rows} rows are more than a segment holds")
+        raise RecordError(
+            "too-large",
+            f"its {about.num_rows} rows are more than a segment holds",
+            "move it away",
+            path=segment.name,
+            rows=about.num_rows,
+        )

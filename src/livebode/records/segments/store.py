@@ -13,7 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.core import Event, InputError
+from livebode.core import Event, LivebodeError, RecordError
 from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing
@@ -59,7 +59,7 @@ class Store:
 
     Raises
     ------
-    InputError
+    RecordError
         On entering: if another process records there, something else is there, or the run is finished or damaged.
     """
 
@@ -89,7 +89,7 @@ class Store:
         self._files.close()
 
     def begin(self, summary: dict[str, Any], sample: int, time_s: float, states: Mapping[str, bytes]) -> None:
-        """Make the directory a run, with this run.json, that begins at this sample; InputError if the disk refuses."""
+        """Make the directory a run, with this run.json, that begins at this sample; RecordError if the disk refuses."""
         commit = Commit(sample, time_s, time.time(), 0, dict(states))
         with _refusing(self.path, "cannot be recorded in"):
             os.mkdir(self.path / journal.FOLDER)
@@ -155,7 +155,7 @@ class Store:
             # Where there is no room for it, the journal grows on and this is tried again at the next commit.
             try:
                 self._close_segment()
-            except (OSError, InputError) as error:
+            except (OSError, LivebodeError) as error:
                 self._not_closed(error, "with the next commit")
         elif self._closing.done:
             self._closed()
@@ -166,7 +166,7 @@ class Store:
 
         Raises
         ------
-        InputError
+        RecordError
             If the disk refuses; the record is then as if it had been killed.
         """
         with _refusing(self.path, "could not be finished in"):
@@ -185,7 +185,13 @@ class Store:
 
     def _not_paused(self) -> None:
         if self._pause is not None:
-            raise InputError(f"the run in {str(self.path)!r} could not be finished: {self._pause.message}")
+            raise RecordError(
+                "not-written",
+                f"the run in {str(self.path)!r} could not be finished: {self._pause.message}",
+                "make room, and continue the run",
+                path=str(self.path),
+                errno=self._pause.details.get("errno"),
+            )
 
     def _full(self, sample: int) -> bool:
         limits = self.limits
@@ -277,7 +283,7 @@ class Store:
         used = self._events.length + JOURNALS * self.limits.journal_bytes_max
         self._closing.begin(None if budget is None else budget - used)
 
-    def _closed(self) -> OSError | InputError | None:
+    def _closed(self) -> OSError | LivebodeError | None:
         """Wait until the journal before is turned, and say what was removed or damaged; the error where it failed."""
         gone, error = self._closing.result()
         for retained in self._shelf.retained[self._named :]:
@@ -301,7 +307,7 @@ class Store:
             self._say_closed()
         return error
 
-    def _not_closed(self, error: OSError | InputError, retried: str) -> None:
+    def _not_closed(self, error: OSError | LivebodeError, retried: str) -> None:
         """Say that a segment cannot be closed: the first, second, fourth, eighth … time."""
         self._attempts += 1
         if self._attempts & (self._attempts - 1):
@@ -364,4 +370,11 @@ def _refusing(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(f"{str(path)!r} {what}: {why(error)}") from None
+        raise RecordError(
+            "not-written",
+            f"{str(path)!r} {what}: {why(error)}",
+            "check the disk, or choose another path",
+            path=str(path),
+            reason=why(error),
+            errno=error.errno,
+        ) from None

@@ -7,7 +7,7 @@ from math import hypot, isfinite
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.fitting import Fit
 from livebode.margins import Margins, OpenLoop, against_lines, margins
 from livebode.session.axis import FitSection, LoopSection
@@ -74,7 +74,7 @@ def changes(of: Compared) -> Changes:
             fit_averaged(replace(average, response=one, words="what was compared"), model)[0]
             for average, one in zip(of.averages, (of.overall.before, of.overall.after))
         ]
-    except InputError as error:
+    except LivebodeError as error:
         return Changes((), f"No parameters: {error}.", (), "No margins: they are read around a fit.")
     for run, fit in zip(of.runs, fits):
         if fit.status != "ok":
@@ -86,7 +86,7 @@ def changes(of: Compared) -> Changes:
     loops = [LoopSection.model_validate(s.get("loop", {})) for s in own]
     try:
         read = [_margins(fit, loop) for fit, loop in zip(fits, loops)]
-    except InputError as error:
+    except LivebodeError as error:
         return Changes(found, words, (), f"No margins: {error}.")
     known = [m for m in read if m is not None and m.ok[0]]
     if len(known) < len(read):

@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import PER_LINE, InputError, Lines, Response, Responses, widened
+from livebode.core import PER_LINE, GridError, Lines, Response, Responses, widened
 from livebode.fitting import RunningMean
 from livebode.records import Run
 from livebode.session.averaged import Averaged, averaged
@@ -116,8 +116,10 @@ def compare(before: Run, after: Run) -> Compared:
 
     Raises
     ------
-    InputError
-        If quantity or unit differ, no line is common, or a run has no valid response.
+    GridError
+        If quantity or unit differ, or no line is common.
+    SignalError
+        If a run has no valid response.
     """
     _refuse(before, after)
     both = averaged(before), averaged(after)
@@ -151,9 +153,13 @@ def _refuse(before: Run, after: Run) -> None:
     for what in ("quantity", "unit"):
         one, other = (run.found.get(what, "") for run in (before, after))
         if one != other:
-            raise InputError(
+            raise GridError(
+                "not-alike",
                 f"{before.path.name!r} has the {what} {one!r} and {after.path.name!r} {other!r}: such responses have "
-                "nothing in common; compare runs of the same"
+                "nothing in common",
+                f"compare runs of the same {what}",
+                what=what,
+                values=[one, other],
             )
 
 
@@ -163,9 +169,12 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
     nearest = np.abs(f[:, np.newaxis] - g).argmin(axis=1)
     first = np.flatnonzero(np.abs(g[nearest] / f - 1) < _SAME_HZ)
     if not first.size:
-        raise InputError(
+        raise GridError(
+            "no-common-line",
             f"the runs have no line in common: {f[0]:g} … {f[-1]:g} Hz on a grid of {before.resolution_hz:g} Hz, and "
-            f"{g[0]:g} … {g[-1]:g} Hz on one of {after.resolution_hz:g} Hz; track one again at the other's lines"
+            f"{g[0]:g} … {g[-1]:g} Hz on one of {after.resolution_hz:g} Hz",
+            "track one again at the other's lines",
+            resolutions_hz=[before.resolution_hz, after.resolution_hz],
         )
     bins = tuple(before.bins[i] for i in first)
     return Lines(bins, before.window, before.rate_hz), (first, nearest[first])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.core import InputError, Responses
+from livebode.core import LivebodeError, Responses
 from livebode.core.clock import moment
 from livebode.fitting import Fit
 from livebode.records import Run
@@ -96,7 +96,7 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
 
     Raises
     ------
-    InputError
+    RecordError, SignalError
         If it is not a run, cannot be read, or has no valid response.
     """
     run = Run.open(directory)
@@ -113,7 +113,7 @@ def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
         return None, "No model was fitted: the run has no [fit]. `livebode fit RUN` fits one afterwards."
     try:
         found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
-    except InputError as error:
+    except LivebodeError as error:
         return None, f"No model was fitted: {error}."
     return (found, words) if found.status == "ok" else (None, f"No model holds for {words}: {found.sentence}.")
 
@@ -126,7 +126,7 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
         return None, "No margins: they are read around a fitted model, and there is none."
     try:
         found = loop_report(fit, "the mean", of.overview, described)
-    except InputError as error:
+    except LivebodeError as error:
         return None, f"No margins: {error}."
     return replace(found, responses=Responses.of(of.response)), ""
 

@@ -35,7 +35,7 @@ def run_report(directory: Path, judged: Judged | None = None, *, made: datetime)
 
     Raises
     ------
-    InputError
+    RecordError, SignalError
         If it is not a run, cannot be read, or has no valid response.
     """
     of = read(directory, judged)
