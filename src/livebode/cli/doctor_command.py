@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.doctor import Check, Subject, Verdict, examine, worst, write_bundle
 from livebode.records import to_json
 
-_STYLES: dict[Verdict, str] = {"not applicable": "dim", "ok": "green", "warning": "yellow", "failed": "bold red"}
+if TYPE_CHECKING:
+    from livebode.doctor import Check
+
+_STYLES = {"not applicable": "dim", "ok": "green", "warning": "yellow", "failed": "bold red"}
 
 
 def doctor_command(
@@ -34,6 +36,8 @@ def doctor_command(
 
     Exit code 2 where a check failed. No data is changed; a connection is opened and closed.
     """
+    from livebode.doctor import Subject, examine, worst, write_bundle  # with the dashboard and the simulation
+
     subject = Subject.of(targets or [])
     checks = examine(subject, out)
     verdict = worst(check.verdict for check in checks)
