@@ -206,7 +206,7 @@ SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spa
         ({"address": "0.0.0.0", "token_env": "token"}, "needs TLS"),
         ({"address": "::", "viewer_token_env": "viewer"}, "needs TLS"),
         ({"address": "plant"}, "is no IP address"),
-        ({"token_env": "nowhere"}, "the environment has no 'nowhere'"),
+        ({"token_env": "nowhere"}, "serve.token_env names a variable that is not set"),
         ({"token_env": "short"}, "at least 32"),
         ({"token_env": "spaces"}, "at least 32"),
         ({"token_env": "token", "viewer_token_env": "token"}, "are the same"),

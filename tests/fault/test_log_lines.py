@@ -157,6 +157,9 @@ def test_a_source_that_does_not_answer_is_logged_with_its_address_and_without_a_
         f'url = "mqtt://h/t"\npassword = "{SECRET}"',
         f'url = "mqtt://h/t"\npassword_env = ["{SECRET}"]',
         f'url = "mqtt://h/t"\nusername = ["{SECRET}"]',
+        f'url = "mqtt://h/t"\npassword_env = "{SECRET}"',
+        f'url = "mqtt://h/t"\npassword_file = "{SECRET}"',
+        f'url = "mqtt://h/t"\nusername = "{SECRET}"\nca_file = "nowhere"',
     ],
 )
 def test_a_configuration_that_is_refused_is_logged_without_its_secret(tmp_path: Path, source: str) -> None:
@@ -164,7 +167,7 @@ def test_a_configuration_that_is_refused_is_logged_without_its_secret(tmp_path: 
     own = tmp_path / "own.log"
     done = livebode("--log-level", "debug", "run", tmp_path / "axis.toml", "--log-file", own)
     assert done.code == 2
-    assert " ERROR livebode.cli.run_command: config." in own.read_text()
+    assert " ERROR livebode." in own.read_text()
     assert SECRET not in own.read_text() + done.err + done.out
 
 
