@@ -116,7 +116,7 @@ def commands(path: Path, out: Path) -> dict[str, Callable[[], Any]]:
             done = livebode(*arguments)
             assert done.code in (0, 2, 3), done.err
             assert "Traceback" not in done.err
-            assert "fault in livebode" not in done.err
+            assert "internal error" not in done.err
 
         return run
 

@@ -9,8 +9,18 @@ from livebode.core import LivebodeError
 HEAD = """# Errors and their codes
 
 Every error that livebode raises on purpose is a `LivebodeError` of one of these classes. It has a stable `code`, a
-`message`, a `remedy` and its `facts`, each of which is also an attribute; `as_dict()` gives them as plain data, and
-commands with `--json` print that on standard error. A code never changes its meaning; new ones may come.
+`message`, a `remedy` and its `facts`, each of which is also an attribute; `as_dict()` gives them as plain data. A code
+never changes its meaning; new ones may come.
+
+On the command line an error is one line on standard error, and the exit code is 2. It names the options of the command
+that it is about. With `--json` the last line on standard error is an object instead, with these options as a fact:
+
+    $ livebode run log.parquet --json
+    {"error": {"code": "usage.missing", "place": "", "message": "the output channel is not named", "remedy": "...",
+    "facts": {"argument": "output", "options": ["--output"]}}}
+
+Two codes have no class: `internal` is an internal error (exit code 1, its traceback is a fact), and `stopped`, in the
+list of several axes, an axis that somebody ended.
 """
 
 

@@ -40,7 +40,7 @@ def log(tmp_path: Path) -> Path:
     [
         (("--excitation", "w", "--input", "U", "--output", "y", *GRID), ("'U'", "did you mean 'u'?")),
         (("--excitation", "w", "--output", "y", *GRID), ("joint", "needs the input signal")),
-        (("--excitation", "w", "--input", "u"), ("no output is named", "--output")),
+        (("--excitation", "w", "--input", "u"), ("output channel is not named", "--output")),
         ((*JOINT, "--rate", 2000, *GRID), ("2000 Hz", "1000")),
         ((*JOINT, "--rate", -1, *GRID), ("source.rate_hz = -1", "greater than 0")),
         ((*JOINT, "--lines", "600", "--window", 100), ("600 Hz", "Nyquist frequency 500 Hz")),
@@ -68,7 +68,7 @@ def log(tmp_path: Path) -> Path:
         ((*JOINT, *GRID, "--estimator", "indirect"), ("indirect", "controllers")),
         ((*JOINT, *GRID, "--quantity", "open loop", "--estimator", "direct"), ("loop's feedback",)),
         ((*JOINT, *GRID, "--forgetting", 2), ("tracking.forgetting = 2", "less than or equal to 1")),
-        ((*JOINT, *GRID, "--difference", "z"), ("'z', which is none of the signals in use",)),
+        ((*JOINT, *GRID, "--difference", "z"), ("'z', which is not one of the signals in use",)),
         ((*JOINT, *GRID, "--time", "clock"), ("'clock'",)),
     ],
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
@@ -259,5 +259,5 @@ def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, t
     result = livebode("run", log, *JOINT, *GRID, "--out", tmp_path / "run")
     assert result.code == 1
     assert "ZeroDivisionError" in result.err
-    assert "fault in livebode" in result.err
+    assert "internal error" in result.err
     assert not (tmp_path / "run").exists()

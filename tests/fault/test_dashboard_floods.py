@@ -55,9 +55,9 @@ def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
     with opened() as live:  # a message that means nothing is answered, and no more
         answer(live, "facts")
         live.send("no json")
-        assert answer(live, "error") == "the message is not JSON"
+        assert answer(live, "error") == "the message is not JSON; send an object of JSON"
         live.send(b"\x00\xff")
-        assert answer(live, "error") == "a message is text, not bytes"
+        assert answer(live, "error") == "a message is text, not bytes; send text"
         live.send('{"kind": "watch"}')
         answer(live, "facts")
     assert not [line for line in watched.told if "internal error" in line]

@@ -17,7 +17,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from livebode.core import InputError
+from livebode.core import LivebodeError
 from livebode.dashboard import Dashboard, Serving, asked
 from tests.dashboards import Watched
 
@@ -99,7 +99,7 @@ def message(rng: random.Random) -> str:
 def test_messages() -> None:
     rng, understood = random.Random(1), 0
     for _ in range(CASES):
-        with contextlib.suppress(InputError):
+        with contextlib.suppress(LivebodeError):
             found = asked.wish(message(rng), axes=2)
             assert found.axis in (0, 1)
             assert found.time_s is None or abs(found.time_s) <= 1e12
@@ -115,7 +115,7 @@ def test_queries() -> None:
         for name in usual:
             if rng.random() < 0.15:
                 query[name] = rng.choice([rng.choice(_WORDS), str(rng.uniform(-1e13, 1e13)), str(rng.randrange(-9, 9))])
-        with contextlib.suppress(InputError):
+        with contextlib.suppress(LivebodeError):
             found = asked.span(query, axes=2)
             assert found.axis in (0, 1)
             assert -1e12 <= found.from_s <= found.to_s <= 1e12
@@ -128,7 +128,7 @@ def test_bodies() -> None:
     rng = random.Random(3)
     for _ in range(CASES):
         data = message(rng).encode("utf-8", "surrogatepass")
-        with contextlib.suppress(InputError):
+        with contextlib.suppress(LivebodeError):
             axis, event = asked.acknowledged(data, axes=2)
             assert axis in (0, 1)
             assert len(event) <= 64
@@ -196,5 +196,5 @@ def test_messages_leave_the_socket_or_close_it(watched: Watched, capfd: pytest.C
 
 
 def test_a_record_that_cannot_be_read_is_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not the directory of a run"):
+    with pytest.raises(LivebodeError, match="not the directory of a run"):
         Dashboard(Serving("127.0.0.1", 0)).view(tmp_path)

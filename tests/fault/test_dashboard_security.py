@@ -16,15 +16,16 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
-from livebode.core import Event, InputError
+from livebode.core import ConfigError, Event, LivebodeError, ServerError
 from livebode.dashboard import Dashboard, Serving
-from livebode.dashboard.access import Access, TooManyTriesError
+from livebode.dashboard.access import Access
 from livebode.dashboard.guard import Guard
 from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium
 from tests.dashboards import Watched
 from tests.guarded import TOKEN, VIEWER, ask, cookie, guarded, login, origin, port_of
 from tests.peers.certificates import Authority
+from tests.support.errors import refused
 
 
 @pytest.fixture(scope="module")
@@ -148,9 +149,10 @@ def test_wrong_tokens_are_refused_slower_and_slower_and_said_once() -> None:
         assert access.login("wrong" * 10, "10.0.0.5") is None
     waits = []
     for _ in range(12):
-        with pytest.raises(TooManyTriesError) as stopped:
+        with pytest.raises(ServerError) as stopped:
             access.login(TOKEN, "10.0.0.5")  # even the right one waits
-        waits.append(stopped.value.args[0])
+        assert stopped.value.code == "server.too-many-tries"
+        waits.append(stopped.value.retry_after_s)
         now[0] += waits[-1]
         assert access.login("wrong", "10.0.0.5") is None
     assert waits == sorted(waits)
@@ -199,30 +201,48 @@ SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spa
 
 
 @pytest.mark.parametrize(
-    ("section", "word"),
+    ("section", "code", "key"),
     [
-        ({"address": "0.0.0.0"}, "needs a token; make one with"),
-        ({"address": "192.168.1.5"}, "needs a token"),
-        ({"address": "0.0.0.0", "token_env": "token"}, "needs TLS"),
-        ({"address": "::", "viewer_token_env": "viewer"}, "needs TLS"),
-        ({"address": "plant"}, "is no IP address"),
-        ({"token_env": "nowhere"}, "serve.token_env names a variable that is not set"),
-        ({"token_env": "short"}, "at least 32"),
-        ({"token_env": "spaces"}, "at least 32"),
-        ({"token_env": "token", "viewer_token_env": "token"}, "are the same"),
-        ({"token_file": "/no/such"}, "cannot be read"),
-        ({"token_env": "token", "token_file": "/no/such"}, "both"),
-        ({"certificate_file": "/no/such"}, "go together"),
-        ({"certificate_file": "/no/such", "key_file": "/no/such"}, "there is no file"),
-        ({"certificate_file": __file__, "key_file": __file__}, "no certificate"),
+        ({"address": "0.0.0.0"}, "open-without-token", "serve.address"),
+        ({"address": "192.168.1.5"}, "open-without-token", "serve.address"),
+        ({"address": "0.0.0.0", "token_env": "token"}, "open-without-tls", "serve.address"),
+        ({"address": "::", "viewer_token_env": "viewer"}, "open-without-tls", "serve.address"),
+        ({"address": "plant"}, "value-invalid", "serve.address"),
+        ({"token_env": "short"}, "token-weak", "serve.token"),
+        ({"token_env": "spaces"}, "token-weak", "serve.token"),
+        ({"token_env": "token", "viewer_token_env": "token"}, "tokens-equal", "serve.viewer_token"),
+        ({"certificate_file": "/no/such"}, "key-missing", "serve.certificate_file"),
+        ({"certificate_file": "/no/such", "key_file": "/no/such"}, "file-unreadable", "serve.certificate_file"),
+        ({"certificate_file": __file__, "key_file": __file__}, "file-unusable", "serve.certificate_file"),
     ],
 )
-def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str) -> None:
+def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], code: str, key: str) -> None:
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
-    with pytest.raises(InputError, match=re.escape(word)) as refused:
+    with pytest.raises(ConfigError) as caught:
         Serving.of(ServeSection.model_validate(section))
-    assert not any(secret in str(refused.value) for secret in SERVE.values() if len(secret) > 5)
+    assert (caught.value.code, caught.value.key) == (f"config.{code}", key)
+    shown = json.dumps(caught.value.as_dict())
+    assert not any(secret in shown for secret in SERVE.values() if len(secret) > 5)
+
+
+@pytest.mark.parametrize(
+    ("section", "word"),
+    [
+        ({"token_env": "nowhere"}, "serve.token_env names a variable that is not set"),
+        ({"token_file": "/no/such"}, "cannot be read"),
+        ({"token_env": "token", "token_file": "/no/such"}, "both"),
+    ],
+)
+def test_a_token_that_is_not_there_is_not_served(
+    monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str
+) -> None:
+    for name, value in SERVE.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(LivebodeError, match=re.escape(word)) as caught:
+        Serving.of(ServeSection.model_validate(section))
+    shown = json.dumps(caught.value.as_dict())
+    assert not any(secret in shown for secret in SERVE.values() if len(secret) > 5)
 
 
 @pytest.mark.parametrize("key", ["token_file", "viewer_token_file"])
@@ -232,9 +252,11 @@ def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path,
     section = ServeSection.model_validate({key: path})
     for mode in (0o644, 0o604, 0o620, 0o602):
         path.chmod(mode)
-        with pytest.raises(InputError, match=re.escape(f"(mode {mode:04o}); run `chmod 600 '{path}'`")) as refused:
+        with pytest.raises(ConfigError) as caught:
             Serving.of(section)
-        assert TOKEN not in str(refused.value)
+        assert (caught.value.code, caught.value.mode) == ("config.file-open-to-others", mode)
+        assert caught.value.remedy.startswith(f"run `chmod 600 '{path}'`")
+        assert TOKEN not in json.dumps(caught.value.as_dict())
     for mode in (0o600, 0o640, 0o400):
         path.chmod(mode)
         assert TOKEN in (Serving.of(section).token, Serving.of(section).viewer_token)
@@ -252,7 +274,7 @@ def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_
 def test_a_port_that_is_taken_is_said() -> None:
     with Dashboard(Serving("127.0.0.1", 0)) as first:
         port = int(first.url.rsplit(":", 1)[1].strip("/"))
-        with pytest.raises(InputError, match=f"port {port} is taken"), Dashboard(Serving("127.0.0.1", port)):
+        with refused(ServerError, "port-taken", port=port), Dashboard(Serving("127.0.0.1", port)):
             pass
 
 
@@ -308,7 +330,7 @@ def test_the_section_of_a_file_is_not_recorded(tmp_path: Path) -> None:
     axis = Axis.read(tmp_path / "axis.toml")
     assert axis.serve.token_file == tmp_path / "secret"
     assert axis.serve.port == 9000
-    with pytest.raises(InputError, match="did you mean 'token_file'"):
+    with pytest.raises(LivebodeError, match="did you mean 'token_file'"):
         Axis.of({"source": {"log": "x"}, "signals": {"output": "y"}, "serve": {"tokenfile": "x"}}, "it")
 
 

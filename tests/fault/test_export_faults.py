@@ -38,11 +38,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (("--to", "excel"), "'excel' is not a format for responses; take csv, mat, netcdf or uff"),
-        (("--to", "uff", "--parameters"), "'uff' is not a format for parameters; take csv or mat"),
-        (("--to", "xarray"), "xarray is no file; in Python it is to_xarray"),
-        (("--to", "control"), "control is no file; in Python it is mean_response(Run"),
-        (("--to", "csv", "--at", "1", "--mean"), "--at and --mean do not go together"),
+        (("--to", "excel"), "'excel' is not a format for responses; choose csv, mat, netcdf or uff"),
+        (("--to", "uff", "--parameters"), "'uff' is not a format for parameters; choose csv or mat"),
+        (("--to", "xarray"), "xarray is not a file format; in Python use to_xarray"),
+        (("--to", "control"), "control is not a file format; in Python use mean_response(Run"),
+        (("--to", "csv", "--at", "1", "--mean"), "--at and --mean exclude each other"),
         (("--to", "csv", "--at", "nan"), "nan is not finite; give seconds in the recording's clock"),
         (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; take the nearest"),
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),

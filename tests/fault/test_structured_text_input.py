@@ -166,7 +166,7 @@ def test_files_that_stand_there_are_replaced_only_when_asked(tmp_path: Path) -> 
     (out / "MAIN.st").write_text("mine")
     done = livebode(*command)
     assert done.code == 2
-    assert "exists already; take another --out, or --force to replace it" in done.err
+    assert "exists already; choose another --out, or replace it with --force" in done.err
     assert (out / "MAIN.st").read_text() == "mine"
     assert livebode(*command, "--force").code == 0
     assert "mine" not in (out / "MAIN.st").read_text()

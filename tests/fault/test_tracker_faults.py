@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import Block, InputError, Lines, Loop
+from livebode.core import Block, Lines, LivebodeError, Loop, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from tests.support.errors import refused
 
 WINDOW, RATE_HZ = 100, 1000.0
 LINES = Lines.parse("50,100,200", RATE_HZ, WINDOW)
@@ -139,43 +140,44 @@ def test_a_line_without_excitation_is_not_valid() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "code", "argument"),
     [
-        ({"dtype": "float16"}, "dtype='float16' is not known; choose 'float64' or 'float32'"),
-        ({"estimator": "jiont"}, "estimator='jiont' is not known; choose 'direct' or 'joint' or 'indirect'"),
-        ({"excitation": None}, "the joint estimator of the plant needs the excitation signal"),
-        ({"hop": 0}, "hop=0 is not between 1 and the window of 100 samples, and no multiple of it"),
-        ({"hop": 101}, "hop=101 is not between 1 and the window"),
-        ({"forgetting": 0.0}, "forgetting=0.0 is not in 0 < λ ≤ 1"),
-        ({"forgetting": 1.5}, "forgetting=1.5"),
-        ({"estimator": "indirect"}, "the indirect estimator needs the controllers"),
-        ({"quantity": "open loop", "estimator": "direct"}, "needs the loop's feedback"),
-        ({"differenced": ("yy",)}, "differenced names 'yy', which is none of the signals in use: y, u, w"),
-        ({"spikes": ("x",)}, "spikes names 'x'"),
-        ({"noise": "quiet", "lines": Lines((5,), 100, 1000.0)}, "the lines leave 0 bins quiet"),
-        ({"hann": True, "lines": Lines((5, 6), 100, 1000.0)}, "must be 2 bins (20 Hz) apart"),
-        ({"hann": True, "noise": "quiet"}, "take the noise from periods"),
+        ({"dtype": "float16"}, "usage.not-one-of", "dtype"),
+        ({"estimator": "jiont"}, "usage.not-one-of", "estimator"),
+        ({"excitation": None}, "usage.missing", "excitation"),
+        ({"hop": 0}, "usage.out-of-range", "hop"),
+        ({"hop": 101}, "usage.out-of-range", "hop"),
+        ({"forgetting": 0.0}, "usage.out-of-range", "forgetting"),
+        ({"forgetting": 1.5}, "usage.out-of-range", "forgetting"),
+        ({"estimator": "indirect"}, "usage.missing", "estimator"),
+        ({"quantity": "open loop", "estimator": "direct"}, "usage.missing", "estimator"),
+        ({"differenced": ("yy",)}, "usage.unknown-name", "differenced"),
+        ({"spikes": ("x",)}, "usage.unknown-name", "spikes"),
+        ({"noise": "quiet", "lines": Lines((5,), 100, 1000.0)}, "grid.too-few-detection-lines", "noise"),
+        ({"hann": True, "lines": Lines((5, 6), 100, 1000.0)}, "grid.lines-too-close", "lines"),
+        ({"hann": True, "noise": "quiet"}, "usage.conflict", "noise"),
     ],
 )
-def test_settings_that_do_not_fit_are_refused(options: dict, says: str) -> None:
-    with pytest.raises(InputError) as refused:
+def test_settings_that_do_not_fit_are_refused(options: dict, code: str, argument: str) -> None:
+    with pytest.raises(LivebodeError) as caught:
         tracker(**options)
-    assert says in str(refused.value)
+    assert (caught.value.code, caught.value.argument) == (code, argument)
+    assert "\n" not in str(caught.value)
 
 
 def test_blocks_that_do_not_fit_are_refused() -> None:
     found, block = tracker(), record()
     found.process(block.cut(0, 100))
-    with pytest.raises(InputError, match="samples 50 to 99 came twice"):
+    with refused(SignalError, "repeated", first_sample=50, last_sample=99):
         found.process(block.cut(50, 200))
-    with pytest.raises(InputError, match="2000 samples per second, but the lines are for 1000"):
+    with refused(SignalError, "rate-differs", rate_hz=2000, lines_rate_hz=1000):
         tracker().process(Block(block.data, NAMES, 2000.0))
-    with pytest.raises(InputError, match="there is no channel 'u'"):
+    with pytest.raises(LivebodeError, match="there is no channel 'u'"):
         tracker().process(Block(block.data, ("w", "U2", "y"), RATE_HZ))
-    with pytest.raises(InputError, match="is empty"):
+    with refused(SignalError, "empty"):
         tracker().process(block.cut(0, 0))
 
 
 def test_an_unknown_logging_moment_is_refused() -> None:
-    with pytest.raises(InputError, match="input_logged='later' is not known"):
+    with pytest.raises(LivebodeError, match="input_logged='later'"):
         Loop(input_logged="later")

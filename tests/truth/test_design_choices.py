@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import GridError, InputError
+from livebode.core import DesignError, GridError
 from livebode.design import Bearable, Wish, belt_machine, choose
 from livebode.design.grid import grid
 from livebode.estimation.settings import default_hop
 from livebode.simulation import BeltAxis, Sensor, Strokes
+from tests.support.errors import refused
 
 MACHINE = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.05)))
 MOVING = belt_machine(BeltAxis(motion=Strokes()))
@@ -44,19 +45,19 @@ def test_more_lines_than_tell_something_are_refused_and_the_named_resolution_pas
     try:
         assert lines(resolution_hz) <= 5000
     except GridError as error:
-        told = re.search(r"finest resolution of this band is (\S+) Hz|is 20, with lines (\S+) Hz apart", str(error))
-        finest_hz = float(told.group(1) or told.group(2))
+        finest_hz = error.resolution_hz_min
         assert finest_hz > resolution_hz
-        if told.group(2):  # no register is that long; with the longest there are too many lines
+        if error.code == "grid.window-too-long":  # no register is that long; with the longest there are too many lines
             return
         assert lines(finest_hz) <= 5000
 
 
 @pytest.mark.parametrize("order", [14, 17, 20])
 def test_a_prbs_with_more_lines_than_tell_something_names_an_order_that_passes(order):
-    with pytest.raises(GridError, match="more than 5000") as caught:
+    with pytest.raises(GridError) as caught:
         grid(Wish(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
-    named = int(re.search(r"take order (\d+)", str(caught.value)).group(1))
+    assert (caught.value.code, caught.value.lines_max) == ("grid.too-many-lines", 5000)
+    named = caught.value.order_max
     assert len(grid(Wish(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
 
 
@@ -69,11 +70,11 @@ def test_listed_amplitudes_are_told_as_listed_and_refused_with_the_share_that_pa
     (row,) = [choice for choice in design.choices if choice.what == "amplitude"]
     assert row.value == "0.5 … 3 N m"
     limits = Bearable(torque_n_m_max=4.0)
-    with pytest.raises(InputError, match="the amplitudes as listed bring the torque") as caught:
+    with pytest.raises(DesignError, match="the amplitudes as listed give a torque") as caught:
         choose(Wish(**wish, amplitude_n_m=listed), MOVING, limits)
-    share = float(re.search(r"; (\S+) times them would pass", str(caught.value)).group(1))
+    share = caught.value.passing
     choose(Wish(**wish, amplitude_n_m=[share * a for a in listed]), MOVING, limits)
-    with pytest.raises(InputError):
+    with refused(DesignError, "limit-exceeded", quantity="torque"):
         choose(Wish(**wish, amplitude_n_m=[1.01 * share * a for a in listed]), MOVING, limits)
 
 
@@ -84,13 +85,13 @@ def test_listed_amplitudes_are_told_as_listed_and_refused_with_the_share_that_pa
 def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step, limit, kind):
     wish = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
     wish |= {"phases": "schroeder"} if kind == "multisine" else {}
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(DesignError) as caught:
         choose(Wish(**wish, amplitude_n_m=20.0), MACHINE, Bearable(torque_n_m_max=limit))
-    found = re.search(r"largest amplitude that passes is (\S+) N m", str(caught.value))
-    if not found:
-        assert "left in the drive's steps" in str(caught.value)
+    assert caught.value.code == "design.limit-exceeded"
+    if caught.value.passing <= 0:
+        assert "finer steps of the drive" in caught.value.remedy
         return
-    choose(Wish(**wish, amplitude_n_m=float(found.group(1))), MACHINE, Bearable(torque_n_m_max=limit))
+    choose(Wish(**wish, amplitude_n_m=caught.value.passing), MACHINE, Bearable(torque_n_m_max=limit))
 
 
 def test_the_bound_of_each_line_is_that_of_its_windows_and_the_worst_is_the_wanted_one():

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from livebode import InputError, Lines, open_log
+from livebode import Lines, open_log
+from livebode.core import LivebodeError
 from livebode.design import Waveform, choose, write
 from livebode.excitation import multisine
 from livebode.records import Run
@@ -118,7 +119,7 @@ def test_a_design_from_a_run_predicts_as_the_run_s_machine_does(tmp_path):
     outside = described(tmp_path, 'lines = "20:160:20"\nwindow = 400\namplitude_n_m = 1.0\n', measured)
     refused = livebode("design", outside, "--out", tmp_path / "outside")
     assert refused.code == 2
-    assert "measured from 20 to 140 Hz" in refused.err
+    assert "is outside 20 … 140 Hz" in refused.err
 
 
 @pytest.fixture
@@ -190,7 +191,7 @@ def test_structured_text_plays_the_period_to_the_bit_and_names_its_seed(tmp_path
         played.append(block["w"])
     assert np.array_equal(played[-80:], np.tile(waveform.samples, 2))
     assert "seed: 7" in text
-    with pytest.raises(InputError, match="belt__w"):
+    with pytest.raises(LivebodeError, match="belt__w"):
         write(tmp_path / "bad.st", waveform, "belt__w")
     assert not (tmp_path / "bad.st").exists()
 

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.design import Wish, belt_machine, choose
 from livebode.design.grid import grid
 from livebode.excitation import multisine, recognise
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
+from tests.support.errors import refused
 
 RATE_HZ = 4000.0
 
@@ -81,5 +82,5 @@ def test_the_counts_at_the_encoder_are_those_of_the_simulated_axis():
 
 @pytest.mark.parametrize("mains_hz", [[0.0], [float("nan")]])
 def test_mains_that_are_no_frequency_are_refused(mains_hz):
-    with pytest.raises(InputError, match="mains_hz"):
+    with refused(UsageError, "out-of-range", argument="mains_hz"):
         Wish(lines="20", mains_hz=mains_hz)

@@ -16,11 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from livebode.core import Block, InputError, Lines
+from livebode.core import Block, Lines, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.hum import find_hum
 from livebode.excitation import multisine, odd_lines, recognise
 from tests.command import livebode, write_parquet
+from tests.support.errors import refused
 
 RATE_HZ, N = 4000.0, 800
 ODD = odd_lines(20, 140, RATE_HZ, N, seed=1)  # 5 Hz apart: 50 and 60 Hz are even bins
@@ -116,7 +117,7 @@ def test_hum_whose_power_noise_changes_by_more_than_a_tenth_is_found() -> None:
 
 
 def test_less_than_two_seconds_is_refused() -> None:
-    with pytest.raises(InputError, match="record two seconds or more"):
+    with refused(SignalError, "too-short", seconds_min=2):
         find_hum({"y": T[:7999]}, RATE_HZ)
 
 
@@ -176,10 +177,10 @@ def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) ->
     refused = livebode("inspect", excited, *LINES, *SIGNALS, "--excitation", "w")
     assert (refused.code, "'w' pauses for 0.5 s at most" in refused.err) == (2, True)
     for missing, words in (
-        (LINES, "name --output"),
-        (("--lines", "50", "--output", "y"), "--lines and --window belong together"),
-        (("--input", "u"), "name --lines and --window too"),
-        (("--output", "y"), "name --excitation, or --lines and --window"),
+        (LINES, "give --output"),
+        (("--lines", "50", "--output", "y"), "--lines and --window need each other"),
+        (("--input", "u"), "give --lines and --window too"),
+        (("--output", "y"), "give --excitation, or --lines and --window"),
     ):
         refused = livebode("inspect", quiet, *missing)
         assert (refused.code, words in refused.err) == (2, True), refused.err

@@ -7,11 +7,9 @@ user's, 3 no model fits, 130 and above stopped from outside.
 
 from __future__ import annotations
 
-import errno
 import os
 import signal
 import sys
-import traceback
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -24,6 +22,7 @@ from livebode.cli.demo_command import demo_command
 from livebode.cli.design_command import design_command
 from livebode.cli.doctor_command import doctor_command
 from livebode.cli.export_command import export_command
+from livebode.cli.failures import disk_full, failure_of, json_wanted, name_options, unparsed
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
@@ -36,7 +35,8 @@ from livebode.cli.run_command import run_command
 from livebode.cli.terminal import protect, unchecked_output
 from livebode.cli.validate_command import validate_command
 from livebode.cli.view_command import view_command
-from livebode.core import DamageWarning, InputError
+from livebode.core import DamageWarning, LivebodeError
+from livebode.records import to_json
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -57,6 +57,25 @@ class _Command(TyperCommand):
         """As Typer does, on the terminal itself."""
         with unchecked_output():
             super().format_help(ctx, formatter)
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """As Typer does; with --json an option that cannot be used is an error with a code."""
+        try:
+            return super().make_context(info_name, args, parent, **extra)
+        except typer.Exit:
+            raise
+        except Exception as error:
+            if not json_wanted() or not hasattr(error, "format_message"):
+                raise
+            raise unparsed(error, info_name) from None
+
+    def invoke(self, ctx: Any) -> Any:
+        """As Typer does; an error names the options of this command that it is about."""
+        try:
+            return super().invoke(ctx)
+        except LivebodeError as error:
+            name_options(error, self.params)
+            raise
 
 
 app = typer.Typer(
@@ -116,20 +135,14 @@ def main() -> None:
         # Who read our output has gone; what was to be done is done.
         _discard_output()
     except Exception as error:
-        _stop(*_explained(error))
+        _fail(error)
 
 
-def _explained(error: Exception) -> tuple[str, int]:
-    """A sentence, and whose fault it is."""
-    if isinstance(error, InputError):
-        return f"livebode: {error}", 2
-    if isinstance(error, MemoryError):
-        return "livebode: there is not enough memory; take a shorter window, fewer lines or a longer hop", 2
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+def _fail(error: Exception) -> None:
+    if disk_full(error):
         _discard_output()
-        return f"livebode: the output could not be written: {error.strerror}", 2
-    traceback.print_exception(error)
-    return "livebode: this is a fault in livebode, not yours; please report it with the lines above", 1
+    failure = failure_of(error)
+    _stop(to_json({"error": failure.error}) if json_wanted() else failure.text, failure.exit_code)
 
 
 def _prepare_process() -> None:

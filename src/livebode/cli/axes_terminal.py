@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import traceback
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,8 +11,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from livebode.cli.failures import failure_of
 from livebode.cli.terminal import console
-from livebode.core import Event, InputError
+from livebode.core import Event, LivebodeError
 from livebode.session import Session, StoppedError
 from livebode.session.axis_thread import AxisThread
 
@@ -85,10 +85,10 @@ def table_of(threads: list[AxisThread]) -> Table:
 
 
 def said(error: Exception | None) -> str:
-    """A sentence, or the traceback of a fault of ours."""
-    if isinstance(error, (InputError, StoppedError)) or error is None:
+    """A sentence, or the traceback of an internal error."""
+    if isinstance(error, (LivebodeError, StoppedError)) or error is None:
         return str(error)
-    return "".join(traceback.format_exception(error)) + "this is a fault in livebode, not yours; please report it"
+    return failure_of(error).text
 
 
 def _row(thread: AxisThread) -> tuple[str, ...]:
@@ -120,5 +120,11 @@ def plain(session: Session) -> dict[str, Any]:
 
 def _plain(thread: AxisThread) -> dict[str, Any]:
     if thread.outcome is None:
-        return {"error": str(thread.error)}
+        return {"error": _error(thread.error)}
     return {"directory": str(thread.outcome.directory)} | thread.outcome.summary
+
+
+def _error(error: Exception | None) -> dict[str, Any]:
+    if isinstance(error, StoppedError) or error is None:
+        return {"code": "stopped", "place": "", "message": str(error or "stopped"), "remedy": "", "facts": {}}
+    return failure_of(error).error

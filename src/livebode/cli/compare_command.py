@@ -27,7 +27,10 @@ def compare_command(
     from livebode.session.reporting.compare_report import Comparison
 
     found = Comparison.of(before, after)
-    written = [] if out is None else write_documents(found.document(datetime.now(UTC)), out, force=force)
+    files: list[Path] = []
+    remark = ""
+    if out is not None:
+        files, remark = write_documents(found.document(datetime.now(UTC)), out, force=force)
     if as_json:
         print(to_json(found.plain()))
         return
@@ -35,5 +38,5 @@ def compare_command(
         print(finding.text)
     for table in found.tables:
         print(f"\n{table}")
-    for line in written:
+    for line in filter(None, (*files, remark)):
         print(line)

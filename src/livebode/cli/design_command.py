@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.core import InputError, counted
+from livebode.core import UsageError, counted
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -69,7 +69,13 @@ def _band(text: str) -> list[float]:
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
-        raise InputError(f"--band {text!r} cannot be read; write two frequencies in Hz as 20:140") from None
+        raise UsageError(
+            "unreadable",
+            f"the band {text!r} is not LOW:HIGH in Hz",
+            "write for example 20:140",
+            argument="band",
+            value=text,
+        ) from None
     return [low, high]
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import OutputError
 from livebode.core.document import Document
 
 _NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or print the page from a browser"
 
 
-def write_documents(document: Document, out: Path, *, force: bool) -> list[str]:
-    """Write `out` with .html and, if it can be, .pdf; each whole or not at all. What was written, line by line.
+def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:
+    """Write `out` with .html and, if it can be, .pdf; each whole or not at all. The files, and what was not possible.
 
     Raises
     ------
-    InputError
+    OutputError
         If a file is there and not to be replaced, or cannot be written.
     """
     from livebode.export import save
@@ -24,11 +24,16 @@ def write_documents(document: Document, out: Path, *, force: bool) -> list[str]:
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
     if not force and paper.exists():
-        raise InputError(f"{str(paper)!r} exists already; take another --out, or --force to replace it")
+        raise OutputError(
+            "exists",
+            f"{str(paper)!r} exists already",
+            "choose another --out, or replace it with --force",
+            path=str(paper),
+        )
     save(page, lambda partial: partial.write_text(to_html(document), encoding="utf-8"), force=force)
     try:
         from livebode.report.pdf import save_pdf
     except ImportError:
-        return [str(page), _NO_PDF]
+        return [page], _NO_PDF
     save(paper, lambda partial: save_pdf(document, partial), force=force)
-    return [str(page), str(paper)]
+    return [page, paper], ""

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from livebode.core import InputError, Responses
-from livebode.records import Run
+from livebode.cli.options import Json
+from livebode.core import Responses, UsageError
+from livebode.records import Run, to_json
 
 _IN_PYTHON = {
     "xarray": "to_xarray(Run.open(path).responses()); --to netcdf writes a file that xarray opens",
@@ -31,6 +32,7 @@ def export_command(
         bool, typer.Option("--parameters", help="The fitted parameters instead of the responses; csv or mat.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write what a run measured in a format that other programs read."""
     from livebode import export
@@ -42,7 +44,8 @@ def export_command(
     if parameters:
         table = export.ParameterTable(record.path, partial(record.tables, "parameters"))
         written = export.save(path, lambda path: export.TABLES[to](path, table), force=force)
-        print(f"{path}: {written.rows} parameter values")
+        found = {"file": str(path), "rows": written.rows}
+        print(to_json(found) if as_json else f"{path}: {written.rows} parameter values")
         return
     if at is not None:
         parts = iter([Responses.of(export.at(record.batches(), at))])
@@ -53,16 +56,35 @@ def export_command(
     else:
         parts = record.batches()
     written = export.save(path, lambda path: export.FORMATS[to](path, parts, record.summary), force=force)
+    if as_json:
+        print(to_json({"file": str(path), "rows": written.rows, "left_out": written.left_out}))
+        return
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
     print(f"{path}: {written.rows} response{'s' * (written.rows != 1)} at {len(record.lines)} lines{left_out}")
 
 
 def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tuple[str, ...]) -> None:
     if to in _IN_PYTHON:
-        raise InputError(f"{to} is no file; in Python it is {_IN_PYTHON[to]} (docs/export.md)")
+        raise UsageError(
+            "not-one-of",
+            f"{to} is not a file format",
+            f"in Python use {_IN_PYTHON[to]} (docs/export.md)",
+            argument="to",
+            value=to,
+            allowed=list(formats),
+        )
     if to not in formats:
         what = "parameters" if parameters else "responses"
-        raise InputError(f"--to {to!r} is not a format for {what}; take {', '.join(formats[:-1])} or {formats[-1]}")
+        raise UsageError(
+            "not-one-of",
+            f"{to!r} is not a format for {what}",
+            f"choose {', '.join(formats[:-1])} or {formats[-1]}",
+            argument="to",
+            value=to,
+            allowed=list(formats),
+        )
     given = [name for name, said in (("--at", at is not None), ("--mean", mean), ("--parameters", parameters)) if said]
     if len(given) > 1:
-        raise InputError(f"{given[0]} and {given[1]} do not go together; give one of them")
+        raise UsageError(
+            "conflict", f"{given[0]} and {given[1]} exclude each other", "give one of them", options=given[:2]
+        )

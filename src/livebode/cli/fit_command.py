@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.records import Run, to_json
 from livebode.session import Axis
 
@@ -70,7 +70,13 @@ def _pair(text: str) -> tuple[str, float]:
     try:
         return name.strip(), float(value)
     except ValueError:
-        raise InputError(f"--fix {text!r} is not NAME=VALUE with a number; write --fix Js=0.0028") from None
+        raise UsageError(
+            "unreadable",
+            f"{text!r} is not NAME=VALUE with a number",
+            "write for example Js=0.0028",
+            argument="fix",
+            value=text,
+        ) from None
 
 
 def _band(text: str | None) -> list[float] | None:
@@ -79,5 +85,11 @@ def _band(text: str | None) -> list[float] | None:
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:
-        raise InputError(f"--band {text!r} is not LOW:HIGH in Hz; write --band 30:120") from None
+        raise UsageError(
+            "unreadable",
+            f"the band {text!r} is not LOW:HIGH in Hz",
+            "write for example 30:120",
+            argument="band",
+            value=text,
+        ) from None
     return [low, high]

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.estimation.settings import default_hop
 from livebode.records import to_json
 
@@ -66,18 +66,33 @@ def _check(
     excitation: str | None, output: str | None, input_: str | None, lines: str | None, window: int | None
 ) -> None:
     if (lines is None) != (window is None):
-        raise InputError("--lines and --window belong together: the window says how near to a line hum disturbs it")
+        raise UsageError(
+            "missing",
+            "--lines and --window need each other: the window determines how near to a line hum disturbs it",
+            "give both",
+            options=["--lines", "--window"],
+        )
     if lines is not None:
         if output is None:
-            raise InputError(
-                "--lines is for the hum in a recording without excitation; name --output (and --input) too"
+            raise UsageError(
+                "missing",
+                "--lines finds hum in a recording without excitation, and needs a channel",
+                "give --output (and --input) too",
+                options=["--lines", "--output"],
             )
     elif input_ is not None:
-        raise InputError("--input is for the hum in a recording without excitation; name --lines and --window too")
+        raise UsageError(
+            "missing",
+            "--input is for hum in a recording without excitation, and needs lines",
+            "give --lines and --window too",
+            options=["--input", "--lines", "--window"],
+        )
     elif output is not None and excitation is None:
-        raise InputError(
-            "--output is for the signal-to-noise ratio of an excitation, or for hum without one; "
-            "name --excitation, or --lines and --window, too"
+        raise UsageError(
+            "missing",
+            "--output is for the signal-to-noise ratio of an excitation, or for hum without one",
+            "give --excitation, or --lines and --window, too",
+            options=["--output", "--excitation", "--lines"],
         )
 
 

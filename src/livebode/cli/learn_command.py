@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.core import InputError
+from livebode.core import OutputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -30,7 +30,9 @@ def learn_command(
     from livebode.session.learning import learn  # with the simulation
 
     if out.exists() and not force:
-        raise InputError(f"{str(out)!r} exists already; take another --out, or --force to replace it")
+        raise OutputError(
+            "exists", f"{str(out)!r} exists already", "choose another --out, or replace it with --force", path=str(out)
+        )
     console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
         baseline = learn(runs, say=status.update)

@@ -18,7 +18,7 @@ Time = Annotated[
         help="Time column where its name does not tell, with its unit in brackets behind it; none ignores it.",
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and an error too.")]
 Port = Annotated[
     int | None,
     typer.Option(metavar="PORT", min=0, max=65535, help="Of the dashboard; 8765 unless said, 0 for a free one."),

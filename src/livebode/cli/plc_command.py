@@ -10,7 +10,8 @@ from typing import Annotated
 
 import typer
 
-from livebode.core import InputError
+from livebode.cli.options import Json
+from livebode.core import OutputError
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
 
@@ -32,9 +33,11 @@ def plc_command(
     ring: Annotated[int, typer.Option(metavar="SAMPLES", help="Samples that the ring keeps.")] = 8192,
     twincat: Annotated[bool, typer.Option("--twincat", help="As .TcPOU and .TcDUT instead of .st.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace files that stand there.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write function blocks for the axis's PLC: excitation, sliding DFT, and the ring that livebode reads."""
     from livebode import structured_text
+    from livebode.records import to_json
     from livebode.session.axis import Axis
     from livebode.session.designed import read_designed
     from livebode.session.plc import plc_project
@@ -51,6 +54,10 @@ def plc_command(
     if twincat:
         files = dict(structured_text.twincat(text) for text in files.values())
     _write(out, files, force)
+    if as_json:
+        source = {"symbol": "MAIN.livebode", "channels": list(project.columns)}
+        print(to_json({"files": [str(out / name) for name in files], "source": source}))
+        return
     for name in files:
         print(out / name)
     columns = ", ".join(f'"{name}"' for name in project.columns)
@@ -62,7 +69,12 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
     for name in files:
         path = folder / name
         if path.is_dir() or (not force and (path.exists() or path.is_symlink())):
-            raise InputError(f"{str(path)!r} exists already; take another --out, or --force to replace it")
+            raise OutputError(
+                "exists",
+                f"{str(path)!r} exists already",
+                "choose another --out, or replace it with --force",
+                path=str(path),
+            )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".partial-", dir=folder) as partial:
@@ -72,4 +84,9 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
                 (Path(partial) / name).replace(folder / name)
     except OSError as error:
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
-        raise InputError(f"{str(folder)!r} could not be written: {why}; nothing was left there") from None
+        raise OutputError(
+            "not-written",
+            f"{str(folder)!r} could not be written: {why}; nothing was left there",
+            path=str(folder),
+            reason=why,
+        ) from None

@@ -11,7 +11,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.options import Json
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.records import Run, to_json
 
 
@@ -29,7 +29,12 @@ def query_command(
     from livebode.records.query import query  # with Arrow's data sets
 
     if as_csv and as_json:
-        raise InputError("--csv and --json are two forms of the same; take one")
+        raise UsageError(
+            "conflict",
+            "--csv and --json are two forms of the same result",
+            "give one of them",
+            options=["--csv", "--json"],
+        )
     found = query(Run.open(run), sql, rows)
     if as_json:
         plain = [[_plain(value) for value in row] for row in found.rows]

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from livebode.cli.documents import write_documents
+from livebode.cli.options import Json
 
 
 def report_command(
@@ -19,13 +20,14 @@ def report_command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Without an ending; RUN/report unless said.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report elsewhere than in RUN.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write what a run measured, how, and what it comes to: report.html and report.pdf.
 
     A report in the run's own directory is replaced. The PDF needs the extra `pdf`.
     """
     from livebode.core.clock import RunClock, moments_by
-    from livebode.records import Run
+    from livebode.records import Run, to_json
     from livebode.session.reporting.material import Judged
     from livebode.session.reporting.run_report import run_report
 
@@ -40,6 +42,9 @@ def report_command(
         judged = Judged(on.name, tuple(found), tuple(notes))
     with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)):
         document = run_report(directory, judged, made=datetime.now(UTC))
-        written = write_documents(document, out or directory / "report", force=force or out is None)
-    for line in written:
+        files, remark = write_documents(document, out or directory / "report", force=force or out is None)
+    if as_json:
+        print(to_json({"files": list(map(str, files))}))
+        return
+    for line in filter(None, (*files, remark)):
         print(line)

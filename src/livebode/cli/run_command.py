@@ -12,7 +12,7 @@ from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import AudienceOf, served
-from livebode.core import Event, InputError
+from livebode.core import ConfigError, Event, LivebodeError, UsageError
 from livebode.records import to_json
 from livebode.session import (
     Audience,
@@ -126,13 +126,16 @@ def run_command(
 
 
 def _serving(axes: Axes) -> ServeSection:
-    """What all of them say of the dashboard; InputError where they do not agree."""
+    """What all of them say of the dashboard; ConfigError where they do not agree."""
     name, first = next(iter(axes.items()))
     for other, axis in axes.items():
         if axis.serve != first.serve:
-            raise InputError(
-                f"axes {name} and {other} have another [serve], but there is one dashboard; write [serve] once, "
-                "outside [axes]"
+            raise ConfigError(
+                "key-conflict",
+                f"axes {name} and {other} have different [serve] sections, but there is one dashboard",
+                "write [serve] once, outside [axes]",
+                key="serve",
+                axes=[name, other],
             )
     return first.serve
 
@@ -140,7 +143,12 @@ def _serving(axes: Axes) -> ServeSection:
 def _axis(target: Path, said: dict[str, dict[str, Any]]) -> Axis:
     """The configuration of a recording from the options."""
     if "output" not in said.get("signals", {}):
-        raise InputError("no output is named; give --output CHANNEL (livebode inspect lists the channels)")
+        raise UsageError(
+            "missing",
+            "the output channel is not named",
+            "give --output CHANNEL (livebode inspect lists the channels)",
+            argument="output",
+        )
     return Axis.of(said | {"source": said.get("source", {}) | {"log": target}}, "the options")
 
 
@@ -150,7 +158,13 @@ def _window(text: str | None) -> int | str | None:
     try:
         return int(text)
     except ValueError:
-        raise InputError(f"--window {text!r} is neither a whole number of samples nor auto") from None
+        raise UsageError(
+            "unreadable",
+            f"the window {text!r} is neither a whole number of samples nor auto",
+            "write for example 4000, or auto",
+            argument="window",
+            value=text,
+        ) from None
 
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
@@ -200,7 +214,7 @@ def _run_axes(
             print(f"{thread.name}: {counted(thread.outcome.summary)}\n{thread.outcome.directory}/")
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
-        raise typer.Exit(2 if all(isinstance(error, (InputError, StoppedError)) for error in errors) else 1)
+        raise typer.Exit(2 if all(isinstance(error, (LivebodeError, StoppedError)) for error in errors) else 1)
 
 
 def _drawing(axis: Axis) -> Draw:

@@ -10,8 +10,10 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
+from math import ceil
 from typing import Literal
 
+from livebode.core import ServerError
 from livebode.dashboard.settings import Serving
 
 Role = Literal["operator", "viewer"]
@@ -22,10 +24,6 @@ _SESSIONS_MAX = 64
 _ADDRESSES_MAX = 1024
 _FREE_TRIES = 5
 _PAUSE_S_MAX = 300.0
-
-
-class TooManyTriesError(Exception):
-    """Wrong tokens came too often from one address; the argument is after how many seconds to try again."""
 
 
 class Access:
@@ -65,7 +63,7 @@ class Access:
 
         Raises
         ------
-        TooManyTriesError
+        ServerError
             Where this address must wait.
         """
         role = self._check(token, address)
@@ -86,7 +84,7 @@ class Access:
 
         Raises
         ------
-        TooManyTriesError
+        ServerError
             Where this address sent wrong tokens and must wait.
         """
         if self.open:
@@ -102,7 +100,9 @@ class Access:
         address = network(address)
         count, until = self._wrong.get(address, (0, 0.0))
         if (left := until - self._clock()) > 0:
-            raise TooManyTriesError(left)
+            raise ServerError(
+                "too-many-tries", "too many wrong tokens", f"try again in {ceil(left)} s", retry_after_s=ceil(left)
+            )
         given, found = _hash(token), None
         for role, known in self._hashes:  # all of them, whichever is right
             if hmac.compare_digest(given, known):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from pathlib import Path
 
@@ -14,9 +13,9 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
-from livebode.core import InputError, Responses
+from livebode.core import LivebodeError, Responses, ServerError
 from livebode.dashboard import asked
-from livebode.dashboard.access import COOKIE, SESSION_S, TooManyTriesError
+from livebode.dashboard.access import COOKIE, SESSION_S
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
 from livebode.dashboard.frames import frame
@@ -46,7 +45,7 @@ def application(board: Board, serving: Serving) -> Guard:
         WebSocketRoute("/live", pages.live),
         Route("/static/{name:path}", pages.static),
     ]
-    handlers = {InputError: _sorry, TooManyTriesError: _wait}
+    handlers = {LivebodeError: _sorry}
     return Guard(Starlette(routes=routes, exception_handlers=handlers), serving.names, serving.tls is not None)
 
 
@@ -69,7 +68,7 @@ class _Pages:
         data = await body(request)
         token = None if data is None else asked.plain(data).get("token")
         if not isinstance(token, str):
-            raise InputError("a login has a token")
+            raise ServerError("request-malformed", "the login has no token", "send an object with the text token")
         session = self._board.access.login(token, _address(request))
         if session is None:
             return JSONResponse({"error": "this token is not right"}, 401)
@@ -136,7 +135,11 @@ class _Pages:
             return JSONResponse({"error": "this session may only look"}, 403)
         data = await body(request)
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
-            raise InputError("an acknowledgement is a short object of JSON")
+            raise ServerError(
+                "request-malformed",
+                "the acknowledgement is not a short object of JSON",
+                "send one of type application/json",
+            )
         axis, event = asked.acknowledged(data, len(self._board.states))
         self._board.acknowledge(axis, event)
         return JSONResponse({}, 202)
@@ -146,7 +149,7 @@ class _Pages:
         address = socket.client.host if socket.client else ""
         try:
             role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-        except TooManyTriesError:
+        except ServerError:
             role = None
         if role is None:
             await socket.close(1008)
@@ -177,7 +180,7 @@ class _Pages:
         state = self._board.states[asked.span(request.query_params, len(self._board.states)).axis]
         state.refresh()
         if state.quantities is None:
-            raise InputError("the run has not begun; wait for its first samples")
+            raise ServerError("not-begun", "the run has not begun", "wait for its first samples")
         return state
 
 
@@ -205,11 +208,7 @@ def _unknown() -> Response:
 
 
 async def _sorry(_request: Request, error: Exception) -> Response:
-    return JSONResponse({"error": str(error)}, 400)
-
-
-async def _wait(_request: Request, error: Exception) -> Response:
-    seconds = math.ceil(float(error.args[0]))
-    return JSONResponse(
-        {"error": f"too many wrong tokens; try again in {seconds} s"}, 429, headers={"retry-after": str(seconds)}
-    )
+    pause_s = error.facts.get("retry_after_s") if isinstance(error, LivebodeError) else None
+    if pause_s is None:
+        return JSONResponse({"error": str(error)}, 400)
+    return JSONResponse({"error": str(error)}, 429, headers={"retry-after": str(pause_s)})

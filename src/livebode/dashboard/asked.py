@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from livebode.core import InputError, Quantity
+from livebode.core import Quantity, ServerError, UsageError
 from livebode.dashboard.quantities import QUANTITIES
 
 MESSAGE_BYTES_MAX = 1024
 _FORMATS = ("csv", "mat")
+_KINDS = ("watch", "pause", "resume", "freeze", "unfreeze")
 _TIME_S_MAX = 1e12
 
 
@@ -43,36 +44,55 @@ class Wish:
 
 
 def span(query: Mapping[str, str], axes: int) -> Span:
-    """From the query of a request; InputError where it cannot be.
+    """From the query of a request; LivebodeError where it cannot be.
 
     >>> span({"axis": "0", "quantity": "plant", "from": "0", "to": "2.5"}, axes=1).to_s
     2.5
     """
     from_s, to_s = _time(query.get("from", "0")), _time(query.get("to", "0"))
     if to_s < from_s:
-        raise InputError(f"from={from_s:g} is behind to={to_s:g}; swap them")
+        raise UsageError(
+            "out-of-range",
+            f"from={from_s:g} is after to={to_s:g}",
+            "swap them",
+            argument="from",
+            from_s=from_s,
+            to_s=to_s,
+        )
     format = query.get("format", "csv")
     if format not in _FORMATS:
-        raise InputError(f"format={format[:20]!r} is not known; take csv or mat")
+        raise UsageError(
+            "not-one-of",
+            f"format={format[:20]!r} is not one of csv, mat",
+            "choose one of them",
+            argument="format",
+            value=format[:20],
+            allowed=list(_FORMATS),
+        )
     rows = _whole(query.get("rows", "1200"), 1, 1 << 20, "rows")
     axis = _whole(query.get("axis", "0"), 0, axes - 1, "axis")
     return Span(axis, _quantity(query.get("quantity", "plant")), from_s, to_s, rows, format)
 
 
 def wish(text: str, axes: int) -> Wish:
-    """From a message; InputError where it cannot be.
+    """From a message; LivebodeError where it cannot be.
 
     >>> wish('{"kind": "watch", "axis": 0, "quantity": "open loop"}', axes=1).quantity
     'open loop'
     """
     if len(text) > MESSAGE_BYTES_MAX:
-        raise InputError(f"the message is longer than {MESSAGE_BYTES_MAX} bytes")
+        raise ServerError(
+            "request-malformed",
+            f"the message is longer than {MESSAGE_BYTES_MAX} bytes",
+            "send a shorter one",
+            limit_bytes=MESSAGE_BYTES_MAX,
+        )
     said = plain(text, "message")
     kind = said.get("kind")
     if kind == "watch":
         axis = said.get("axis", 0)
         if isinstance(axis, bool) or not isinstance(axis, int):
-            raise InputError("axis is no whole number")
+            raise UsageError("unreadable", "axis is not a whole number", "give the number of an axis", argument="axis")
         quantity = said.get("quantity")
         asked_for = None if quantity is None else _quantity(quantity)
         return Wish(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
@@ -82,29 +102,36 @@ def wish(text: str, axes: int) -> Wish:
         time_s = said.get("time_s")
         if time_s is not None:
             if isinstance(time_s, bool) or not isinstance(time_s, int | float):
-                raise InputError("time_s is no number")
+                raise UsageError("unreadable", "time_s is not a number", "give seconds", argument="time_s")
             time_s = _time(str(time_s)[:40])
         return Wish(kind, time_s=time_s)
-    raise InputError(f"the message's kind {str(kind)[:20]!r} is not known")
+    raise UsageError(
+        "not-one-of",
+        f"the message's kind {str(kind)[:20]!r} is not known",
+        f"choose {', '.join(_KINDS)}",
+        argument="kind",
+        value=str(kind)[:20],
+        allowed=list(_KINDS),
+    )
 
 
 def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
-    """Axis and event of an acknowledgement; InputError where it cannot be."""
+    """Axis and event of an acknowledgement; LivebodeError where it cannot be."""
     said = plain(data)
     axis, event = said.get("axis"), said.get("event")
     if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
-        raise InputError("an acknowledgement has an axis and an event")
+        raise ServerError("request-malformed", "the acknowledgement does not have an axis and an event", "send both")
     return _whole(str(axis)[:10], 0, axes - 1, "axis"), event
 
 
 def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
-    """An object of JSON; InputError where it is none."""
+    """An object of JSON; ServerError where it is not."""
     try:
         said = json.loads(data)
     except (ValueError, RecursionError):
-        raise InputError(f"the {what} is not JSON") from None
+        raise ServerError("request-malformed", f"the {what} is not JSON", "send an object of JSON") from None
     if not isinstance(said, dict):
-        raise InputError(f"the {what} is no object of JSON")
+        raise ServerError("request-malformed", f"the {what} is not an object of JSON", "send one")
     return said
 
 
@@ -112,7 +139,14 @@ def _quantity(word: object) -> Quantity:
     for known in QUANTITIES:
         if word == known:
             return known
-    raise InputError(f"quantity={str(word)[:20]!r} is not known; take {', '.join(QUANTITIES)}")
+    raise UsageError(
+        "not-one-of",
+        f"quantity={str(word)[:20]!r} is not one of the quantities",
+        f"choose {', '.join(QUANTITIES)}",
+        argument="quantity",
+        value=str(word)[:20],
+        allowed=list(QUANTITIES),
+    )
 
 
 def _time(text: str) -> float:
@@ -121,11 +155,24 @@ def _time(text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= _TIME_S_MAX:
-        raise InputError(f"{text[:40]!r} is no time in seconds")
+        raise UsageError(
+            "unreadable",
+            f"{text[:40]!r} is not a time in seconds",
+            f"give seconds up to {_TIME_S_MAX:g}",
+            value=text[:40],
+        )
     return value
 
 
 def _whole(text: str, low: int, high: int, name: str) -> int:
     if text.isascii() and text.isdigit() and len(text) <= 10 and low <= int(text) <= high:
         return int(text)
-    raise InputError(f"{name}={text[:20]!r} is no whole number from {low} to {high}")
+    raise UsageError(
+        "out-of-range",
+        f"{name}={text[:20]!r} is not a whole number from {low} to {high}",
+        f"choose one from {low} to {high}",
+        argument=name,
+        value=text[:20],
+        low=low,
+        high=high,
+    )

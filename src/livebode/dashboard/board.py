@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-from livebode.core import InputError
+from livebode.core import LivebodeError, ServerError
 from livebode.dashboard.access import Access
 from livebode.dashboard.client import Pulse
 from livebode.dashboard.notices import acknowledgement
@@ -77,9 +77,9 @@ class Board:
         return state.health() | {"browsers": len(self.places), "refused": self.access.refused}
 
     async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
-        """The result of a long job, which runs in another thread; InputError where too many wait."""
+        """The result of a long job, which runs in another thread; ServerError where too many wait."""
         if self._jobs >= _JOBS_MAX:
-            raise InputError("too much of the record is being read; try again in a moment")
+            raise ServerError("busy", "too much of the record is being read", "try again in a moment")
         self._jobs += 1
         try:
             return await asyncio.get_running_loop().run_in_executor(self._worker, job, *arguments)
@@ -87,20 +87,25 @@ class Board:
             self._jobs -= 1
 
     def acknowledge(self, axis: int, key: str) -> None:
-        """Have it recorded that a person has seen an event, and all of the same cause before; InputError if not."""
+        """Have it recorded that a person has seen an event, and all of the same cause before; ServerError if not."""
         state = self.states[axis]
         found = state.notices.of(key)
         if found is None:
-            raise InputError("there is no such event")
+            raise ServerError("event-unknown", f"there is no event {key!r}", "reload the page", event=key)
         if state.hub is None or state.finished:
-            raise InputError("the run has ended, and its record is closed; events can be acknowledged while it goes on")
+            raise ServerError(
+                "run-ended",
+                "the run has ended, and its record is closed",
+                "acknowledge events while a run continues",
+                event=key,
+            )
         notice, count = found
         if notice.seen >= count:
             return
         newest = state.newest
         sample, time_s = (int(newest.sample[0]), float(newest.time_s[0])) if newest is not None else (0, 0.0)
         if not state.hub.say(acknowledgement(notice, key, count, sample, time_s)):
-            raise InputError("too many acknowledgements wait to be recorded; try again in a moment")
+            raise ServerError("busy", "too many acknowledgements wait to be recorded", "try again in a moment")
 
     def close(self) -> None:
         """Let the reading thread go."""
@@ -116,7 +121,7 @@ class Board:
                 continue
             try:
                 items, rows, summary, finished = await self.elsewhere(viewed.more)
-            except InputError:
+            except LivebodeError:
                 continue  # it is just being closed; the next look reads it
             state.take(items)
             for row in rows:

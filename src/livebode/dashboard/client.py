@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from livebode.core import InputError, Responses
+from livebode.core import LivebodeError, Responses, ServerError
 from livebode.dashboard.asked import Wish, wish
 from livebode.dashboard.frames import frame
 from livebode.dashboard.past import Past
@@ -81,16 +81,16 @@ class Client:
                 return
             try:
                 if text is None:
-                    raise InputError("a message is text, not bytes")
+                    raise ServerError("request-malformed", "a message is text, not bytes", "send text")
                 await self._heed(wish(text, len(self._board.states)))
-            except (InputError, KeyError) as error:
+            except (LivebodeError, KeyError) as error:
                 await self._tell({"error": str(error)})
 
     async def _heed(self, asked: Wish) -> None:
         if asked.kind == "watch":
             state = self._board.states[asked.axis]
-            if asked.quantity and state.quantities is not None and (why := state.quantities.why_not(asked.quantity)):
-                raise InputError(why)
+            if asked.quantity and state.quantities is not None:
+                state.quantities.check(asked.quantity)
             if asked.axis != self._watched.axis:
                 self._reference = None
             self._watched, self._anew = asked, True

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
-from livebode.core import InputError
+from livebode.core import ExtraError, ServerError
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
 from livebode.dashboard.settings import Serving
@@ -39,8 +39,10 @@ class Dashboard:
 
     Raises
     ------
-    InputError
-        On entering, where the address cannot be listened on or the packages of the extra `dashboard` are missing.
+    ServerError
+        On entering, where the address cannot be listened on.
+    ExtraError
+        On entering, where the packages of the extra `dashboard` are missing.
     """
 
     def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
@@ -64,7 +66,7 @@ class Dashboard:
         return hub
 
     def view(self, directory: Path) -> None:
-        """Show a run that was recorded, or that another process records; InputError where it cannot be read."""
+        """Show a run that was recorded, or that another process records; LivebodeError where it cannot be read."""
         state, viewed = State(directory.resolve().name, len(self._states)), Viewed(directory)
         viewed.fill(state)
         self._viewed[len(self._states)] = viewed
@@ -92,8 +94,12 @@ class Dashboard:
             from livebode.dashboard.patience import IDLE_S, PatientProtocol
             from livebode.dashboard.server import Server
         except ImportError as error:
-            raise InputError(
-                f"the dashboard needs {error.name}, which is not installed; pip install 'livebode[dashboard]'"
+            raise ExtraError(
+                "not-installed",
+                f"the dashboard needs {error.name}, which is not installed",
+                "pip install 'livebode[dashboard]'",
+                extra="dashboard",
+                package=error.name,
             ) from None
         self._socket = listening(self._serving)
         tls = self._serving.tls or (None, None)
@@ -126,7 +132,12 @@ class Dashboard:
         until = time.monotonic() + _START_S
         while not self._server.started:
             if not self._thread.is_alive() or time.monotonic() > until:
-                raise InputError(f"the dashboard did not start at {self.url}")
+                raise ServerError(
+                    "not-started",
+                    f"the dashboard did not start at {self.url}",
+                    "look for the reason in the lines above, and try another port",
+                    url=self.url,
+                )
             time.sleep(0.005)
         _logger.info("listening at %s", self.url)
         return self
@@ -187,8 +198,19 @@ def listening(serving: Serving) -> socket.socket:
     except OSError as error:
         found.close()
         if error.errno == errno.EADDRINUSE:
-            raise InputError(
-                f"port {serving.port} is taken; give another with --port, or --port 0 for a free one"
+            raise ServerError(
+                "port-taken",
+                f"port {serving.port} is taken",
+                "choose another port, or 0 for a free one",
+                argument="port",
+                port=serving.port,
             ) from None
-        raise InputError(f"{serving.address} port {serving.port} cannot be listened on: {error.strerror}") from None
+        raise ServerError(
+            "cannot-listen",
+            f"{serving.address} port {serving.port} cannot be listened on: {error.strerror}",
+            "choose an address of this computer and a port that you may use",
+            argument="port",
+            address=serving.address,
+            port=serving.port,
+        ) from None
     return found

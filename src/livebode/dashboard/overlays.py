@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines, Quantity, Responses
+from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
 from livebode.fitting import Grid, PhysicalModel
@@ -90,7 +90,7 @@ class Healthy:
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
-        """As the configuration names it; None where it names none. InputError where the file cannot be read."""
+        """As the configuration names it; None where it names none. LivebodeError where the file cannot be read."""
         path = said(dict(summary)).get("monitoring", {}).get("baseline")
         if path is None:
             return None
@@ -140,10 +140,10 @@ def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[Fit
     healthy: Healthy | None = None
     try:
         fitted = Fitted.of(summary, quantities)
-    except (InputError, ValueError) as error:
+    except ValueError as error:
         remarks.append(f"the fitted model cannot be drawn: {error}")
     try:
         healthy = Healthy.of(summary)
-    except InputError as error:
+    except LivebodeError as error:
         remarks.append(f"the baseline cannot be drawn: {error}")
     return fitted, healthy, "; ".join(remarks)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import InputError, Responses
+from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
 from livebode.records import Run
 from livebode.session.overview import Overview
@@ -59,9 +59,9 @@ class Past:
         )
 
     def between(self, from_s: float, to_s: float, rows: int) -> Responses:
-        """Every n-th response of a span, at most `rows`; InputError before the first response."""
+        """Every n-th response of a span, at most `rows`; ServerError before the first response."""
         if self.overview is None:
-            raise InputError("there is no response yet; wait for the first window")
+            raise ServerError("not-begun", "there is no response yet", "wait for the first window")
         rows = max(1, min(rows, ROWS_MAX))
         within = self.overview.between(from_s, to_s)
         if (to_s - from_s) >= _WHOLE * (self.last_s - self.first_s):
@@ -82,7 +82,7 @@ class Past:
         if self.readable:
             yield from Run.open(self.directory).between(from_s, to_s)
         elif self.recent is None or self.overview is None:
-            raise InputError("there is no response yet; wait for the first window")
+            raise ServerError("not-begun", "there is no response yet", "wait for the first window")
         else:
             yield (self.recent if from_s >= self.recent.time_s[0] else self.overview).between(from_s, to_s)
 
@@ -94,7 +94,7 @@ class Past:
             found += Run.open(self.directory).between(time_s - reach_s, time_s + reach_s)
         best = _nearest(found, time_s)
         if best is None:
-            raise InputError("no response has a valid line yet; wait for the first window")
+            raise ServerError("not-begun", "no response has a valid line yet", "wait for the first window")
         return best
 
 

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines, Loop, Quantity, Responses
+from livebode.core import Lines, Loop, Quantity, Responses, ServerError
 from livebode.estimation.quantities import convert
 from livebode.records.run import lines_in
 from livebode.session.axis import LoopSection
@@ -19,7 +19,7 @@ from livebode.session.said import said
 Complex = NDArray[np.complex128]
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-_UNKNOWN = "the run does not say what feeds back: describe its controllers under [loop]"
+_UNKNOWN, _REMEDY = "the run does not say what feeds back", "describe its controllers under [loop]"
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,19 @@ class Quantities:
         lines = lines_in(found)
         try:
             loop = LoopSection.model_validate(said(dict(summary)).get("loop", {})).build(lines.rate_hz)
-        except (InputError, ValueError):  # pydantic's errors are ValueErrors
+        except ValueError:  # ours, or pydantic's
             loop = None
         return cls(found["quantity"], found["unit"], lines, loop)
 
     def why_not(self, quantity: Quantity) -> str:
         """Why the page cannot show it; empty where it can."""
-        return "" if quantity == self.own or (self.loop is not None and self.loop.feedback is not None) else _UNKNOWN
+        shown = quantity == self.own or (self.loop is not None and self.loop.feedback is not None)
+        return "" if shown else f"{_UNKNOWN}; {_REMEDY}"
+
+    def check(self, quantity: Quantity) -> None:
+        """ServerError where the page cannot show it."""
+        if self.why_not(quantity):
+            raise ServerError("quantity-unavailable", _UNKNOWN, _REMEDY, quantity=quantity)
 
     def unit_of(self, quantity: Quantity) -> str:
         """Of the quantity; without one where it has none or nobody says it."""
@@ -68,11 +74,10 @@ class Quantities:
         return responses.quantity == self.own and np.array_equal(at_hz, self.lines.frequency_hz)
 
     def of_responses(self, responses: Responses, quantity: Quantity) -> Responses:
-        """The same responses as another quantity; sigma to first order. InputError where it cannot be."""
+        """The same responses as another quantity; sigma to first order. ServerError where it cannot be."""
         if quantity == responses.quantity:
             return responses
-        if why := self.why_not(quantity):
-            raise InputError(why)
+        self.check(quantity)
         value, slope = self.converted(responses.value, quantity, self._feedback)
         return replace(
             responses,

@@ -10,7 +10,7 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import ConfigError
 from livebode.session.axis import ServeSection
 from livebode.sources.live.secret import secret
 
@@ -50,25 +50,37 @@ class Serving:
 
         Raises
         ------
-        InputError
+        ConfigError
             Where a secret or file is missing, a token is short, or another address than the loopback is to be served
             without token and TLS.
         """
         token = _token("token", section.token_env, section.token_file)
         viewer = _token("viewer_token", section.viewer_token_env, section.viewer_token_file)
         if viewer is not None and viewer == token:
-            raise InputError("serve.token and serve.viewer_token are the same; a viewer would be an operator")
+            raise ConfigError(
+                "tokens-equal",
+                "serve.token and serve.viewer_token are the same, which would make a viewer an operator",
+                "make another token for viewers",
+                key="serve.viewer_token",
+            )
         tls = _tls(section)
         if not _loopback(section.address):
             if token is None and viewer is None:
-                raise InputError(
-                    f"serve.address = {section.address!r} is open to others, which needs a token; make one with "
-                    f"`{_MAKE}`, put it in a file or the environment, and name that as serve.token_file or token_env"
+                raise ConfigError(
+                    "open-without-token",
+                    f"serve.address = {section.address!r} is open to others, which needs a token",
+                    f"make one with `{_MAKE}`, put it in a file or the environment, and name "
+                    "that as serve.token_file or token_env",
+                    key="serve.address",
+                    value=section.address,
                 )
             if tls is None:
-                raise InputError(
-                    f"serve.address = {section.address!r} is open to others, which needs TLS; give "
-                    "serve.certificate_file and serve.key_file"
+                raise ConfigError(
+                    "open-without-tls",
+                    f"serve.address = {section.address!r} is open to others, which needs TLS",
+                    "give serve.certificate_file and serve.key_file",
+                    key="serve.address",
+                    value=section.address,
                 )
         return cls(section.address, section.port, tuple(section.names), token, viewer, tls, section.read_only)
 
@@ -79,7 +91,13 @@ def _loopback(address: str) -> bool:
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
-        raise InputError(f"serve.address = {address!r} is no IP address; 127.0.0.1 is this computer alone") from None
+        raise ConfigError(
+            "value-invalid",
+            f"serve.address = {address!r} is not an IP address",
+            "write for example 127.0.0.1, which is this computer alone",
+            key="serve.address",
+            value=address,
+        ) from None
 
 
 def _token(key: str, variable: str | None, path: Path | None) -> str | None:
@@ -89,19 +107,27 @@ def _token(key: str, variable: str | None, path: Path | None) -> str | None:
     if token is None:
         return None
     if len(token) < TOKEN_LETTERS_MIN or not token.isascii() or not token.isprintable() or " " in token:
-        raise InputError(
-            f"serve.{key} is no token of at least {TOKEN_LETTERS_MIN} letters and digits; make one with `{_MAKE}`"
+        raise ConfigError(
+            "token-weak",
+            f"serve.{key} is not a token of at least {TOKEN_LETTERS_MIN} letters and digits",
+            f"make one with `{_MAKE}`",
+            key=f"serve.{key}",
+            letters_min=TOKEN_LETTERS_MIN,
         )
     return token
 
 
 def _check_rights(key: str, path: Path) -> None:
-    """InputError where other users may read or change the file. Its group may read it: so services share secrets."""
+    """ConfigError where other users may read or change the file. Its group may read it: so services share secrets."""
     mode = stat.S_IMODE(path.stat().st_mode)
     if os.name == "posix" and mode & (stat.S_IROTH | stat.S_IWOTH | stat.S_IWGRP):
-        raise InputError(
-            f"serve.{key}_file = {str(path)!r} can be read or changed by other users (mode {mode:04o}); "
-            f"run `chmod 600 {shlex.quote(str(path))}`, and make another token if others may have read it"
+        raise ConfigError(
+            "file-open-to-others",
+            f"serve.{key}_file = {str(path)!r} can be read or changed by other users (mode {mode:04o})",
+            f"run `chmod 600 {shlex.quote(str(path))}`, and make another token if others may have read it",
+            key=f"serve.{key}_file",
+            path=str(path),
+            mode=mode,
         )
 
 
@@ -110,12 +136,29 @@ def _tls(section: ServeSection) -> tuple[Path, Path] | None:
     if certificate is None and key is None:
         return None
     if certificate is None or key is None:
-        raise InputError("serve.certificate_file and serve.key_file go together; give both or none")
+        raise ConfigError(
+            "key-missing",
+            "serve.certificate_file and serve.key_file need each other",
+            "give both or none",
+            key="serve.certificate_file",
+        )
     for path, name in ((certificate, "certificate_file"), (key, "key_file")):
         if not path.is_file():
-            raise InputError(f"there is no file {path} for serve.{name}; check the name")
+            raise ConfigError(
+                "file-unreadable",
+                f"there is no file {path} for serve.{name}",
+                "check the name",
+                key=f"serve.{name}",
+                path=str(path),
+            )
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
     except (ssl.SSLError, OSError, ValueError) as error:
-        raise InputError(f"{certificate} and {key} are no certificate and its key in PEM: {error}") from None
+        raise ConfigError(
+            "file-unusable",
+            f"{certificate} and {key} are not a certificate and its key in PEM: {error}",
+            "convert them, and remove the password of the key",
+            key="serve.certificate_file",
+            path=str(certificate),
+        ) from None
     return certificate, key

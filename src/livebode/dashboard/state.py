@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Event, InputError, Quantity, Responses
+from livebode.core import Event, LivebodeError, Quantity, Responses
 from livebode.core.clock import RunClock
 from livebode.dashboard.frames import curve, frame
 from livebode.dashboard.hub import Hub, Item
@@ -113,7 +113,7 @@ class State:
         """The events of a run that is gone on with."""
         if "record" not in self._summary or self.directory is None:
             return
-        with suppress(InputError):  # it has just begun
+        with suppress(LivebodeError):  # it has just begun
             self.take(list(Run.open(self.directory).events()))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:

@@ -8,7 +8,7 @@ from math import ceil, inf, log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.design.machine import Machine
 from livebode.design.waveform import Waveform
 
@@ -36,7 +36,13 @@ class Accuracy:
     def windows(self, accuracy: float) -> int:
         """Windows to average until every line's 95 % bound is within `accuracy` times |G|; at least 1."""
         if not (np.isfinite(accuracy) and accuracy > 0):
-            raise InputError(f"{accuracy=} is not a share above 0; 0.05 asks for 5 % of |G|")
+            raise UsageError(
+                "out-of-range",
+                f"{accuracy=} is not a number above 0",
+                "give it as a fraction of |G|, such as 0.05 for 5 %",
+                argument="accuracy",
+                value=accuracy,
+            )
         return max(1, ceil((HOLDING_95 * float(self.relative.max()) / accuracy) ** 2 - 1e-9))
 
     def reached(self, windows: int) -> Floats:

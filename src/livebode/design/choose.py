@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import InputError, rounded_down
+from livebode.core import DesignError, rounded_down
 from livebode.design.accuracy import Accuracy, Floats, accuracy_of
 from livebode.design.encoder import encoder_counts
 from livebode.design.explain import Choice, explained
@@ -110,7 +110,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
 
     Raises
     ------
-    InputError
+    LivebodeError
         If a limit would be broken (with the largest amplitude that passes), the grid has no such lines, a crest factor
         is not reached, or nothing is left of the excitation in the drive's steps.
     """
@@ -125,7 +125,7 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     share, first = room(predicted, limits)
     if share < 1 and first is not None:
         passing = _passing(wish, unit, factor, share, machine, limits)
-        raise InputError(beyond(first, limits, share, None if wish.listed else factor, passing))
+        raise beyond(first, limits, share, None if wish.listed else factor, passing)
     accuracy = accuracy_of(waveform, machine)
     windows = accuracy.windows(wish.accuracy)
     ramp_s = ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz
@@ -157,9 +157,13 @@ def _played(wish: Wish, unit: Waveform, factor: float) -> Waveform:
         return waveform
     waveform = waveform.quantised(wish.resolution_n_m)
     if wish.crest_factor_max is not None and waveform.crest_factor > wish.crest_factor_max * (1 + REACHED):
-        raise InputError(
-            f"rounding to steps of {wish.resolution_n_m:g} N m makes a crest factor of {waveform.crest_factor:.4f}, "
-            f"above {wish.crest_factor_max:g}; ask for {waveform.crest_factor + 5e-4:.3f}, or take finer steps"
+        raise DesignError(
+            "crest-factor-not-reached",
+            f"rounding to steps of {wish.resolution_n_m:g} N m gives a crest factor "
+            f"of {waveform.crest_factor:.4f}, above {wish.crest_factor_max:g}",
+            f"allow {waveform.crest_factor + 5e-4:.3f}, or take finer steps",
+            crest_factor=waveform.crest_factor,
+            crest_factor_max=wish.crest_factor_max,
         )
     return waveform
 
@@ -176,7 +180,7 @@ def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: M
         factor = rounded_down(factor * min(share, 1 - 1e-3))
         try:
             share, _ = room(peaks(_played(wish, unit, factor), machine), limits)
-        except InputError:  # too small for the steps
+        except DesignError:  # too small for the steps
             break
         if share >= 1:
             return factor
@@ -191,12 +195,17 @@ def _factor(
         return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
     largest, first = room(of_unit, limits)
     if first is not None and largest <= 0:
-        raise InputError(beyond(first, limits, largest, None, 0.0))
+        raise beyond(first, limits, largest, None, 0.0)
     needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
     allowed = largest * (1 - _RESERVE)
     if needed == 0:
         if largest == inf:
-            raise InputError("neither noise nor limits are known, so no amplitude can be chosen; give one of the three")
+            raise DesignError(
+                "amplitude-undetermined",
+                "neither noise nor limits are known, so no amplitude can be chosen",
+                "give the amplitude, the noise, or a limit",
+                argument="amplitude_n_m",
+            )
         return largest * _WITHOUT_NOISE, "a tenth of what the limits leave; nothing says how much noise there is"
     if needed <= allowed:
         rounded = "" if wish.resolution_n_m is None else ", before rounding"

@@ -51,16 +51,28 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
     """
     found = _found(wish, rate_hz)
     if len(found.lines) > _LINES_MAX:
-        f, many = found.lines.frequency_hz, len(found.lines)
-        if wish.order is not None:
-            fewer = f"take order {wish.order - ceil(log2(many / _LINES_MAX))}"
-        else:  # the period of a PRBS is rounded up to a power of two
-            finest_hz = (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)
-            fewer = f"the finest resolution of this band is {ceil(1000 * finest_hz) / 1000:g} Hz"
-        raise GridError(
-            f"{many} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}; {fewer}, or narrow the band"
-        )
+        raise _too_many(wish, found.lines)
     return found
+
+
+def _too_many(wish: Wish, lines: Lines) -> GridError:
+    """With the order, or the resolution, that leaves few enough."""
+    f, many = lines.frequency_hz, len(lines)
+    facts: dict[str, float] = {}
+    if wish.order is not None:
+        order = wish.order - ceil(log2(many / _LINES_MAX))
+        facts["order_max"], fewer = order, f"take order {order}"
+    else:  # the period of a PRBS is rounded up to a power of two
+        finest_hz = ceil(1000 * (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)) / 1000
+        facts["resolution_hz_min"], fewer = finest_hz, f"take lines {finest_hz:g} Hz or more apart"
+    return GridError(
+        "too-many-lines",
+        f"{many} lines from {f[0]:g} to {f[-1]:g} Hz are more than {_LINES_MAX}",
+        f"{fewer}, or narrow the band",
+        lines=many,
+        lines_max=_LINES_MAX,
+        **facts,
+    )
 
 
 def _found(wish: Wish, rate_hz: float) -> Grid:
@@ -81,7 +93,7 @@ def _found(wish: Wish, rate_hz: float) -> Grid:
         first, last = ceil(low * window / rate_hz - 1e-9), floor(high * window / rate_hz + 1e-9)
         bins = [k for k in range(max(first, 1), last + 1) if 2 * k < window]
         if not bins:
-            raise GridError(_no_line(low, high, 1, window, rate_hz))
+            raise _no_line(low, high, 1, window, rate_hz)
         bins, mains = _without_mains(wish, bins, rate_hz / window)
         return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
     return _odd(wish, low, high, window, rate_hz, why)
@@ -91,7 +103,7 @@ def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: 
     """Odd bins: with every second one only even the excitation would repeat after half the window."""
     all_odd = odd_bins(low, high, rate_hz, window).tolist()
     if not all_odd:
-        raise GridError(_no_line(low, high, _QUIET_BETWEEN, window, rate_hz))
+        raise _no_line(low, high, _QUIET_BETWEEN, window, rate_hz)
     bins, mains = _without_mains(wish, all_odd, rate_hz / window)
     if wish.kind == "odd" and len(bins) >= _GROUP:
         lines = odd_lines(low, high, rate_hz, window, group=_GROUP, seed=wish.seed, without=mains)
@@ -110,15 +122,23 @@ def _without_mains(wish: Wish, bins: list[int], resolution_hz: float) -> tuple[l
     return (left, tuple(k for k, near in zip(bins, met) if near)) if 2 * len(left) >= len(bins) else (bins, ())
 
 
-def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -> str:
+def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -> GridError:
     """Why the band holds none of these lines (every bin, or the odd ones), and what would."""
     bin_hz, odd = rate_hz / window, apart - 1
     below = apart * floor((low / bin_hz - odd) / apart) + odd
     near = [k * bin_hz for k in (below, below + apart) if 0 < 2 * k < window]
-    told = f"; the nearest are {' and '.join(f'{f:g}' for f in near)} Hz" if near else ""
+    nearest = f" (the nearest are {' and '.join(f'{f:g}' for f in near)} Hz)" if near else ""
     finer = f", or take a window of {ceil(apart * rate_hz / (high - low))} samples" if high > low else ""
     which = "odd line" if odd else "line"
-    return f"no {which} of the {bin_hz:g} Hz grid lies in {low:g} … {high:g} Hz{told}; widen the band{finer}"
+    return GridError(
+        "band-without-line",
+        f"no {which} of the {bin_hz:g} Hz grid is in {low:g} … {high:g} Hz{nearest}",
+        f"widen the band{finer}",
+        argument="band_hz",
+        low_hz=low,
+        high_hz=high,
+        nearest_hz=near,
+    )
 
 
 def _stepped(wish: Wish, found: Grid) -> Grid:
@@ -135,13 +155,22 @@ def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]
     asked = apart * rate_hz / resolution_hz
     if asked > WINDOW_MAX:
         raise GridError(
-            f"lines {resolution_hz:g} Hz apart need a window of {asked:.0f} samples, more than {WINDOW_MAX}; the "
-            f"finest at {rate_hz:g} Hz is {apart * rate_hz / WINDOW_MAX:.3g} Hz"
+            "window-too-long",
+            f"lines {resolution_hz:g} Hz apart need a window of {asked:.0f} samples, more than {WINDOW_MAX}",
+            f"take {apart * rate_hz / WINDOW_MAX:.3g} Hz or more at {rate_hz:g} Hz",
+            argument="resolution_hz",
+            resolution_hz=resolution_hz,
+            resolution_hz_min=apart * rate_hz / WINDOW_MAX,
+            window_max=WINDOW_MAX,
         )
     if asked < 2 * apart + 1 - 1e-9:
         raise GridError(
-            f"lines {resolution_hz:g} Hz apart do not fit below the Nyquist frequency {rate_hz / 2:g} Hz; "
-            f"the coarsest is {apart * rate_hz / (2 * apart + 1):.4g} Hz"
+            "above-nyquist",
+            f"lines {resolution_hz:g} Hz apart do not fit below the Nyquist frequency {rate_hz / 2:g} Hz",
+            f"take {apart * rate_hz / (2 * apart + 1):.4g} Hz or less",
+            argument="resolution_hz",
+            resolution_hz=resolution_hz,
+            resolution_hz_max=apart * rate_hz / (2 * apart + 1),
         )
     shortest = ceil(asked * (1 - 1e-9))
     why = f"{apart} × {rate_hz:g} Hz / {resolution_hz:g} Hz"
@@ -156,7 +185,13 @@ def _of_text(wish: Wish, text: str, rate_hz: float) -> Grid:
     if wish.window is not None:
         return Grid(Lines.parse(text, rate_hz, wish.window), "as given", "as given")
     if "k=" in text:
-        raise GridError(f"lines {text!r} count in bins, which need a window; give window")
+        raise GridError(
+            "window-missing",
+            f"lines {text!r} count in bins, which need a window",
+            "give the window",
+            argument="window",
+            lines=text,
+        )
     wanted = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
     return Grid(wanted, "the shortest on whose grid the lines are, two bins apart or more", "as given")
 
@@ -192,14 +227,24 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
         if order > ORDER_MAX:
             finest = rate_hz / held / (2**ORDER_MAX - 1)
             raise GridError(
-                f"lines {wish.resolution_hz:g} Hz apart need a PRBS of order {order}; "
-                f"the highest is {ORDER_MAX}, with lines {finest:.3g} Hz apart"
+                "window-too-long",
+                f"lines {wish.resolution_hz:g} Hz apart need a PRBS of order {order}, above {ORDER_MAX}",
+                f"take {finest:.3g} Hz or more",
+                argument="resolution_hz",
+                resolution_hz=wish.resolution_hz,
+                order=order,
+                order_max=ORDER_MAX,
+                resolution_hz_min=finest,
             )
     window = (2**order - 1) * held
     if window > WINDOW_MAX:
         raise GridError(
-            f"2^{order} - 1 bits of {counted(held, 'tick')} are {window} samples, more than {WINDOW_MAX}; take a lower "
-            "order or fewer ticks"
+            "window-too-long",
+            f"2^{order} - 1 bits of {counted(held, 'tick')} are {window} samples, more than {WINDOW_MAX}",
+            "take a lower order or fewer ticks",
+            window=window,
+            window_max=WINDOW_MAX,
+            order=order,
         )
     first, last = max(1, ceil(low * window / rate_hz - 1e-9)), floor(high * window / rate_hz + 1e-9)
     bins = [k for k in range(first, last + 1) if 2 * k < window and k % (window // gcd(held, window)) != 0]
@@ -207,8 +252,13 @@ def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
         near = max(ceil(log2(rate_hz / held / (high - low) + 1)) if high > low else ORDER_MAX + 1, order + 1)
         fits = near <= ORDER_MAX and (2**near - 1) * held <= WINDOW_MAX
         raise GridError(
-            f"a PRBS of order {order} with {counted(held, 'tick')} a bit has no line in {low:g} … {high:g} Hz; "
-            f"{f'take order {near}' if fits else 'widen the band'}"
+            "band-without-line",
+            f"a PRBS of order {order} with {counted(held, 'tick')} a bit has no line in {low:g} … {high:g} Hz",
+            f"take order {near}" if fits else "widen the band",
+            argument="band_hz",
+            low_hz=low,
+            high_hz=high,
+            order=order,
         )
     why = f"2^{order} − 1 bits of {counted(held, 'tick')}"
     return Grid(Lines.of_bins(bins, window, rate_hz), why, "every bin of the band", order=order, held_ticks=held)

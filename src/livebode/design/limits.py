@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan
 
-from livebode.core import InputError
+from livebode.core import DesignError, UsageError
 from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 from livebode.design.peaks import Peak
 
@@ -23,7 +23,7 @@ class Bearable:
 
     Raises
     ------
-    InputError
+    UsageError
         If a limit is not above 0, or the travel has no room.
     """
 
@@ -36,10 +36,21 @@ class Bearable:
     def __post_init__(self) -> None:
         for name in ("torque_n_m_max", "speed_m_per_s_max", "following_error_m_max"):
             if isnan(value := getattr(self, name)) or value <= 0:
-                raise InputError(f"{name}={value} is not above 0; leave it out for no limit")
+                raise UsageError(
+                    "out-of-range",
+                    f"{name}={value} is not above 0",
+                    "leave it out for no limit",
+                    argument=name,
+                    value=value,
+                )
         if not self.position_m_min < self.position_m_max:
-            raise InputError(
-                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; correct one"
+            raise UsageError(
+                "out-of-range",
+                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}",
+                "correct one of them",
+                argument="position_m_min",
+                value=self.position_m_min,
+                position_m_max=self.position_m_max,
             )
 
     def of(self, quantity: Quantity) -> tuple[float, float]:
@@ -60,12 +71,15 @@ class Bearable:
 
 
 def check_known(machine: Machine, limits: Bearable) -> None:
-    """InputError where a quantity is limited of which nobody says what the motion alone does with it."""
+    """DesignError where a quantity is limited of which nobody says what the motion alone does with it."""
     for name in QUANTITIES:
         if limits.limited(name) and not all(name in place.motion for place in machine.places):
-            raise InputError(
-                f"the {name} is limited, but its lowest and highest value in the motion alone are not given; give them "
-                f"(in a file measured.{MOTION_KEYS[name]}), or leave out the limit"
+            raise DesignError(
+                "motion-unknown",
+                f"the {name} is limited, but its lowest and highest value in the motion alone are not given",
+                f"give them (in a file measured.{MOTION_KEYS[name]}), or leave out the limit",
+                quantity=name,
+                key=f"measured.{MOTION_KEYS[name]}",
             )
 
 
@@ -87,11 +101,11 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     return largest, first
 
 
-def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, passing: float) -> str:
-    """Why a peak that leaves only this share of the excitation is refused, and what would pass.
+def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, passing: float) -> DesignError:
+    """Why a peak that leaves only this share of the excitation is rejected, and what would pass.
 
-    That is `passing`, an amplitude that is borne, 0 where none is. Without an amplitude the lines have one each, and it
-    is what to multiply them by.
+    That is `passing`, an amplitude within the limits, 0 where there is none. Without an amplitude the lines have one
+    each, and it is what to multiply them by.
     """
     low, high = limits.of(peak.quantity)
     unit, name = UNITS[peak.quantity], peak.quantity
@@ -99,15 +113,28 @@ def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, 
     value, limit, added = (peak.high, high, peak.excited[1]) if above else (peak.low, low, peak.excited[0])
     where = f" ({peak.place})" if peak.place else ""
     if share <= 0:
-        return (
-            f"the motion alone has a {name} of {value - added:.4g} {unit}{where} and leaves no room to the limit of "
-            f"{limit:.4g} {unit}; change the motion, or correct the limit"
+        return DesignError(
+            "no-room-in-motion",
+            f"the motion alone has a {name} of {value - added:.4g} {unit}{where}, which leaves no room to the limit of "
+            f"{limit:.4g} {unit}",
+            "change the motion, or correct the limit",
+            quantity=name,
+            value=value - added,
+            limit=limit,
         )
     if amplitude is None:
-        what, passes = "the amplitudes as listed bring", f"{passing:.4g} times them would pass"
+        what, remedy = "the amplitudes as listed give", f"multiply them by {passing:.4g} or less"
     else:
-        what = f"an amplitude of {amplitude:.4g} N m brings"
-        passes = f"the largest amplitude that passes is {passing:.4g} N m"
+        what, remedy = f"an amplitude of {amplitude:.4g} N m gives", f"take at most {passing:.4g} N m"
     if passing <= 0:
-        passes = "no smaller one is left in the drive's steps; take finer ones"
-    return f"{what} the {name} to {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}; {passes}"
+        remedy = "take finer steps of the drive: no smaller amplitude is left in these"
+    return DesignError(
+        "limit-exceeded",
+        f"{what} a {name} of {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}",
+        remedy,
+        argument="amplitude_n_m",
+        quantity=name,
+        value=value,
+        limit=limit,
+        passing=passing,
+    )

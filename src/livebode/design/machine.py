@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Loop, Model
+from livebode.core import Loop, Model, UsageError
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,10 +39,14 @@ def within(frequency_hz: ArrayLike, band_hz: tuple[float, float]) -> NDArray[np.
 
 
 def check_noise(noise: float) -> None:
-    """InputError where no output has noise of this standard deviation."""
+    """UsageError where no output has noise of this standard deviation."""
     if not (noise == 0 or _NOISE_MIN <= noise <= _NOISE_MAX):
-        raise InputError(
-            f"noise={noise} is not 0 or from {_NOISE_MIN:g} to {_NOISE_MAX:g}; give its standard deviation"
+        raise UsageError(
+            "out-of-range",
+            f"noise={noise} is not 0 or from {_NOISE_MIN:g} to {_NOISE_MAX:g}",
+            "give its standard deviation",
+            argument="noise",
+            value=noise,
         )
 
 
@@ -105,9 +109,17 @@ class Machine:
 
     def __post_init__(self) -> None:
         if not self.places:
-            raise InputError("the machine has no place; describe it at one at least")
+            raise UsageError(
+                "missing", "the machine has no place", "describe it at one place at least", argument="places"
+            )
         if not (np.isfinite(self.encoder_step_m) and self.encoder_step_m >= 0):
-            raise InputError(f"encoder_step_m={self.encoder_step_m} is not a finite number of at least 0")
+            raise UsageError(
+                "out-of-range",
+                f"encoder_step_m={self.encoder_step_m} is not a finite number of at least 0",
+                "give metres, 0 for no encoder",
+                argument="encoder_step_m",
+                value=self.encoder_step_m,
+            )
         check_noise(self.noise)
 
     def torque(self, place: Place, frequency_hz: Floats) -> Complex:

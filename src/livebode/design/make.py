@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import DesignError, Lines, UsageError
 from livebode.design.grid import Grid
 from livebode.design.machine import Machine
 from livebode.design.waveform import Waveform
@@ -44,9 +44,13 @@ def unit_waveform(wish: Wish, found: Grid, machine: Machine) -> Waveform:
     # A mean moves a loop at its start, far more than the lines do, and tells nothing; a PRBS and a chirp have one.
     made = Waveform(lines, samples - np.mean(samples), about)
     if wish.crest_factor_max is not None and made.crest_factor > wish.crest_factor_max * (1 + REACHED):
-        raise InputError(
-            f"a crest factor of {wish.crest_factor_max:g} is not reached: the lowest found is "
-            f"{made.crest_factor:.4f}; ask for {made.crest_factor + 5e-4:.3f}, or take {_lower(wish)}"
+        raise DesignError(
+            "crest-factor-not-reached",
+            f"a crest factor of {wish.crest_factor_max:g} is not reached: the lowest found is {made.crest_factor:.4f}",
+            f"allow {made.crest_factor + 5e-4:.3f}, or take {_lower(wish)}",
+            argument="crest_factor_max",
+            crest_factor=made.crest_factor,
+            crest_factor_max=wish.crest_factor_max,
         )
     return made
 
@@ -60,8 +64,13 @@ def amplitudes(wish: Wish, lines: Lines, machine: Machine) -> Floats:
     """Of each line, shape (lines,): as listed, else of rms 1."""
     if wish.listed:
         if len(wish.listed) != len(lines):
-            raise InputError(
-                f"amplitude_n_m lists {len(wish.listed)} amplitudes for {len(lines)} lines; give one for each"
+            raise UsageError(
+                "wrong-shape",
+                f"amplitude_n_m lists {len(wish.listed)} amplitudes for {len(lines)} lines",
+                "give one for each line",
+                argument="amplitude_n_m",
+                amplitudes=len(wish.listed),
+                lines=len(lines),
             )
         return np.array(wish.listed)
     if wish.shape == "flat":

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import GridError, InputError, Loop, Responses
+from livebode.core import DesignError, GridError, Loop, Responses, SignalError, UsageError
 from livebode.core.controllers import integral
 from livebode.core.model import Algebra, Gain, Model, as_model
 from livebode.design.machine import STANDING, Extremes, Machine, Place, within
@@ -34,12 +34,24 @@ class MeasuredResponse(Algebra):
 
     @classmethod
     def of(cls, responses: Responses) -> MeasuredResponse:
-        """Of one response, at the lines where it is valid; InputError where fewer than two are, or it is no plant's."""
+        """Of one response, at the lines where it is valid; SignalError where fewer than two are."""
         if responses.quantity != "plant":
-            raise InputError(f"these are responses of the {responses.quantity}; give those of the plant")
+            raise SignalError(
+                "wrong-quantity",
+                f"these are responses of the {responses.quantity}",
+                "give those of the plant",
+                quantity=responses.quantity,
+                allowed=["plant"],
+            )
         valid = responses.valid[0] & np.isfinite(responses.value[0])
         if np.sum(valid) < 2:
-            raise InputError(f"the response is valid at {np.sum(valid)} lines; at least two are needed")
+            raise SignalError(
+                "too-few-lines",
+                f"the response is valid at {np.sum(valid)} lines; at least two are needed",
+                "measure more lines, or raise the amplitude",
+                lines=int(np.sum(valid)),
+                lines_min=2,
+            )
         return cls(responses.lines.frequency_hz[valid], responses.value[0, valid])
 
     @property
@@ -52,8 +64,12 @@ class MeasuredResponse(Algebra):
         outside = ~within(f, self.band_hz)
         if np.any(outside):
             raise GridError(
-                f"the response was measured from {self.band_hz[0]:g} to {self.band_hz[1]:g} Hz and is asked for at "
-                f"{float(f[outside].flat[0]):g} Hz; choose lines within, or measure further"
+                "line-off",
+                f"{float(f[outside].flat[0]):g} Hz is outside {self.band_hz[0]:g} … {self.band_hz[1]:g} "
+                "Hz, where the response was measured",
+                "choose lines within, or measure further",
+                frequency_hz=float(f[outside].flat[0]),
+                band_hz=list(self.band_hz),
             )
         # Over ln f a straight stretch of the Bode plot is met exactly.
         at, known = np.log(f), np.log(self.frequency_hz)
@@ -125,17 +141,30 @@ def measured_machine(
 
     Raises
     ------
-    InputError
+    LivebodeError
         If the plant has no response, the loop no feedback, the output is not known, a quantity of the motion is not in
         order, or an axis without stroke_s moves.
     """
     given = as_model(plant)
     if loop.feedback is None:
-        raise InputError("the loop's feedback is not known; describe its controllers")
+        raise DesignError("feedback-unknown", "the loop's feedback is not known", "describe its controllers")
     if output not in ("velocity", "position"):
-        raise InputError(f"{output=} is not known; choose 'velocity' or 'position'")
+        raise UsageError(
+            "not-one-of",
+            f"{output=} is not one of 'velocity', 'position'",
+            "choose one of them",
+            argument="output",
+            value=output,
+            allowed=["velocity", "position"],
+        )
     if not (np.isfinite(radius_m) and radius_m > 0):
-        raise InputError(f"{radius_m=} is not a finite number above 0; leave it out for a rotary axis")
+        raise UsageError(
+            "out-of-range",
+            f"{radius_m=} is not a finite number above 0",
+            "leave it out for a rotary axis",
+            argument="radius_m",
+            value=radius_m,
+        )
     way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
     speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
     own = _motion(motion or {}, stroke_s)
@@ -152,15 +181,31 @@ def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
     """What the motion does, completed where the axis stands."""
     for name, (low, high) in given.items():
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
-            raise InputError(f"the {name} of the motion, [{low}, {high}], is no lowest and highest value; correct it")
+            raise UsageError(
+                "out-of-range",
+                f"the {name} of the motion, [{low}, {high}], is not a lowest and a highest value",
+                "give two finite numbers, the lower one first",
+                argument="motion",
+                quantity=name,
+                value=[low, high],
+            )
     if stroke_s is not None:
         if not (np.isfinite(stroke_s) and stroke_s > 0):
-            raise InputError(f"{stroke_s=} is not a finite number above 0; leave it out for an axis that stands")
+            raise UsageError(
+                "out-of-range",
+                f"{stroke_s=} is not a finite number above 0",
+                "leave it out for an axis at standstill",
+                argument="stroke_s",
+                value=stroke_s,
+            )
         return given
     low, high = given.get("speed", (0.0, 0.0))
     if low != high:
-        raise InputError(
-            f"the motion has a speed of {low:g} … {high:g} m/s, but no stroke_s; give the seconds in which it passes "
-            "each place once"
+        raise UsageError(
+            "missing",
+            f"the motion has a speed of {low:g} … {high:g} m/s, but no stroke_s",
+            "give the seconds in which it passes each place once",
+            argument="stroke_s",
+            speed_m_per_s=[low, high],
         )
     return STANDING | given

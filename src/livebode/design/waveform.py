@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import DesignError, Lines, UsageError
 from livebode.excitation import quantised
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Waveform:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If the samples are not one finite period of the window, or a line carries no power.
     """
 
@@ -46,15 +46,21 @@ class Waveform:
         samples.flags.writeable = False
         object.__setattr__(self, "samples", samples)
         if samples.shape != (self.lines.window,) or not np.all(np.isfinite(samples)):
-            raise InputError(
-                f"the excitation has shape {samples.shape} or is not finite; give one period of {self.lines.window} "
-                "finite samples"
+            raise UsageError(
+                "wrong-shape",
+                f"the excitation has shape {samples.shape} or is not finite",
+                f"give one period of {self.lines.window} finite samples",
+                argument="samples",
+                shape=list(samples.shape),
+                window=self.lines.window,
             )
         if np.any(np.abs(self.spectrum[list(self.lines.bins)]) <= 1e-9 * np.max(np.abs(samples))):
             weakest = int(np.argmin(np.abs(self.spectrum[list(self.lines.bins)])))
-            raise InputError(
-                f"the excitation has no power at {self.lines.frequency_hz[weakest]:g} Hz; leave out that line, or give "
-                "it an amplitude above 0"
+            raise DesignError(
+                "line-without-power",
+                f"the excitation has no power at {self.lines.frequency_hz[weakest]:g} Hz",
+                "leave out that line, or give it an amplitude above 0",
+                frequency_hz=float(self.lines.frequency_hz[weakest]),
             )
 
     @property
@@ -94,7 +100,7 @@ class Waveform:
 
         Raises
         ------
-        InputError
+        DesignError
             Also where a line is left that the rounding changes by more than half; the sentence has a step that does.
         """
         stepped = replace(self, samples=quantised(self.samples, step), about={**self.about, "resolution_n_m": step})
@@ -107,9 +113,15 @@ class Waveform:
             amplitude = np.abs(self.spectrum[self.lines.bins[worst]])
             whole = self.about.get("kind") in ("prbs", "chirp")
             remedy = "raise the amplitude" if whole else "raise it, leave it out"
-            raise InputError(
-                f"the line at {self.lines.frequency_hz[worst]:g} Hz has {amplitude:.3g} N m, which rounding to steps "
-                f"of {step:g} N m changes by {100 * changed[worst]:.0f} %; {remedy}, or take steps of {fine!r} N m"
+            raise DesignError(
+                "rounded-away",
+                f"the line at {self.lines.frequency_hz[worst]:g} Hz has {amplitude:.3g} "
+                f"N m, which rounding to steps of {step:g} N m changes by {100 * changed[worst]:.0f} "
+                "%",
+                f"{remedy}, or take steps of {fine!r} N m",
+                frequency_hz=float(self.lines.frequency_hz[worst]),
+                step_n_m=step,
+                fitting_step_n_m=fine,
             )
         return stepped
 

@@ -8,19 +8,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.design.mains import MAINS_HZ
-from livebode.excitation import Phases, check_order
+from livebode.design.wish_checks import check
+from livebode.excitation import Phases
 from livebode.excitation.chirp import Sweep
 
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]
-
-_WHOSE = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
-_RESOLUTION_MIN_HZ = 1e-6
-_STEP_MIN = 1e-12
-_MAINS_MIN_HZ = 1.0
-_ACCURACY_MIN, _AMPLITUDE_MIN, _AMPLITUDE_MAX = 1e-6, 1e-9, 1e9  # beyond them is a slip of the pen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +57,7 @@ class Wish:
 
     Raises
     ------
-    InputError
+    UsageError
         If something is missing, cannot be, is of another kind, or is said twice.
     """
 
@@ -94,90 +89,18 @@ class Wish:
             ("sweep", (None, *get_args(Sweep))),
         ):
             if (word := getattr(self, name)) not in known:
-                raise InputError(f"{name}={word!r} is not known; choose {', '.join(map(repr, filter(None, known)))}")
-        self._check_numbers()
-        self._check_amplitude()
-        self._check_whose()
-        self._check_grid()
-        self._check_mains()
-
-    def _check_mains(self) -> None:
-        if not all(np.isfinite(mains) and mains >= _MAINS_MIN_HZ for mains in self.mains_hz):
-            raise InputError(
-                f"mains_hz={list(self.mains_hz)} is not a list of frequencies above 1 Hz, such as [50, 60]"
-            )
-
-    def _check_whose(self) -> None:
-        for name, kind in _WHOSE.items():
-            if getattr(self, name) is not None and self.kind != kind:
-                raise InputError(f"{name} is a setting of kind {kind!r}, and kind is {self.kind!r}; leave it out")
-        if self.phases is not None and self.kind not in ("multisine", "odd"):
-            raise InputError(f"phases is a setting of lines together, and kind is {self.kind!r}; leave it out")
-        if self.lines is not None and self.kind not in ("multisine", "stepped"):
-            raise InputError(f"{self.kind!r} has lines of its own; give band_hz, or take a multisine")
-        if self.shape != "flat" and self.kind not in ("multisine", "odd", "stepped"):
-            raise InputError(f"the lines of {self.kind!r} cannot be shaped; leave out shape, or take a multisine")
-        if self.listed and self.shape != "flat":
-            raise InputError(f"amplitude_n_m lists amplitudes, which shape = {self.shape!r} would set; leave one out")
-        if self.listed and self.kind in ("prbs", "chirp"):
-            raise InputError(f"amplitude_n_m lists {len(self.listed)} amplitudes, but {self.kind!r} has one; give that")
-
-    def _check_grid(self) -> None:
-        if self.band_hz is not None and np.shape(self.band_hz) != (2,):
-            raise InputError(f"band_hz={self.band_hz} is no band; give two frequencies in Hz, such as [20, 140]")
-        if self.order is not None:
-            check_order(self.order)
-        if self.lines is None and self.band_hz is None:
-            raise InputError("neither band_hz nor lines is given; say what is to be measured, such as [20, 140]")
-        if self.kind == "prbs" and self.window is not None:
-            raise InputError(f"a PRBS takes 2^order - 1 bits, no window of {self.window}; give order or resolution_hz")
-        apart = [name for name in ("lines", "resolution_hz", "window", "order") if getattr(self, name) is not None]
-        if self.lines is not None:
-            apart = [name for name in ("lines", "band_hz", "resolution_hz") if getattr(self, name) is not None]
-        if not apart:
-            other = "order" if self.kind == "prbs" else "window"
-            raise InputError(f"neither resolution_hz nor {other} is given; say how far apart the lines may be")
-        if len(apart) > 1:
-            raise InputError(f"{apart[0]} and {apart[1]} both say which lines there are; leave one out")
+                raise UsageError(
+                    "not-one-of",
+                    f"{name}={word!r} is not known",
+                    f"choose {', '.join(map(repr, filter(None, known)))}",
+                    argument=name,
+                    value=word,
+                    allowed=[w for w in known if w],
+                )
+        check(self)
 
     @property
     def listed(self) -> list[float]:
         """The amplitudes that are given one for each line; empty where they are not."""
         given = self.amplitude_n_m
         return [] if given is None or np.ndim(given) == 0 else np.asarray(given, dtype=float).tolist()
-
-    def _check_numbers(self) -> None:
-        for name in ("resolution_hz", "accuracy", "crest_factor_max", "resolution_n_m"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise InputError(f"{name}={value} is not a finite number above 0")
-        if self.resolution_hz is not None and self.resolution_hz < _RESOLUTION_MIN_HZ:
-            raise InputError(
-                f"resolution_hz={self.resolution_hz} is below {_RESOLUTION_MIN_HZ:g}; ask for a coarser one"
-            )
-        if self.resolution_n_m is not None and self.resolution_n_m < _STEP_MIN:
-            raise InputError(
-                f"resolution_n_m={self.resolution_n_m} is below {_STEP_MIN:g}; leave it out for no rounding"
-            )
-        if not _ACCURACY_MIN <= self.accuracy <= 1:
-            raise InputError(f"accuracy={self.accuracy} is no share of |G| from {_ACCURACY_MIN:g} to 1; 0.05 is 5 %")
-        if self.crest_factor_max is not None and self.crest_factor_max < 1:
-            raise InputError(f"crest_factor_max={self.crest_factor_max} is below 1, the crest factor of a PRBS")
-        for name in ("window", "held_ticks", "periods"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise InputError(f"{name}={value} is below 1; give a whole number above 0")
-        if self.seed < 0:
-            raise InputError(f"seed={self.seed} is below 0; give a whole number of at least 0")
-
-    def _check_amplitude(self) -> None:
-        given = np.atleast_1d(np.asarray(1.0 if self.amplitude_n_m is None else self.amplitude_n_m, dtype=np.float64))
-        if not np.all(np.isfinite(given)) or np.any(given < 0) or not given.any():
-            raise InputError(
-                f"amplitude_n_m={self.amplitude_n_m} is not finite and above 0; leave it out to have it chosen"
-            )
-        if not _AMPLITUDE_MIN <= given.max() <= _AMPLITUDE_MAX:
-            raise InputError(
-                f"amplitude_n_m={self.amplitude_n_m} is not from {_AMPLITUDE_MIN:g} to {_AMPLITUDE_MAX:g} N m; "
-                "leave it out to have it chosen"
-            )

@@ -72,7 +72,7 @@ class AroundLines(Generic[W]):
 
         Raises
         ------
-        InputError
+        SignalError
             If the snapshot is damaged or belongs to other settings; all is then as it was.
         """
         for name, state in snapshots.unpack(snapshot, self._identity).items():

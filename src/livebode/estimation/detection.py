@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import GridError, Lines
 from livebode.estimation.bounds import power
 from livebode.estimation.settings import DETECTION_LINES_MIN
 
@@ -104,15 +104,20 @@ class DetectionNoise:
 
     Raises
     ------
-    InputError
+    GridError
         If there are too few such bins.
     """
 
     def __init__(self, lines: Lines, outside: tuple[int, ...] = ()) -> None:
         if len(lines.quiet) < DETECTION_LINES_MIN:
-            raise InputError(
-                f"the lines leave {len(lines.quiet)} bins quiet, but the noise needs {DETECTION_LINES_MIN}; "
-                "take the scatter between periods instead, or fewer lines"
+            raise GridError(
+                "too-few-detection-lines",
+                f"the lines leave {len(lines.quiet)} detection lines (bins without excitation), "
+                f"but the noise needs {DETECTION_LINES_MIN}",
+                "take the noise from the scatter between periods, or fewer lines",
+                argument="noise",
+                detection_lines=len(lines.quiet),
+                detection_lines_min=DETECTION_LINES_MIN,
             )
         at = np.asarray(lines.bins)
         self.bins = np.sort(np.array(lines.quiet + outside, dtype=np.int64))

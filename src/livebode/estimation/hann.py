@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import GridError, Lines
 
 Complex = NDArray[np.complex128]
 
@@ -20,14 +20,21 @@ class Hann:
     def __init__(self, lines: Lines) -> None:
         apart = np.diff(lines.bins)
         if apart.size and apart.min() < 2:
-            raise InputError(
-                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) apart, but two are closer; "
-                "take a longer window or fewer lines"
+            raise GridError(
+                "lines-too-close",
+                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) apart, but two are closer",
+                "take a longer window or fewer lines",
+                argument="lines",
+                resolution_hz=lines.resolution_hz,
             )
         if lines.bins[0] < 2 or 2 * (lines.bins[-1] + 1) >= lines.window:
-            raise InputError(
-                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) from 0 and 1 from "
-                "the Nyquist frequency; leave out the outermost line"
+            raise GridError(
+                "line-at-edge",
+                f"with a Hann window lines must be 2 bins ({2 * lines.resolution_hz:g} Hz) "
+                "from 0 and 1 from the Nyquist frequency",
+                "leave out the outermost line",
+                argument="lines",
+                resolution_hz=lines.resolution_hz,
             )
         self._window = lines.window
         at = np.asarray(lines.bins)

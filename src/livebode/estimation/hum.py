@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend
 from scipy.signal.windows import hann
 
-from livebode.core import InputError
+from livebode.core import SignalError
 from livebode.estimation.mains import HARMONICS, MAINS_HZ, stands_out_by
 from livebode.estimation.silence import STEADY
 
@@ -57,7 +57,7 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
 
     Raises
     ------
-    InputError
+    SignalError
         If there are less than two seconds.
 
     Examples
@@ -84,8 +84,12 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
 def _powers(x: Floats, rate_hz: float) -> Floats:
     """Power of the thirds at each bin, so scaled that a sine of amplitude A has A² in the bins that it reaches."""
     if x.size < SECONDS_MIN * rate_hz:
-        raise InputError(
-            f"{x.size / rate_hz:.3g} s without excitation are too short to see hum; record two seconds or more"
+        raise SignalError(
+            "too-short",
+            f"{x.size / rate_hz:.3g} s without excitation are too short to detect hum",
+            "record two seconds or more",
+            seconds=x.size / rate_hz,
+            seconds_min=SECONDS_MIN,
         )
     n = x.size // _PARTS
     parts = detrend(x[: n * _PARTS].reshape(_PARTS, n), axis=1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +32,13 @@ class RippleOrder:
     def __post_init__(self) -> None:
         for name in ("cycles", "amplitude"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InputError(f"ripple: {name} = {getattr(self, name)} is not a positive number")
+                raise UsageError(
+                    "out-of-range",
+                    f"ripple: {name} = {getattr(self, name)} is not a positive number",
+                    "choose a number above 0",
+                    argument=name,
+                    value=getattr(self, name),
+                )
 
 
 def ripple_power(orders: tuple[RippleOrder, ...], lines: Lines, rate_per_s: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from math import isqrt
 from typing import Literal
 
-from livebode.core import InputError, Lines, Loop, Quantity
+from livebode.core import Lines, Loop, Quantity, UsageError
 from livebode.estimation.estimators import ESTIMATORS, Estimator, Role
 from livebode.estimation.ripple import RippleOrder
 
@@ -59,7 +59,7 @@ class Settings:
 
     Raises
     ------
-    InputError
+    UsageError
         If a signal that the estimator needs is not named, or a number is out of range.
     """
 
@@ -87,31 +87,65 @@ class Settings:
             object.__setattr__(self, "hop", default_hop(self.lines.window))
         window = self.lines.window
         if self.step < 1 or (self.step > window and self.step % window):
-            raise InputError(
-                f"hop={self.hop} is not between 1 and the window of {window} samples, and no multiple of it"
+            raise UsageError(
+                "out-of-range",
+                f"hop={self.hop} is not between 1 and the window of {window} samples, nor a multiple of it",
+                "choose another hop",
+                argument="hop",
+                value=self.hop,
+                window=window,
             )
         if not 0 < self.forgetting <= 1:
-            raise InputError(f"forgetting={self.forgetting} is not in 0 < λ ≤ 1; 0.8 remembers about nine periods")
+            raise UsageError(
+                "out-of-range",
+                f"forgetting={self.forgetting} is not in 0 < λ ≤ 1",
+                "take for example 0.8, which remembers about nine periods",
+                argument="forgetting",
+                value=self.forgetting,
+                low=0,
+                high=1,
+            )
         for role in self.roles:
             if self.channel(role) is None:
-                raise InputError(
-                    f"the {self.estimator} estimator of the {self.quantity} needs the {role} signal; name its channel"
+                raise UsageError(
+                    "missing",
+                    f"the {self.estimator} estimator of the {self.quantity} needs the {role} signal",
+                    "name its channel",
+                    argument=role,
+                    estimator=self.estimator,
+                    quantity=self.quantity,
                 )
         known = [name for role in self.roles if (name := self.channel(role))]
         for option in ("differenced", "spikes"):
             for name in getattr(self, option):
                 if name not in known:
-                    raise InputError(
-                        f"{option} names {name!r}, which is none of the signals in use: {', '.join(known)}"
+                    raise UsageError(
+                        "unknown-name",
+                        f"{option} names {name!r}, which is not one of the signals in use",
+                        f"choose {' or '.join(known)}",
+                        argument=option,
+                        value=name,
+                        allowed=known,
                     )
         self._check_together()
         self._check_loop()
 
     def _check_together(self) -> None:
         if self.ripple and self.schedule is None:
-            raise InputError("a ripple repeats with the schedule; name the channel of the position")
+            raise UsageError(
+                "missing",
+                "a ripple repeats with the schedule, and the schedule is not named",
+                "name the channel of the position",
+                argument="schedule",
+            )
         if self.hann and self.noise == "quiet":
-            raise InputError("a Hann window spreads the lines over the quiet bins; take the noise from periods")
+            raise UsageError(
+                "conflict",
+                "a Hann window spreads the lines over the detection lines",
+                "take the noise from periods",
+                argument="noise",
+                value="quiet",
+            )
 
     def _check_words(self) -> None:
         for name, known in (
@@ -121,13 +155,33 @@ class Settings:
             ("dtype", ("float64", "float32")),
         ):
             if (word := getattr(self, name)) not in known:
-                raise InputError(f"{name}={word!r} is not known; choose {' or '.join(map(repr, known))}")
+                raise UsageError(
+                    "not-one-of",
+                    f"{name}={word!r} is not known",
+                    f"choose {' or '.join(map(repr, known))}",
+                    argument=name,
+                    value=word,
+                    allowed=list(known),
+                )
 
     def _check_loop(self) -> None:
         if self.method.through_loop and self.loop.feedback is None:
-            raise InputError("the indirect estimator needs the controllers: describe the loop's feedback, or use joint")
+            raise UsageError(
+                "missing",
+                "the indirect estimator needs the controllers",
+                "describe the loop's feedback, or use joint",
+                argument="estimator",
+                estimator=self.estimator,
+            )
         if self.quantity != "plant" and self.method is ESTIMATORS["direct"] and self.loop.feedback is None:
-            raise InputError(f"the {self.quantity} from the direct estimator needs the loop's feedback, or use joint")
+            raise UsageError(
+                "missing",
+                f"the {self.quantity} from the direct estimator needs the loop's feedback",
+                "describe it, or use joint",
+                argument="estimator",
+                estimator=self.estimator,
+                quantity=self.quantity,
+            )
 
     @property
     def method(self) -> Estimator:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 Arrays = dict[str, NDArray[np.generic]]
 
@@ -24,15 +24,22 @@ def pack(parts: dict[str, Arrays], owner: str) -> bytes:
 
 
 def unpack(data: bytes, owner: str) -> dict[str, Arrays]:
-    """The parts again; InputError where the bytes are damaged or belong to other settings."""
+    """The parts again; UsageError where the bytes are damaged or belong to other settings."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as stored:
             flat = {name: stored[name] for name in stored.files}
         stored_owner = flat.pop("owner")
     except (ValueError, OSError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"the snapshot of {len(data)} bytes is damaged ({error}); start afresh") from None
+        raise UsageError(
+            "unreadable", f"the snapshot of {len(data)} bytes is damaged ({error})", "start without it", argument="data"
+        ) from None
     if not np.array_equal(stored_owner, _fingerprint(owner)):
-        raise InputError("the snapshot belongs to a tracker with other settings; restore it into one with the same")
+        raise UsageError(
+            "conflict",
+            "the snapshot belongs to a tracker with other settings",
+            "restore it into one with the same",
+            argument="data",
+        )
     parts: dict[str, Arrays] = {}
     for path, array in flat.items():
         part, name = path.split("/", 1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import NOT_WHOLE, SPIKE, Block, InputError, Responses, Spectra, SpectraLayout
+from livebode.core import NOT_WHOLE, SPIKE, Block, Responses, SignalError, Spectra, SpectraLayout, UsageError
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
@@ -43,7 +43,7 @@ class SpectraTracker(AroundLines[SpectraWatch]):
 
     Raises
     ------
-    InputError
+    LivebodeError
         If a signal, a bin or the schedule that the settings need is not sent, or they ask for what needs samples.
     """
 
@@ -82,11 +82,15 @@ class SpectraTracker(AroundLines[SpectraWatch]):
 
         Raises
         ------
-        InputError
+        SignalError
             If they are of another layout, are samples, or came twice.
         """
         if not isinstance(block, Spectra) or block.layout != self._layout:
-            raise InputError("these are not spectra of the layout that the tracker was made for; make another one")
+            raise SignalError(
+                "layout-differs",
+                "these are not spectra of the layout that the tracker was made for",
+                "make another tracker",
+            )
         hop, window = self._layout.hop, self._layout.window
         sums = block.sums[self._signals][:, :, self._columns]
         finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
@@ -116,17 +120,26 @@ class SpectraTracker(AroundLines[SpectraWatch]):
 
 
 def _check(settings: Settings, layout: SpectraLayout) -> None:
-    """InputError where these settings cannot be had from such spectra."""
+    """LivebodeError where these settings cannot be had from such spectra."""
     mine = settings.lines
     if (mine.window, mine.bins) != (layout.window, layout.lines) or settings.step != layout.hop:
-        raise InputError("lines, window or hop are not those of the spectra; take them from the layout")
+        raise SignalError(
+            "layout-differs", "lines, window or hop are not those of the spectra", "take them from the layout"
+        )
     if settings.spikes:
-        raise InputError(
-            "spikes are found in samples, and the drive sends spectra; leave them out, and let it mark its windows"
+        raise UsageError(
+            "conflict",
+            "spikes are found in samples, and the drive sends spectra",
+            "leave them out, and let the drive mark its windows",
+            argument="spikes",
         )
     if settings.dtype != "float64":
-        raise InputError(
-            f"dtype={settings.dtype!r} is for samples, and spectra come as the drive computed them; leave it out"
+        raise UsageError(
+            "conflict",
+            f"dtype={settings.dtype!r} is for samples, and spectra come as the drive computed them",
+            "leave it out",
+            argument="dtype",
+            value=settings.dtype,
         )
     _check_channels(settings, layout)
 
@@ -136,20 +149,31 @@ def _check_channels(settings: Settings, layout: SpectraLayout) -> None:
     for role in settings.roles:
         name = settings.channel(role) or ""
         if name not in signals:
-            raise InputError(
-                f"the drive sends no spectrum of {name!r}, which the {settings.estimator} estimator needs; "
-                f"it sends those of {', '.join(signals)}"
+            raise SignalError(
+                "channel-unknown",
+                f"the drive sends no spectrum of {name!r}, which the {settings.estimator} estimator needs",
+                f"choose one that it sends: {', '.join(signals)}",
+                channel=name,
+                channels=signals,
             )
     if settings.schedule is not None and settings.schedule not in values:
-        raise InputError(
-            f"the drive does not send the value of {settings.schedule!r} to plot over; let it, or leave out the "
-            f"schedule (values: {', '.join(values) or 'none'})"
+        raise SignalError(
+            "channel-unknown",
+            f"the drive does not send the value of {settings.schedule!r} to plot over",
+            f"let it send that, or leave out the schedule (values: {', '.join(values) or 'none'})",
+            argument="schedule",
+            channel=settings.schedule,
+            channels=values,
         )
     used = {settings.channel(role) for role in settings.roles}
     theirs = {name for name, d in zip(signals, layout.differenced) if d and name in used}
     if settings.differenced and set(settings.differenced) != theirs:
         odd = sorted(set(settings.differenced) ^ theirs)[0]
         does = "differences" if odd in theirs else "does not difference"
-        raise InputError(
-            f"the drive {does} {odd!r}, which cannot be changed in spectra; say so in differenced, or leave it out"
+        raise SignalError(
+            "layout-differs",
+            f"the drive {does} {odd!r}, which cannot be changed in spectra",
+            "name it in differenced as the drive does it, or leave differenced out",
+            argument="differenced",
+            channel=odd,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError, Spectra
+from livebode.core import SignalError, Spectra
 from livebode.estimation.counted import Counted
 
 _KINDS = {
@@ -23,13 +23,16 @@ class SpectraWatch(Counted):
         self._window = window
 
     def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
-        """Count these, of each kind those that are `marked`; InputError where they do not follow the ones before."""
+        """Count these, of each kind those that are `marked`; SignalError where they do not follow the ones before."""
         first = self._next < 0
         missing = 0 if first else block.start - self._next
         if missing < 0:
-            raise InputError(
-                f"spectra up to sample {self._next - 1} came twice, from sample {block.start} on; blocks must follow "
-                "each other, so drop what repeats"
+            raise SignalError(
+                "repeated",
+                f"spectra up to sample {self._next - 1} came twice, from sample {block.start} on",
+                "let blocks follow each other: drop what repeats",
+                first_sample=block.start,
+                last_sample=self._next - 1,
             )
         if not first and (missing or block.gap):
             self.counts["gaps"] += 1

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Event, InputError, Responses
+from livebode.core import Block, Event, Responses, SignalError
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
@@ -101,17 +101,20 @@ class Tracker(AroundLines[Watch]):
 
         Raises
         ------
-        InputError
+        SignalError
             If the rate is not that of the lines, a channel is missing, or samples come twice.
         """
         s = self.settings
         if abs(block.rate_hz / s.lines.rate_hz - 1) > 1e-9:
-            raise InputError(
-                f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}; "
-                "make the lines for the block's rate"
+            raise SignalError(
+                "rate-differs",
+                f"the block has {block.rate_hz:g} samples per second, but the lines are for {s.lines.rate_hz:g}",
+                "make the lines for the block's rate",
+                rate_hz=block.rate_hz,
+                lines_rate_hz=s.lines.rate_hz,
             )
         if not len(block):
-            raise InputError("the block is empty; leave it out")
+            raise SignalError("empty", "the block is empty", "leave it out")
         channels = block.data[[block.index(s.channel(role) or "") for role in self._roles]]
         schedule = block[s.schedule] if s.schedule else np.full(len(block), np.nan)
         if self._watch.starts(block):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Block, InputError
+from livebode.core import Block, SignalError
 from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
 
@@ -27,9 +27,12 @@ class Watch(Counted):
         first = self._next < 0
         missing = 0 if first else block.start - self._next
         if missing < 0:
-            raise InputError(
-                f"samples {block.start} to {self._next - 1} came twice; blocks must follow each other, "
-                "so drop what repeats"
+            raise SignalError(
+                "repeated",
+                f"samples {block.start} to {self._next - 1} came twice",
+                "let blocks follow each other: drop what repeats",
+                first_sample=block.start,
+                last_sample=self._next - 1,
             )
         gap = not first and (missing > 0 or block.gap)
         self._next = block.stop

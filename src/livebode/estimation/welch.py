@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Block, InputError, Lines, Response
+from livebode.core import Block, Lines, Response, SignalError, UsageError
 from livebode.estimation.bounds import power
 
 
@@ -46,7 +46,7 @@ def welch(
 
     Raises
     ------
-    InputError
+    LivebodeError
         If the recording is shorter than two segments or holds samples that are not finite.
 
     Examples
@@ -59,16 +59,30 @@ def welch(
     (99, np.complex128(2+0j), np.float64(1.0))
     """
     if not 0 <= overlap <= 0.9:
-        raise InputError(f"{overlap=} is not between 0 and 0.9")
+        raise UsageError(
+            "out-of-range",
+            f"{overlap=} is not between 0 and 0.9",
+            "take for example 0.5",
+            argument="overlap",
+            value=overlap,
+            low=0,
+            high=0.9,
+        )
     lines = Lines(tuple(range(1, (window + 1) // 2)), window, block.rate_hz)
     step = window - int(overlap * window)
     segments = 1 + (len(block) - window) // step
     if segments < 2:
-        raise InputError(f"{len(block)} samples are less than two segments of {window}; take a shorter window")
+        raise SignalError(
+            "too-short",
+            f"{len(block)} samples are less than two segments of {window}",
+            "take a shorter window",
+            samples=len(block),
+            window=window,
+        )
     u, y = block[input], block[output]
     w = u if excitation is None else block[excitation]
     if not np.isfinite(u.sum() + y.sum() + w.sum()):
-        raise InputError("the recording holds samples that are not finite; cut it before or after them")
+        raise SignalError("not-finite", "the recording has samples that are not finite", "cut it before or after them")
 
     from scipy import signal  # takes half a second to import
 

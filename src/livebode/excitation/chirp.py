@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import GridError, InputError, Lines
+from livebode.core import GridError, Lines, UsageError
 from livebode.core.lines import check_window
 from livebode.excitation.odd import check_band, wider
 
@@ -36,7 +36,7 @@ def chirp(
     ------
     GridError
         If the band is not between 0 and the Nyquist frequency, or is not wider than two bins.
-    InputError
+    UsageError
         If the sweep is not known.
 
     Examples
@@ -47,7 +47,14 @@ def chirp(
     """
     chirp_lines(low_hz, high_hz, rate_hz, window)
     if sweep not in ("linear", "logarithmic"):
-        raise InputError(f"{sweep=} is not known; choose 'linear' or 'logarithmic'")
+        raise UsageError(
+            "not-one-of",
+            f"{sweep=} is not known",
+            "choose 'linear' or 'logarithmic'",
+            argument="sweep",
+            value=sweep,
+            allowed=["linear", "logarithmic"],
+        )
     low, high = low_hz * window / rate_hz, high_hz * window / rate_hz  # turns in a window
     at = np.arange(window) / window
     if sweep == "linear":
@@ -68,7 +75,12 @@ def chirp_lines(low_hz: float, high_hz: float, rate_hz: float, window: int) -> L
     first = max(first, 1)
     if last - first < 2:
         raise GridError(
-            f"{low_hz:g} … {high_hz:g} Hz is not wider than two bins of {rate_hz / window:g} Hz; "
-            f"take {wider(high_hz - low_hz, 3, window, rate_hz)}"
+            "band-too-narrow",
+            f"{low_hz:g} … {high_hz:g} Hz is not wider than two bins of {rate_hz / window:g} Hz",
+            f"take {wider(high_hz - low_hz, 3, window, rate_hz)}",
+            argument="band_hz",
+            low_hz=low_hz,
+            high_hz=high_hz,
+            resolution_hz=rate_hz / window,
         )
     return Lines.of_bins(list(range(first, last + 1)), window, rate_hz)

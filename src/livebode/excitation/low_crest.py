@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.excitation.descent import PEAK, VALLEY, Stages, descend, descend_together, period, samples_for
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def low_crest_phases(
 
     Raises
     ------
-    InputError
+    UsageError
         If amplitudes are not as many as bins, or `starts` is below 1.
 
     Examples
@@ -59,7 +59,9 @@ def low_crest_phases(
     k, size = _reduced(bins, amplitude)
     count = _starts_for(k) if starts is None else starts
     if count < 1:
-        raise InputError(f"{starts=} is below 1; give at least one start")
+        raise UsageError(
+            "out-of-range", f"{starts=} is below 1", "give at least one start", argument="starts", value=starts, low=1
+        )
     # Threads of products as small as these wait for each other, on a busy machine for several times the search.
     with threadpool_limits(1, user_api="blas"):
         return np.asarray((_searched(k, size, seed, count) + np.pi / 2) % (2 * np.pi))  # of sines, found as cosines
@@ -127,11 +129,30 @@ def _reduced(bins: ArrayLike, amplitude: ArrayLike) -> tuple[Bins, Floats]:
     k = np.asarray(bins, dtype=np.int64)
     size = np.asarray(amplitude, dtype=np.float64)
     if size.shape not in ((), k.shape):
-        raise InputError(f"amplitude has shape {size.shape} for {k.size} lines; give one number, or one for each line")
+        raise UsageError(
+            "wrong-shape",
+            f"amplitude has shape {size.shape} for {k.size} lines",
+            "give one number, or one for each line",
+            argument="amplitude",
+            shape=list(size.shape),
+            lines=int(k.size),
+        )
     if not k.size or k.min() < 1:
-        raise InputError(f"bins={k.tolist()} are not whole numbers above 0; name at least one line")
+        raise UsageError(
+            "out-of-range",
+            f"bins={k.tolist()} are not whole numbers above 0",
+            "name at least one line",
+            argument="bins",
+            value=k.tolist(),
+            low=1,
+        )
     if not np.all(np.isfinite(size)) or not np.any(size):
-        raise InputError("the amplitudes are not finite, or all zero; give each line one above 0")
+        raise UsageError(
+            "not-finite",
+            "the amplitudes are not finite, or all zero",
+            "give each line one above 0",
+            argument="amplitude",
+        )
     return k // np.gcd.reduce(k), np.broadcast_to(size, k.shape)
 
 

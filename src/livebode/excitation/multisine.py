@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, UsageError
 from livebode.excitation.low_crest import low_crest_phases
 
 Floats = NDArray[np.float64]
@@ -52,7 +52,7 @@ def multisine(
 
     Raises
     ------
-    InputError
+    UsageError
         If amplitudes or phases are not finite or are not as many as lines.
 
     Examples
@@ -79,16 +79,33 @@ def _named(phases: str, lines: Lines, amplitude: Floats, seed: int) -> Floats:
         return np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
     if phases == "low crest":
         return low_crest_phases(lines.bins, amplitude, seed=seed)
-    raise InputError(
-        f"{phases=} is not known; choose 'schroeder', 'random', 'low crest', or give radians for each line"
+    raise UsageError(
+        "not-one-of",
+        f"{phases=} is not known",
+        "choose 'schroeder', 'random', 'low crest', or give radians for each line",
+        argument="phases",
+        value=str(phases),
+        allowed=list(get_args(Phases)),
     )
 
 
 def each(value: ArrayLike, count: int, name: str) -> Floats:
-    """One finite number for each of `count` lines, shape (count,); InputError where they are not."""
+    """One finite number for each of `count` lines, shape (count,); UsageError where they are not."""
     given = np.asarray(value, dtype=np.float64)
     if given.shape not in ((), (count,)):
-        raise InputError(f"{name} has shape {given.shape} for {count} lines; give one number, or one for each line")
+        raise UsageError(
+            "wrong-shape",
+            f"{name} has shape {given.shape} for {count} lines",
+            "give one number, or one for each line",
+            argument=name,
+            shape=list(given.shape),
+            lines=count,
+        )
     if not np.all(np.isfinite(given)):
-        raise InputError(f"{name}={given[~np.isfinite(given)].flat[0]} is not finite; give finite numbers")
+        raise UsageError(
+            "not-finite",
+            f"{name}={given[~np.isfinite(given)].flat[0]} is not finite",
+            "give finite numbers",
+            argument=name,
+        )
     return np.broadcast_to(given, (count,))

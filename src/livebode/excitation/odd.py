@@ -8,7 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import GridError, Lines
+from livebode.core import GridError, Lines, UsageError
 from livebode.core.lines import WINDOW_MAX, check_window
 
 _GROUP_MIN = 2
@@ -58,13 +58,26 @@ def odd_lines(
     check_window(window, rate_hz)
     check_band(low_hz, high_hz, rate_hz)
     if group < _GROUP_MIN:
-        raise GridError(f"{group=} leaves every line quiet; choose {_GROUP_MIN} or more, such as 4")
+        raise UsageError(
+            "out-of-range",
+            f"{group=} excites no line",
+            f"choose {_GROUP_MIN} or more, such as 4",
+            argument="group",
+            value=group,
+            low=_GROUP_MIN,
+        )
     odd = odd_bins(low_hz, high_hz, rate_hz, window)
     odd = odd[~np.isin(odd, list(without))]
     if odd.size < group:
         raise GridError(
-            f"{low_hz:g} … {high_hz:g} Hz holds {odd.size} odd bins of the {rate_hz / window:g} Hz grid, less than one "
-            f"group of {group}; take {wider(high_hz - low_hz, 2 * group, window, rate_hz)}"
+            "band-too-narrow",
+            f"{low_hz:g} … {high_hz:g} Hz has {odd.size} odd bins of the {rate_hz / window:g} "
+            f"Hz grid, less than one group of {group}",
+            f"take {wider(high_hz - low_hz, 2 * group, window, rate_hz)}",
+            argument="band_hz",
+            low_hz=low_hz,
+            high_hz=high_hz,
+            resolution_hz=rate_hz / window,
         )
     generator, ends = np.random.default_rng(seed), odd[[0, -1]].tolist()
     groups = [odd[i : i + group] for i in range(0, odd.size - group + 1, group)]
@@ -89,12 +102,21 @@ def check_band(low_hz: float, high_hz: float, rate_hz: float) -> None:
     """GridError where a band is none, or leaves what the rate can carry."""
     if not 0 < low_hz <= high_hz:
         raise GridError(
-            f"the band {low_hz:g} … {high_hz:g} Hz is none; give two frequencies above 0, the lower one first"
+            "band-invalid",
+            f"{low_hz:g} … {high_hz:g} Hz is not a band",
+            "give two frequencies above 0, the lower one first",
+            argument="band_hz",
+            low_hz=low_hz,
+            high_hz=high_hz,
         )
     if not high_hz < rate_hz / 2:
         raise GridError(
-            f"the band ends at {high_hz:g} Hz, not below the Nyquist frequency {rate_hz / 2:g} Hz of {rate_hz:g} Hz; "
-            f"end it at {0.45 * rate_hz:g} Hz, or sample at {2.5 * high_hz:g} Hz"
+            "above-nyquist",
+            f"the band ends at {high_hz:g} Hz, not below the Nyquist frequency {rate_hz / 2:g} Hz of {rate_hz:g} Hz",
+            f"end it at {0.45 * rate_hz:g} Hz, or sample at {2.5 * high_hz:g} Hz",
+            argument="band_hz",
+            high_hz=high_hz,
+            rate_hz=rate_hz,
         )
 
 

@@ -7,7 +7,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import SignalError
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.evidence import log_chance
 from livebode.excitation.extent import extent
@@ -48,11 +48,16 @@ def find_period(x: Floats) -> tuple[int, int, int]:
 
     Raises
     ------
-    InputError
+    SignalError
         If nothing repeats, or what repeats is there less than twice.
     """
     if x.size < 2 * LAG_MIN:
-        raise InputError(f"{x.size} samples are too few to hold two periods; record at least two")
+        raise SignalError(
+            "too-short",
+            f"{x.size} samples are too few for two periods",
+            "record at least two periods",
+            samples=int(x.size),
+        )
     calm = clipped(x)
     calm -= calm.mean()
     period = _fundamental_of(calm)
@@ -66,7 +71,7 @@ def _fundamental_of(calm: Floats) -> int:
         middle = calm[calm.size // 2 - _PART // 2 :][:_PART]
         try:
             return _sharpened(calm, _fundamental_of(middle), 1)
-        except InputError:
+        except SignalError:
             pass
     flat, peaks = whitened(calm)
     d = difference(calm)
@@ -82,15 +87,20 @@ def _fundamental_of(calm: Floats) -> int:
         start, stop = extent(view, period)
         fundamental = _fundamental(view[start:stop], period, (d, standing_out))
     if short := _too_short(flat, d, fundamental):
-        raise InputError(short)
+        raise short
     repeats = min(d[fundamental], standing_out[fundamental]) <= _DIFFERENT_MAX
     if fundamental and repeats and _steady_at_lines(view[start:stop], fundamental):
         return fundamental
     half = calm.size // 2
-    raise InputError(
-        f"the excitation does not repeat within {half} samples, half of the recording (the best lag, {period} "
-        f"samples, leaves {min(100, 100 * max(d[period], 0)):.0f} % of its power different); record at least two whole "
-        "periods of a multisine, PRBS, square wave or repeated chirp, or use an estimator for noise and single chirps"
+    raise SignalError(
+        "not-periodic",
+        f"the excitation does not repeat within {half} samples, half of the recording "
+        f"(the best lag, {period} samples, leaves {min(100, 100 * max(d[period], 0)):.0f} "
+        "% of its power different)",
+        "record at least two whole periods of a multisine, PRBS, square wave or "
+        "repeated chirp, or use an estimator for noise and single chirps",
+        samples=int(calm.size),
+        best_lag=period,
     )
 
 
@@ -159,23 +169,27 @@ def _steady_at_lines(view: Floats, period: int) -> bool:
     return bool(change[lines].sum() - count * noise <= _LEFT_OVER_MAX * power + chance)
 
 
-def _too_short(flat: Floats, d: Floats, period: int) -> str:
-    """The sentence for a recording that repeats after more than its half, better than with the period; or empty."""
+def _too_short(flat: Floats, d: Floats, period: int) -> SignalError | None:
+    """For a recording that repeats after more than its half, better than with the period; else None."""
     half, longest = flat.size // 2, flat.size - max(flat.size // 10, LAG_MIN)  # a tenth must come back, or it is chance
     if longest <= half + 1:
-        return ""
+        return None
     lag = half + 1 + int(np.argmin(d[half + 1 : longest]))
     rest = flat.size - lag
     # As far below the best shorter lag as noise in the shorter overlap cannot take it: F with (rest, rest) degrees.
     if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(rest)) > (d[period] if period else 1.0) or d[lag] > 0.5:
-        return ""
+        return None
     # A multiple of the period, each counted half a sample wrong, is no news.
     if period and abs(lag - period * round(lag / period)) <= min(1 + lag // (2 * period), period // 4):
-        return ""
+        return None
     pair = np.concatenate((flat[:rest], flat[lag:]))
     if log_chance(pair, rest) + np.log(flat.size) > np.log(FALSE_ALARM):
-        return ""
-    return (
-        f"the excitation seems to repeat after {lag} samples, but the recording holds only "
-        f"{flat.size / lag:.2f} periods ({flat.size} samples); record at least two"
+        return None
+    return SignalError(
+        "too-short",
+        f"the excitation seems to repeat after {lag} samples, but the recording has only "
+        f"{flat.size / lag:.2f} periods ({flat.size} samples)",
+        "record at least two periods",
+        samples=int(flat.size),
+        period=lag,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
 
     Raises
     ------
-    InputError
+    UsageError
         If the order is not from 2 to 20 or the hold is below 1.
 
     Examples
@@ -38,7 +38,14 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
     """
     check_order(order)
     if held_ticks < 1:
-        raise InputError(f"{held_ticks=} is below 1; a bit stands for at least one tick")
+        raise UsageError(
+            "out-of-range",
+            f"{held_ticks=} is below 1",
+            "let a bit last at least one tick",
+            argument="held_ticks",
+            value=held_ticks,
+            low=1,
+        )
     # a(n + order) = a(n) ⊕ Σ a(n + tap)
     count = 2**order - 1
     bits = np.ones(count, dtype=np.int8)
@@ -52,11 +59,17 @@ def prbs(order: int, amplitude: float = 1.0, *, held_ticks: int = 1) -> Floats:
 
 
 def check_order(order: int) -> None:
-    """InputError for an order that no register here has."""
+    """UsageError for an order that no register here has."""
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or not ORDER_MIN <= order <= ORDER_MAX:
         number = float(order) if isinstance(order, (int, float)) else ORDER_MIN
         near = int(np.clip(np.nan_to_num(np.floor(number)), ORDER_MIN, ORDER_MAX))
-        raise InputError(
-            f"the {order=} of a PRBS is not a whole number from {ORDER_MIN} to {ORDER_MAX}; the nearest is {near}, "
-            f"with a period of {2**near - 1} bits"
+        raise UsageError(
+            "out-of-range",
+            f"the {order=} of a PRBS is not a whole number from {ORDER_MIN} to {ORDER_MAX}",
+            f"take {near}, the nearest, with a period of {2**near - 1} bits",
+            argument="order",
+            value=order,
+            nearest=near,
+            low=ORDER_MIN,
+            high=ORDER_MAX,
         )

@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import SignalError, UsageError
 
 Floats = NDArray[np.float64]
 
@@ -30,31 +30,54 @@ def checked(samples: ArrayLike, name: str) -> Floats:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If it is not one-dimensional, empty, without a finite sample, or constant.
     """
     try:
         x = np.array(samples, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"the {name} cannot be read as numbers; give one number for each sample") from None
+        raise UsageError(
+            "unreadable", f"the {name} cannot be read as numbers", "give one number for each sample", argument=name
+        ) from None
     if x.ndim != 1:
-        raise InputError(f"the {name} has shape {x.shape}; give one channel, shape (samples,)")
+        raise UsageError(
+            "wrong-shape",
+            f"the {name} has shape {x.shape}",
+            "give one channel, shape (samples,)",
+            argument=name,
+            shape=list(x.shape),
+        )
     if not x.size:
-        raise InputError(f"the {name} is empty; record at least two periods")
+        raise SignalError("empty", f"the {name} is empty", "record at least two periods", role=name)
     x[~np.isfinite(x)] = np.nan
     known = x[np.isfinite(x)]
     if not known.size:
-        raise InputError(f"the {name} has no finite sample among {x.size}; choose another channel")
+        raise SignalError(
+            "channel-empty",
+            f"the {name} has no finite sample among {x.size}",
+            "choose another channel",
+            role=name,
+            samples=int(x.size),
+        )
     if np.ptp(known) == 0:
-        raise InputError(
-            f"the {name} is constant at {known[0]:g}; choose the channel that carries the excitation (what a recording "
-            "without excitation shows of hum: livebode inspect --lines)"
+        raise SignalError(
+            "channel-constant",
+            f"the {name} is constant at {known[0]:g}",
+            "choose the channel that carries the excitation; for hum in a recording "
+            "without excitation, inspect it with lines",
+            role=name,
+            value=float(known[0]),
         )
     # A time column is a ramp but for rounding, and rounding repeats.
     n = np.flatnonzero(np.isfinite(x))
     rest = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))
     if np.ptp(rest) <= _STRAIGHT * np.max(np.abs(known)):
-        raise InputError(f"the {name} is a straight line; choose the channel that carries the excitation")
+        raise SignalError(
+            "no-excitation",
+            f"the {name} is a straight line",
+            "choose the channel that carries the excitation",
+            role=name,
+        )
     return x
 
 

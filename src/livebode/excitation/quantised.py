@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import DesignError, UsageError
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ def quantised(period: Floats, step: float) -> Floats:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If the step is not positive, or so coarse that nothing but zero is left: the sentence has the smallest peak
         that would be left, and the largest step that would leave this one.
 
@@ -28,13 +28,23 @@ def quantised(period: Floats, step: float) -> Floats:
     array([ 0.3, -0.1,  0. ])
     """
     if not (np.isfinite(step) and step > 0):
-        raise InputError(f"the resolution {step:g} is not a finite number above 0; give the drive's step")
+        raise UsageError(
+            "out-of-range",
+            f"the resolution {step:g} is not a finite number above 0",
+            "give the drive's step",
+            argument="step",
+            value=step,
+        )
     counts = np.rint(period / step)
     if np.any(period) and not np.any(counts):
         peak = float(np.max(np.abs(period)))
-        raise InputError(
-            f"an excitation with a peak of {peak:g} is nothing in steps of {step:g}; raise its peak above "
-            f"{step / 2:g}, or take steps below {2 * peak:g}"
+        raise DesignError(
+            "rounded-away",
+            f"an excitation with a peak of {peak:g} is nothing in steps of {step:g}",
+            f"raise its peak above {step / 2:g}, or take steps below {2 * peak:g}",
+            peak=peak,
+            step=step,
+            step_max=2 * peak,
         )
     beyond = counts - period / step
     excess = round(float(np.sum(beyond)))

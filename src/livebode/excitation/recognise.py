@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Lines
+from livebode.core import Lines, SignalError, UsageError
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.crest import peak_and_rms
 from livebode.excitation.period import find_period
@@ -107,7 +107,7 @@ def recognise(
 
     Raises
     ------
-    InputError
+    LivebodeError
         If a channel is empty, constant, not finite or of the wrong length, nothing repeats, less than two periods were
         recorded, or no line stands out of the noise.
 
@@ -141,9 +141,12 @@ def recognise(
     steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
     found = find_lines(spectra(blocks[steady]), floor_db, gap_db)
     if not found.excited.any():
-        raise InputError(
-            f"no line of the period of {period} samples stands out of the noise of {len(blocks)} periods; record more "
-            "periods or raise the amplitude"
+        raise SignalError(
+            "no-line-above-noise",
+            f"no line of the period of {period} samples exceeds the noise of {len(blocks)} periods",
+            "record more periods, or raise the amplitude",
+            period=period,
+            periods=len(blocks),
         )
     peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
     ahead = leading(strange)
@@ -166,12 +169,25 @@ def recognise(
 def _checked_together(excitation: ArrayLike, rate_hz: float, output: ArrayLike | None) -> tuple[Floats, Floats | None]:
     given = checked(excitation, "excitation")
     if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"{rate_hz=} is not a positive number of samples per second")
+        raise UsageError(
+            "out-of-range",
+            f"{rate_hz=} is not a positive number of samples per second",
+            "give the samples per second",
+            argument="rate_hz",
+            value=rate_hz,
+        )
     if output is None:
         return given, None
     answer = checked(output, "output")
     if answer.size != given.size:
-        raise InputError(f"the output has {answer.size} samples and the excitation {given.size}; give the same stretch")
+        raise UsageError(
+            "wrong-shape",
+            f"the output has {answer.size} samples and the excitation {given.size}",
+            "give the same stretch of both",
+            argument="output",
+            samples=int(answer.size),
+            excitation_samples=int(given.size),
+        )
     return given, answer
 
 

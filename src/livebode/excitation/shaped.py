@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
 
     Raises
     ------
-    InputError
+    UsageError
         If a response is zero or not finite: no amplitude would make such a line clear.
 
     Examples
@@ -36,6 +36,12 @@ def equal_snr(response: ArrayLike, noise: ArrayLike = 1.0) -> Floats:
     size = np.abs(np.asarray(response, dtype=np.complex128))
     if not size.size or not np.all(np.isfinite(size) & (size > 0)):
         line = int(np.argmin(np.where(np.isfinite(size), size, 0.0))) if size.size else 0
-        raise InputError(f"the response at line {line} is zero or not finite; leave out that line")
+        raise UsageError(
+            "not-finite",
+            f"the response at line {line} is zero or not finite",
+            "leave out that line",
+            argument="response",
+            line=line,
+        )
     wanted = np.asarray(noise, dtype=np.float64) / size
     return np.asarray(wanted / np.sqrt(np.mean(wanted**2)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError, Lines, counted
+from livebode.core import GridError, Lines, UsageError, counted
 from livebode.core.lines import WINDOW_MAX
 from livebode.excitation.multisine import each, multisine
 
@@ -22,7 +22,7 @@ def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) 
 
     Raises
     ------
-    InputError
+    LivebodeError
         If `periods` is below 1, or the sequence is longer than the longest window.
 
     Examples
@@ -40,13 +40,24 @@ def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) 
 def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
     """The same frequencies on the grid of the whole sequence."""
     if periods < 1:
-        raise InputError(f"{periods=} is below 1; hold each line for at least one window")
+        raise UsageError(
+            "out-of-range",
+            f"{periods=} is below 1",
+            "let each line last at least one window",
+            argument="periods",
+            value=periods,
+            low=1,
+        )
     times = len(lines) * periods
     if times * lines.window > WINDOW_MAX:
         most = WINDOW_MAX // (lines.window * len(lines))
         fits = f"at most {counted(most, 'period')}" if most else f"{WINDOW_MAX // lines.window} lines or fewer"
-        raise InputError(
-            f"{counted(len(lines), 'step')} of {counted(periods, 'window')} of {lines.window} samples are longer than "
-            f"the longest window {WINDOW_MAX}; take {fits}"
+        raise GridError(
+            "window-too-long",
+            f"{counted(len(lines), 'step')} of {counted(periods, 'window')} of {lines.window} "
+            f"samples are longer than the longest window {WINDOW_MAX}",
+            f"take {fits}",
+            window=times * lines.window,
+            window_max=WINDOW_MAX,
         )
     return Lines(tuple(k * times for k in lines.bins), lines.window * times, lines.rate_hz)

@@ -8,7 +8,7 @@ from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
 from livebode.simulation.motion import Motion, Standstill, Strokes
 from livebode.simulation.settings import Drive, Friction, Limits, Sensor
-from livebode.simulation.source import DivergenceError, SimulatedAxis
+from livebode.simulation.source import SimulatedAxis
 from livebode.simulation.truth import Truth
 
 __all__ = [
@@ -17,7 +17,6 @@ __all__ = [
     "BeltResponse",
     "ClosedLoop",
     "DampingGrowth",
-    "DivergenceError",
     "Drive",
     "Fault",
     "FmuAxis",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import SimulationError, UsageError
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition, Fault, SoftSpot, condition_at
 from livebode.simulation.linear import StateSpace, linear
@@ -74,7 +74,7 @@ class BeltAxis:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If the motion leaves the limits, a rate does not divide, or the loop is unstable at an end or the middle of the
         motion's way, at a soft spot on it, or at any fault's beginning or end.
 
@@ -106,9 +106,14 @@ class BeltAxis:
         self._check_numbers()
         low, high = self.limits.stops_m
         if low <= 0 or high >= self.mechanics.pulley_distance_m:
-            raise InputError(
-                f"the stroke with its overrun goes from {low:g} to {high:g} m; it must lie between the pulleys, "
-                f"0 and pulley_distance_m={self.mechanics.pulley_distance_m}"
+            raise SimulationError(
+                "stroke-beyond-machine",
+                f"the stroke with its overrun goes from {low:g} to {high:g} m, which is "
+                f"not between the pulleys at 0 and pulley_distance_m={self.mechanics.pulley_distance_m}",
+                "shorten the stroke or the overrun",
+                low_m=low,
+                high_m=high,
+                pulley_distance_m=self.mechanics.pulley_distance_m,
             )
         self.motion.check(self.limits)
         self._check_faults()
@@ -116,36 +121,78 @@ class BeltAxis:
 
     def _check_numbers(self) -> None:
         if self.excitation_n_m.ndim != 1 or not np.all(np.isfinite(self.excitation_n_m)):
-            raise InputError(
-                f"excitation_n_m has shape {self.excitation_n_m.shape}; give one period of finite numbers, N m"
+            raise UsageError(
+                "wrong-shape",
+                f"excitation_n_m has shape {self.excitation_n_m.shape} or is not finite",
+                "give one period of finite numbers, N m",
+                argument="excitation_n_m",
+                shape=list(self.excitation_n_m.shape),
             )
         if isnan(self.seconds) or self.seconds <= 0:
-            raise InputError(f"seconds={self.seconds} is not above 0; leave it out for a run without end")
+            raise UsageError(
+                "out-of-range",
+                f"seconds={self.seconds} is not above 0",
+                "leave it out for a run without end",
+                argument="seconds",
+                value=self.seconds,
+            )
         nonnegative(self, "run_in_s")
         if self.run_in_s > RUN_IN_S_MAX:
-            raise InputError(f"run_in_s={self.run_in_s} is above {RUN_IN_S_MAX:g}; 10 s settle the loop of Table I")
+            raise UsageError(
+                "out-of-range",
+                f"run_in_s={self.run_in_s} is above {RUN_IN_S_MAX:g}",
+                "take less: 10 s settle the loop of Table I",
+                argument="run_in_s",
+                value=self.run_in_s,
+                high=RUN_IN_S_MAX,
+            )
         count(self, "seed", 1 << 63)
         if self.substeps is not None:
             count(self, "substeps", SUBSTEPS_MAX)
             if self.substeps < 1:
-                raise InputError(f"substeps={self.substeps} is not at least 1; leave it out to have them chosen")
+                raise UsageError(
+                    "out-of-range",
+                    f"substeps={self.substeps} is not at least 1",
+                    "leave it out to have them chosen",
+                    argument="substeps",
+                    value=self.substeps,
+                    low=1,
+                )
 
     def _check_faults(self) -> None:
         if len(self.spots) > SPOTS_MAX:
-            raise InputError(f"there are {len(self.spots)} soft spots; at most {SPOTS_MAX} are simulated")
+            raise UsageError(
+                "out-of-range",
+                f"there are {len(self.spots)} soft spots, more than {SPOTS_MAX}",
+                "leave some out",
+                argument="faults",
+                value=len(self.spots),
+                high=SPOTS_MAX,
+            )
         condition = self.condition(self._moments_s)
         for name in ("stiffness", "damping", "load_kg"):
             if (least := float(np.min(getattr(condition, name)))) <= 0:
-                raise InputError(f"the faults together bring {name} to {least:g}; it must stay above 0")
+                raise SimulationError(
+                    "parameters-impossible",
+                    f"the faults together bring {name} to {least:g}, which must remain above 0",
+                    "make them smaller",
+                    parameter=name,
+                    value=least,
+                )
 
     def _check_stability(self) -> None:
         for time_s in self._moments_s.tolist():
             for position_m in self._places_m:
                 radius = self.closed_loop(position_m, time_s).spectral_radius
                 if radius > 1 + _UNSTABLE:
-                    raise InputError(
-                        f"the closed loop is unstable with the cart at {position_m:g} m, {time_s:g} s: an eigenvalue "
-                        f"has size {radius:.6f}, above 1; lower the gains or the delay"
+                    raise SimulationError(
+                        "unstable",
+                        f"the closed loop is unstable with the cart at {position_m:g} m, {time_s:g} "
+                        f"s: an eigenvalue has size {radius:.6f}, above 1",
+                        "lower the gains or the delay",
+                        position_m=position_m,
+                        time_s=time_s,
+                        spectral_radius=radius,
                     )
 
     @property

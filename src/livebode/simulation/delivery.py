@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, InputError, missing_channel
+from livebode.core import Block, Channel, SignalError, UsageError, missing_channel
 
 CHANNELS = (
     Channel("w", "N m"),
@@ -22,10 +22,17 @@ BLOCK_SAMPLES_MAX = 1 << 24
 
 
 def checked_block_samples(block_samples: int) -> None:
-    """InputError unless it is a whole number from 1 to 2²⁴."""
+    """UsageError unless it is a whole number from 1 to 2²⁴."""
     whole = isinstance(block_samples, int) and not isinstance(block_samples, bool)
     if not (whole and 1 <= block_samples <= BLOCK_SAMPLES_MAX):
-        raise InputError(f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}")
+        raise UsageError(
+            "out-of-range",
+            f"{block_samples=} is not a whole number from 1 to {BLOCK_SAMPLES_MAX}",
+            "choose for example 4096",
+            argument="block_samples",
+            low=1,
+            high=BLOCK_SAMPLES_MAX,
+        )
 
 
 def excitation_at(period: NDArray[np.float64], number: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -44,7 +51,7 @@ def delivered(
     names = [channel.name for channel in CHANNELS]
     for name in channels or ():
         if name not in names:
-            raise InputError(missing_channel(name, names))
+            raise SignalError("channel-unknown", missing_channel(name, names), channel=name, channels=names)
     rows = [names.index(name) for name in (names if channels is None else channels)]
     labels = tuple(CHANNELS[i] for i in rows)
     chosen = (Block(block.data[rows], labels, block.rate_hz, start=block.start) for block in blocks)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.simulation.values import nonnegative, positive
 
 Floats = NDArray[np.float64]
@@ -165,7 +165,15 @@ class SoftSpot:
 
 def _share_below_1(loss: float) -> None:
     if not 0 <= loss < 1:
-        raise InputError(f"loss={loss} is not a share from 0 up to but without 1")
+        raise UsageError(
+            "out-of-range",
+            f"loss={loss} is not a fraction from 0 to below 1",
+            "choose a fraction, such as 0.1",
+            argument="loss",
+            value=loss,
+            low=0,
+            high=1,
+        )
 
 
 def condition_at(faults: tuple[Fault, ...], time_s: Floats, load_kg: float) -> Condition:

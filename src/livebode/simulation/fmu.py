@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, InputError, missing_channel
+from livebode.core import Block, Channel, ExtraError, SimulationError, UsageError, missing_channel
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
+from livebode.simulation.divergence import diverged
 from livebode.simulation.motion import Motion, Standstill
 from livebode.simulation.settings import Drive, Limits, Sensor
-from livebode.simulation.source import DivergenceError
 from livebode.simulation.twin import Controller, Now
 from livebode.simulation.values import positive
 
@@ -50,7 +50,7 @@ class FmuAxis:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If fmpy is missing, the file is no such FMU, a name is none of its variables, or the motion leaves its limits.
     """
 
@@ -72,12 +72,30 @@ class FmuAxis:
         object.__setattr__(self, "excitation_n_m", np.array(self.excitation_n_m, dtype=np.float64))
         positive(self, "radius_m")
         if not self.seconds > 0:
-            raise InputError(f"seconds={self.seconds} is not above 0; leave it out for a run without end")
+            raise UsageError(
+                "out-of-range",
+                f"seconds={self.seconds} is not above 0",
+                "leave it out for a run without end",
+                argument="seconds",
+                value=self.seconds,
+            )
         if self.excitation_n_m.ndim != 1 or not np.all(np.isfinite(self.excitation_n_m)):
-            raise InputError("excitation_n_m is not one period of finite numbers, N m")
+            raise UsageError(
+                "wrong-shape",
+                "excitation_n_m is not one period of finite numbers, N m",
+                "give one period, shape (samples,)",
+                argument="excitation_n_m",
+                shape=list(self.excitation_n_m.shape),
+            )
         for name in ("torque_ripple_n_m", "torque_noise_n_m"):
             if value := getattr(self.drive, name):
-                raise InputError(f"{name}={value}: an FMU brings its own disturbances; set it to 0")
+                raise UsageError(
+                    "conflict",
+                    f"{name}={value}, but an FMU has its own disturbances",
+                    "set it to 0",
+                    argument=name,
+                    value=value,
+                )
         self.motion.check(self.limits)
         self._references()
 
@@ -113,7 +131,9 @@ class FmuAxis:
         names = [self.torque, self.position, self.velocity, *([] if self.cart is None else [self.cart])]
         for name in names:
             if name not in known:
-                raise InputError(missing_channel(name, known))
+                raise UsageError(
+                    "unknown-name", missing_channel(name, known), value=name, allowed=list(known), path=str(self.path)
+                )
         return [known[name] for name in names]
 
     def _blocks(self, block_samples: int) -> Iterator[Block]:
@@ -147,7 +167,7 @@ class FmuAxis:
     ) -> tuple[float, float, float, float]:
         values = plant.read()
         if not all(isfinite(value) for value in values):
-            raise DivergenceError(number / self.rate_hz, values, "the FMU's outputs, of which one is not finite")
+            raise diverged(number / self.rate_hz, values, "an output of the FMU is not finite")
         now = Now._make([*given, *_NO_FAULT])
         torque, velocity, reading = controller.tick(values[0], values[1], now)
         plant.step(torque, number / self.rate_hz, 1 / self.rate_hz)
@@ -166,7 +186,13 @@ class _Instance:
             self._fmu = fmpy.simulation.instantiate_fmu(self._folder, description, "CoSimulation")
         except Exception as error:
             shutil.rmtree(self._folder, ignore_errors=True)
-            raise InputError(f"{path} cannot be started: {error}") from error
+            raise SimulationError(
+                "fmu-unusable",
+                f"{path} cannot be started: {error}",
+                "try it in another simulator",
+                path=str(path),
+                reason=str(error),
+            ) from error
         third = description.fmiVersion.startswith("3")
         self._set = self._fmu.setFloat64 if third else self._fmu.setReal
         self._get = self._fmu.getFloat64 if third else self._fmu.getReal
@@ -195,22 +221,45 @@ def _fmpy() -> Any:
         import fmpy
         import fmpy.simulation
     except ImportError as error:
-        raise InputError("FMUs need fmpy; install livebode with its extra: pip install 'livebode[fmu]'") from error
+        raise ExtraError(
+            "not-installed",
+            "FMUs need fmpy, which is not installed",
+            "pip install 'livebode[fmu]'",
+            extra="fmu",
+            package="fmpy",
+        ) from error
     return fmpy
 
 
 def _description(path: Path | str) -> Any:
-    """The model description of an FMU that can be simulated here; InputError otherwise."""
+    """The model description of an FMU that can be simulated here; SimulationError otherwise."""
     fmpy = _fmpy()
     try:
         description = fmpy.read_model_description(str(path))
         platforms = fmpy.supported_platforms(str(path))
     except Exception as error:
-        raise InputError(f"{path} is no FMU that can be read: {error}") from error
+        raise SimulationError(
+            "fmu-unusable",
+            f"{path} cannot be read as an FMU: {error}",
+            "export it again",
+            path=str(path),
+            reason=str(error),
+        ) from error
     if description.coSimulation is None or not description.fmiVersion.startswith(("2", "3")):
-        raise InputError(
-            f"{path} has FMI {description.fmiVersion} without co-simulation; export it for FMI 2 or 3 with it"
+        raise SimulationError(
+            "fmu-unusable",
+            f"{path} has FMI {description.fmiVersion} without co-simulation",
+            "export it for FMI 2 or 3 with co-simulation",
+            path=str(path),
+            fmi_version=description.fmiVersion,
         )
     if fmpy.platform not in platforms and fmpy.platform_tuple not in platforms:
-        raise InputError(f"{path} has binaries for {', '.join(platforms)}, not for {fmpy.platform}; export it for here")
+        raise SimulationError(
+            "fmu-unusable",
+            f"{path} has binaries for {', '.join(platforms)}, not for {fmpy.platform}",
+            "export it for this platform",
+            path=str(path),
+            platforms=list(platforms),
+            platform=fmpy.platform,
+        )
     return description

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import InputError
+from livebode.core import SimulationError, UsageError
 from livebode.simulation.values import nonnegative, positive
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Mechanics:
 
     Raises
     ------
-    InputError
+    LivebodeError
         If a constant is not positive, or the position is not between the pulleys.
 
     Examples
@@ -75,20 +75,46 @@ class Mechanics:
 
     def __post_init__(self) -> None:
         if self.masses not in (2, 3):
-            raise InputError(f"masses={self.masses} is not known; choose 2 or 3")
+            raise UsageError(
+                "not-one-of",
+                f"masses={self.masses} is not known",
+                "choose 2 or 3",
+                argument="masses",
+                value=self.masses,
+                allowed=[2, 3],
+            )
         positive(self, "inertia_kg_m2", "pulley_inertia_kg_m2", "load_kg", "radius_m", "pulley_distance_m")
         positive(self, "stiffness_n_per_m")
         nonnegative(self, "damping_n_s_per_m", "eccentricity")
         if self.eccentricity >= 1:
-            raise InputError(f"eccentricity={self.eccentricity} is not below 1; 0.01 is a pulley out of centre by 1 %")
+            raise UsageError(
+                "out-of-range",
+                f"eccentricity={self.eccentricity} is not below 1",
+                "give a fraction, such as 0.01 for a pulley out of centre by 1 %",
+                argument="eccentricity",
+                value=self.eccentricity,
+                high=1,
+            )
         for name in ("nominal_position_m", "frozen_position_m"):
             at = getattr(self, name)
             if at is not None and not 0 < at < self.pulley_distance_m:
-                raise InputError(f"{name}={at} is not between the pulleys; choose from 0 to {self.pulley_distance_m} m")
+                raise UsageError(
+                    "out-of-range",
+                    f"{name}={at} is not between the pulleys",
+                    f"choose from 0 to {self.pulley_distance_m} m",
+                    argument=name,
+                    value=at,
+                    low=0,
+                    high=self.pulley_distance_m,
+                )
         if not 2 * self.pulley_inertia_kg_m2 < self.inertia_kg_m2:
-            raise InputError(
-                f"two pulleys of pulley_inertia_kg_m2={self.pulley_inertia_kg_m2} leave nothing of "
-                f"inertia_kg_m2={self.inertia_kg_m2} for the motor; choose less than half of it"
+            raise SimulationError(
+                "parameters-impossible",
+                f"two pulleys of pulley_inertia_kg_m2={self.pulley_inertia_kg_m2} leave "
+                f"nothing of inertia_kg_m2={self.inertia_kg_m2} for the motor",
+                "choose less than half of it",
+                parameter="pulley_inertia_kg_m2",
+                value=self.pulley_inertia_kg_m2,
             )
 
     @property

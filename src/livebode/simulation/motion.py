@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.simulation.settings import Limits
 from livebode.simulation.values import nonnegative, positive
 
@@ -25,7 +25,7 @@ class Motion(Protocol):
         ...
 
     def check(self, limits: Limits) -> None:
-        """InputError where it leaves the limits."""
+        """UsageError where it leaves the limits."""
         ...
 
 
@@ -64,7 +64,7 @@ class Strokes:
 
     Raises
     ------
-    InputError
+    UsageError
         If a value is not positive, or both ends are the same.
 
     Examples
@@ -86,9 +86,21 @@ class Strokes:
         positive(self, "start_m", "end_m", "speed_m_per_s", "acceleration_m_per_s2")
         nonnegative(self, "dwell_s")
         if isnan(self.jerk_m_per_s3) or self.jerk_m_per_s3 <= 0:
-            raise InputError(f"jerk_m_per_s3={self.jerk_m_per_s3} is not above 0; leave it out for trapezoids")
+            raise UsageError(
+                "out-of-range",
+                f"jerk_m_per_s3={self.jerk_m_per_s3} is not above 0",
+                "leave it out for trapezoids",
+                argument="jerk_m_per_s3",
+                value=self.jerk_m_per_s3,
+            )
         if self.start_m == self.end_m:
-            raise InputError(f"start_m and end_m are both {self.start_m}; take Standstill to hold the cart")
+            raise UsageError(
+                "conflict",
+                f"start_m and end_m are both {self.start_m}",
+                "take Standstill to hold the cart",
+                argument="end_m",
+                value=self.start_m,
+            )
 
     @cached_property
     def _stroke(self) -> _Stroke:
@@ -108,13 +120,26 @@ class Strokes:
         for name in ("speed_m_per_s", "acceleration_m_per_s2"):
             value, most = getattr(self, name), getattr(limits, f"{name}_max")
             if value > most:
-                raise InputError(f"{name}={value} is above the limit {name}_max={most}; choose at most that")
+                raise UsageError(
+                    "out-of-range",
+                    f"{name}={value} is above the limit {name}_max={most}",
+                    "choose at most that",
+                    argument=name,
+                    value=value,
+                    high=most,
+                )
 
 
 def within(name: str, position_m: float, limits: Limits) -> None:
     if not limits.position_m_min <= position_m <= limits.position_m_max:
-        raise InputError(
-            f"{name}={position_m} leaves the stroke; choose from {limits.position_m_min} to {limits.position_m_max} m"
+        raise UsageError(
+            "out-of-range",
+            f"{name}={position_m} is outside the stroke",
+            f"choose from {limits.position_m_min} to {limits.position_m_max} m",
+            argument=name,
+            value=position_m,
+            low=limits.position_m_min,
+            high=limits.position_m_max,
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan, pi
 
-from livebode.core import PID, Cascade, InputError, Loop
+from livebode.core import PID, Cascade, Loop, UsageError
 from livebode.simulation.values import count, nonnegative, positive
 
 DELAY_TICKS_MAX = 64
@@ -85,7 +85,13 @@ class Drive:
         nonnegative(self, "torque_noise_n_m")
         count(self, "delay_ticks", DELAY_TICKS_MAX)
         if isnan(self.torque_n_m_max) or self.torque_n_m_max <= 0:
-            raise InputError(f"torque_n_m_max={self.torque_n_m_max} is not above 0; leave it out for no limit")
+            raise UsageError(
+                "out-of-range",
+                f"torque_n_m_max={self.torque_n_m_max} is not above 0",
+                "leave it out for no limit",
+                argument="torque_n_m_max",
+                value=self.torque_n_m_max,
+            )
         _divides("velocity_rate_hz", self.velocity_rate_hz, "rate_hz", self.rate_hz)
         _divides("position_rate_hz", self.position_rate_hz, "velocity_rate_hz", self.velocity_rate_hz)
 
@@ -122,7 +128,14 @@ def _divides(slow_name: str, slow_hz: float, fast_name: str, fast_hz: float) -> 
     ratio = round(fast_hz / slow_hz)
     if ratio < 1 or abs(fast_hz / slow_hz - ratio) > 1e-9 * ratio:
         near = ", ".join(f"{fast_hz / n:g}" for n in sorted({max(ratio, 1), ratio + 1}))
-        raise InputError(f"{slow_name}={slow_hz:g} does not divide {fast_name}={fast_hz:g}; choose for example {near}")
+        raise UsageError(
+            "conflict",
+            f"{slow_name}={slow_hz:g} does not divide {fast_name}={fast_hz:g}",
+            f"choose for example {near}",
+            argument=slow_name,
+            value=slow_hz,
+            rate_hz=fast_hz,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,8 +183,13 @@ class Limits:
         positive(self, "position_m_min", "position_m_max", "speed_m_per_s_max", "acceleration_m_per_s2_max")
         nonnegative(self, "overrun_m")
         if not self.position_m_min < self.position_m_max:
-            raise InputError(
-                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}; swap them"
+            raise UsageError(
+                "out-of-range",
+                f"position_m_min={self.position_m_min} is not below position_m_max={self.position_m_max}",
+                "swap them",
+                argument="position_m_min",
+                value=self.position_m_min,
+                position_m_max=self.position_m_max,
             )
 
     @property

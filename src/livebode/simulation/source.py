@@ -10,23 +10,15 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, InputError
+from livebode.core import Block, Channel, UsageError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
+from livebode.simulation.divergence import diverged
 from livebode.simulation.faults import Condition
 from livebode.simulation.truth import Truth
 
 Floats = NDArray[np.float64]
-
-
-class DivergenceError(ArithmeticError):
-    """The simulated machine left what can be: the time and the state stand in the message and as attributes."""
-
-    def __init__(self, time_s: float, state: Sequence[float], why: str) -> None:
-        self.time_s, self.state = time_s, tuple(state)
-        numbers = ", ".join(f"{value:.6g}" for value in self.state)
-        super().__init__(f"the simulation stopped at {time_s:.6f} s with the state ({numbers}): {why}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +66,7 @@ class SimulatedAxis:
 
         Raises
         ------
-        InputError
+        UsageError
             At once for a missing channel or a block size that is no whole number of at least 1.
         DivergenceError
             While iterating, when the state is not finite or the cart leaves its limits.
@@ -87,9 +79,14 @@ class SimulatedAxis:
         return self._pairs(block_samples)
 
     def run(self) -> tuple[Block, Truth]:
-        """The whole run as one Block, with its truth; InputError for one without end."""
+        """The whole run as one Block, with its truth; UsageError for one without end."""
         if self.samples is None:
-            raise InputError("seconds=inf: a run without end does not fit into one block; give seconds, or take blocks")
+            raise UsageError(
+                "out-of-range",
+                "seconds=inf: a run without end does not fit into one block",
+                "give seconds, or take blocks",
+                argument="seconds",
+            )
         return next(self.pairs(max(1, self.samples)))
 
     def _pairs(self, block_samples: int) -> Iterator[tuple[Block, Truth]]:
@@ -141,11 +138,8 @@ class SimulatedAxis:
         done = engine.advance(inputs, output)
         if done < ticks:
             low, high = self.axis.limits.stops_m
-            why = (
-                "angle and speed of each pulley, position and speed of the cart, "
-                f"of which one is not finite or the cart is outside {low:g} … {high:g} m"
-            )
-            raise DivergenceError((start + done) / self.rate_hz, engine.plant, why)
+            why = f"the state is not finite, or the cart is outside {low:g} … {high:g} m"
+            raise diverged((start + done) / self.rate_hz, engine.plant, why)
         return output
 
 

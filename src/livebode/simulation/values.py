@@ -4,27 +4,47 @@ from __future__ import annotations
 
 from math import isfinite
 
-from livebode.core import InputError
+from livebode.core import UsageError
 
 
 def positive(owner: object, *names: str) -> None:
-    """InputError unless each of these attributes is finite and above 0."""
+    """UsageError unless each of these attributes is finite and above 0."""
     for name in names:
         value = getattr(owner, name)
         if not (isfinite(value) and value > 0):
-            raise InputError(f"{name}={value} is not a finite number above 0")
+            raise UsageError(
+                "out-of-range",
+                f"{name}={value} is not a finite number above 0",
+                "choose a number above 0",
+                argument=name,
+                value=value,
+            )
 
 
 def nonnegative(owner: object, *names: str) -> None:
-    """InputError unless each of these attributes is finite and not below 0."""
+    """UsageError unless each of these attributes is finite and not below 0."""
     for name in names:
         value = getattr(owner, name)
         if not (isfinite(value) and value >= 0):
-            raise InputError(f"{name}={value} is not a finite number of at least 0")
+            raise UsageError(
+                "out-of-range",
+                f"{name}={value} is not a finite number of at least 0",
+                "choose 0 or a number above it",
+                argument=name,
+                value=value,
+            )
 
 
 def count(owner: object, name: str, most: int) -> None:
-    """InputError unless the attribute is a whole number from 0 to `most`."""
+    """UsageError unless the attribute is a whole number from 0 to `most`."""
     value = getattr(owner, name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-        raise InputError(f"{name}={value} is not a whole number from 0 to {most}")
+        raise UsageError(
+            "out-of-range",
+            f"{name}={value} is not a whole number from 0 to {most}",
+            f"choose a whole number from 0 to {most}",
+            argument=name,
+            value=value,
+            low=0,
+            high=most,
+        )

@@ -20,8 +20,6 @@ from livebode.core.errors.simulation import SimulationError
 from livebode.core.errors.source import SourceError
 from livebode.core.errors.usage import UsageError
 
-InputError = LivebodeError  # TRANSITION: until every raise has its code
-
 __all__ = [
     "BaselineError",
     "ConfigError",
@@ -30,7 +28,6 @@ __all__ = [
     "ExtraError",
     "FitError",
     "GridError",
-    "InputError",
     "LivebodeError",
     "OutputError",
     "RecordError",

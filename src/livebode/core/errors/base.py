@@ -44,9 +44,7 @@ class LivebodeError(ValueError):
     area: ClassVar[str] = ""
     codes: ClassVar[Mapping[str, str]] = {}
 
-    def __init__(self, code: str, message: str | None = None, remedy: str = "", **facts: object) -> None:
-        if message is None:  # TRANSITION: a raise that has no code yet
-            code, message = "uncoded", code
+    def __init__(self, code: str, message: str, remedy: str = "", **facts: object) -> None:
         super().__init__(code, message, remedy)
         self.code = f"{self.area}.{code}"
         self.message, self.remedy = message, remedy

@@ -12,4 +12,14 @@ class DesignError(LivebodeError):
     """An excitation or experiment that meets the specification and the limits cannot be made."""
 
     area: ClassVar[str] = "design"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "amplitude-undetermined": "No amplitude can be chosen, as neither noise nor limits are known.",
+        "crest-factor-not-reached": "No excitation with such a low crest factor was found.",
+        "feedback-unknown": "The feedback of the loop is needed and not described.",
+        "limit-exceeded": "The excitation would exceed a limit of the machine.",
+        "line-without-power": "The excitation has no power at one of its lines.",
+        "motion-unknown": "A quantity has a limit, but its range in the motion alone is not given.",
+        "name-forbidden": "The name is not allowed in the language or format of the file.",
+        "no-room-in-motion": "The motion alone exceeds a limit, or leaves no room for an excitation.",
+        "rounded-away": "Rounding to the steps of the drive changes the excitation too much.",
+    }

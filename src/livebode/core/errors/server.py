@@ -12,4 +12,15 @@ class ServerError(LivebodeError):
     """The dashboard cannot be served or reached."""
 
     area: ClassVar[str] = "server"
-    codes: ClassVar[Mapping[str, str]] = {}
+    codes: ClassVar[Mapping[str, str]] = {
+        "busy": "Too many requests wait already.",
+        "cannot-listen": "The operating system does not let the dashboard listen at this address.",
+        "event-unknown": "An event with this key does not exist.",
+        "not-begun": "The run has no samples or responses yet.",
+        "not-started": "The dashboard did not start in time.",
+        "port-taken": "Another program listens at this port.",
+        "quantity-unavailable": "The quantity cannot be computed from what the run knows.",
+        "request-malformed": "A request or message of a browser is not what the dashboard takes.",
+        "run-ended": "The run has ended, so its record cannot be changed.",
+        "too-many-tries": "Wrong tokens came too often from this address.",
+    }

@@ -14,5 +14,9 @@ class SimulationError(LivebodeError):
     area: ClassVar[str] = "simulation"
     codes: ClassVar[Mapping[str, str]] = {
         "diverged": "The simulated machine does not stay finite.",
+        "fmu-unusable": "The FMU cannot be read, started, or simulated on this computer.",
         "loop-unsupported": "A loop of this form cannot be simulated.",
+        "parameters-impossible": "No machine has these parameters together.",
+        "stroke-beyond-machine": "The stroke with its overrun reaches beyond the pulleys.",
+        "unstable": "The closed loop is unstable.",
     }

@@ -19,6 +19,7 @@ class UsageError(LivebodeError):
         "missing": "A required argument is missing or empty.",
         "not-finite": "An argument has a value that is not a finite number.",
         "not-one-of": "An argument is not one of the allowed values.",
+        "options": "The options of a command cannot be used as given.",
         "out-of-range": "The value is outside the range of the argument.",
         "query-rejected": "The database rejects the SQL of a query.",
         "too-large": "What the arguments ask for needs more memory than there is.",

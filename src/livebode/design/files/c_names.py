@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from livebode.core import InputError
+from livebode.core import DesignError
 
 LETTERS_MAX = {"C": 63, "MATLAB": 31}  # that C99 tells apart; that a MATLAB v5 file holds of a struct's name
 _C = """
@@ -29,7 +29,7 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
 
     Raises
     ------
-    InputError
+    DesignError
         If it does not; the sentence has the nearest one that it takes.
 
     >>> identifier("w_1")
@@ -37,18 +37,19 @@ def identifier(name: str, language: Literal["C", "MATLAB"] = "C") -> str:
     >>> identifier("double")
     Traceback (most recent call last):
     ...
-    livebode.core.errors.base.LivebodeError: the name 'double' is a keyword or macro of C or C++; ...
+    livebode.DesignError: the name 'double' is a keyword or macro of C or C++; ...
     """
     most = LETTERS_MAX[language]
     if name in KEYWORDS[language]:
         whose = "keyword or macro of C or C++" if language == "C" else f"keyword of {language}"
-        raise InputError(f"the name {name!r} is a {whose}; take for example {f'{name}_w'!r}")
-    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
+        why, nearest = f"is a {whose}", f"{name}_w"
+    elif re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and "__" not in name and len(name) <= most:
         return name
-    raise InputError(
-        f"the name {name!r} is none in {language} (letters, digits and single underscores, a letter first, at most "
-        f"{most}); take for example {_nearest(name, most, KEYWORDS[language])!r}"
-    )
+    else:
+        why = f"is not valid in {language} (letters, digits and single underscores, a letter first, at most {most})"
+        nearest = _nearest(name, most, KEYWORDS[language])
+    facts = {"argument": "name", "name": name, "language": language, "nearest": nearest}
+    raise DesignError("name-forbidden", f"the name {name!r} {why}", f"take for example {nearest!r}", **facts)
 
 
 def _nearest(name: str, most: int, keywords: frozenset[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import DesignError
 from livebode.design.files.facts import as_lines, facts
 from livebode.design.waveform import Waveform
 
@@ -15,7 +15,13 @@ def write_csv(path: Path, waveform: Waveform, name: str) -> None:
     ``open_log`` reads it back as a recording.
     """
     if not name.isprintable() or not name.strip() or set(name) & set(',;"\t[]#%'):
-        raise InputError(f"{name=} cannot head a column of a CSV file; choose letters, digits and underscores")
+        raise DesignError(
+            "name-forbidden",
+            f"{name=} cannot head a column of a CSV file",
+            "choose letters, digits and underscores",
+            argument="name",
+            name=name,
+        )
     head = [f"# {line}" for line in as_lines(facts(waveform))]
     rate_hz = waveform.lines.rate_hz
     rows = (f"{n / rate_hz!r},{value!r}" for n, value in enumerate(waveform.samples.tolist()))

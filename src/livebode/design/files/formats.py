@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 
-from livebode.core import InputError
+from livebode.core import UsageError
 from livebode.design.files.arrays import write_mat, write_npz
 from livebode.design.files.c_header import write_c_header
 from livebode.design.files.delimited import write_csv
@@ -28,10 +28,19 @@ def write(path: str | PathLike[str], waveform: Waveform, name: str = "excitation
 
     Raises
     ------
-    InputError
-        If the suffix is not known, or the format forbids the name.
+    UsageError
+        If the suffix is not known.
+    DesignError
+        If the format forbids the name.
     """
     place = Path(path)
     if place.suffix not in FORMATS:
-        raise InputError(f"{place.name!r} has no suffix that is known; choose {', '.join(FORMATS)}")
+        raise UsageError(
+            "not-one-of",
+            f"{place.name!r} does not end in a known suffix",
+            f"choose {', '.join(FORMATS)}",
+            argument="out",
+            value=place.suffix,
+            allowed=list(FORMATS),
+        )
     FORMATS[place.suffix](place, waveform, name)

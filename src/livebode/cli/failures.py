@@ -1,0 +1,110 @@
+"""How a command that fails reports it: as a sentence, or with --json as an object."""
+
+from __future__ import annotations
+
+import errno
+import sys
+import traceback
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from livebode.core import LivebodeError, OutputError, UsageError
+
+_OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
+_UNITS = frozenset({"hz", "s", "n", "m", "db", "deg", "rad"})
+_FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What a person reads, what a program reads, and the exit code of the process."""
+
+    text: str
+    error: dict[str, Any]
+    exit_code: int
+
+
+def disk_full(error: Exception) -> bool:
+    """Whether there is no more room for the output."""
+    return isinstance(error, OSError) and error.errno in _FULL_DISK
+
+
+def json_wanted() -> bool:
+    """Whether the command line has --json, also where it cannot be parsed."""
+    return "--json" in sys.argv[1:]
+
+
+def failure_of(error: Exception) -> Failure:
+    """How to report what stopped a command."""
+    known = _known(error)
+    if known is None:
+        lines = "".join(traceback.format_exception(error))
+        message, remedy = "internal error in livebode", "please report it with the lines above"
+        return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), 1)
+    options = [option for option in known.facts.get("options", ()) if option not in str(known)]
+    named = f" (option{'s' * (len(options) > 1)} {', '.join(options)})" if options else ""
+    return Failure(f"livebode: {known}{named}", _written(known), 2)
+
+
+def _written(error: LivebodeError) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in error.as_dict().items()}
+
+
+def _internal(error: Exception, lines: str) -> dict[str, Any]:
+    return {
+        "code": "internal",
+        "place": "",
+        "message": f"{type(error).__name__}: {error}",
+        "remedy": "please report it with the traceback",
+        "facts": {"traceback": lines},
+    }
+
+
+def name_options(error: LivebodeError, parameters: Iterable[Any]) -> None:
+    """Add the options of the command that the error's argument or key belongs to as its fact `options`."""
+    known = {
+        parameter.name.rstrip("_"): max(parameter.opts, key=len)
+        for parameter in parameters
+        if parameter.param_type_name == "option"
+    }
+    names = [error.facts.get("argument"), error.facts.get("key"), *_OPTIONS_BY_CODE.get(error.code, ())]
+    options = [option for name in names if name and (option := _option(str(name), known))]
+    if options:
+        error.facts.setdefault("options", options)
+
+
+def _option(name: str, known: Mapping[str, str]) -> str | None:
+    parts = name.rpartition(".")[2].split("_")
+    while parts[1:] and "_".join(parts) not in known and parts[-1] in _UNITS:
+        parts.pop()
+    return known.get("_".join(parts))
+
+
+def unparsed(error: Exception, command: str | None) -> UsageError:
+    """What Typer reports about the options, as an error with a code."""
+    message = getattr(error, "format_message", error.__str__)()
+    return UsageError("options", message.rstrip("."), f"see livebode {command} --help", command=command)
+
+
+def _known(error: Exception) -> LivebodeError | None:
+    if isinstance(error, LivebodeError):
+        return error
+    if isinstance(error, MemoryError):
+        return UsageError(
+            "too-large", "there is not enough memory", "take a shorter window, fewer lines or a longer hop"
+        )
+    if isinstance(error, OSError) and disk_full(error):
+        why = error.strerror
+        return OutputError("not-written", f"the output could not be written: {why}", "make room", reason=why)
+    return None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, str | int | float | None):
+        return value
+    return _plain(value.tolist()) if hasattr(value, "tolist") else str(value)
