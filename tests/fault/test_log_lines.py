@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import re
@@ -68,7 +69,7 @@ def test_a_file_alone_has_level_info_and_an_error_with_its_code(tmp_path: Path) 
     done = livebode("run", tmp_path / "missing.parquet", *ROLES, "--log-file", own)
     assert done.code == 2
     (error,) = [line for line in own.read_text().splitlines() if " ERROR " in line]
-    assert done.err.removeprefix("livebode: ").strip() in error
+    assert f" ERROR livebode.cli.run_command: {json.loads(done.err)['error']['code']}: " in error
 
 
 def test_the_log_goes_to_standard_error_without_a_file(tmp_path: Path) -> None:

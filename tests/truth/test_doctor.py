@@ -65,7 +65,7 @@ def axis(folder: Path, source: str, rest: str = REST) -> Path:
 
 
 def test_without_a_configuration_the_computer_is_examined(tmp_path: Path) -> None:
-    code, checks = doctor("--out", tmp_path / "runs")
+    code, checks = doctor("--runs", tmp_path / "runs")
     assert code == (2 if any(check["verdict"] == "failed" for check in checks.values()) else 0)
     for name in ("configuration", "run", "source"):
         assert checks[name]["verdict"] == "not applicable"

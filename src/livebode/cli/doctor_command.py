@@ -26,7 +26,7 @@ def doctor_command(
         Path | None,
         typer.Option(metavar="FILE.zip", help="Write what a report of a fault needs, without secrets."),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where runs are written: its disk is checked.")] = Path(
+    runs: Annotated[Path, typer.Option(metavar="DIR", help="Where runs are written: its disk is checked.")] = Path(
         "runs"
     ),
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier bundle.")] = False,
@@ -39,7 +39,7 @@ def doctor_command(
     from livebode.doctor import Subject, examine, worst, write_bundle  # with the dashboard and the simulation
 
     subject = Subject.of(targets or [])
-    checks = examine(subject, out)
+    checks = examine(subject, runs)
     verdict = worst(check.verdict for check in checks)
     files = None if bundle is None else write_bundle(bundle, subject, checks, force=force)
     if as_json:
