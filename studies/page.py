@@ -1,4 +1,4 @@
-"""docs/studies.md from the studies' numbers: no number on that page is typed by hand."""
+"""Writes docs/studies.md from the numbers of the studies: no number on that page is typed by hand."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from studies.result import Study
 
 HEAD = """# The studies: the paper's experiments, measured
 
-Written by `make studies`; each study alone by `python -m studies NAME`. Figures and numbers (JSON) lie in
+`make studies` writes this page; `python -m studies NAME` runs one study. Figures and numbers (JSON) are in
 `docs/images/studies/`. The axis is that of [axis.md](axis.md), the estimates are those of
 [estimators.md](estimators.md), and the paper is Nevaranta et al. 2016, whose equations are cited as (1) … (28).
-A target that is missed says SHORT, with the reason.
+Each target is marked **met** or **missed**; a missed target has a reason.
 """
 
 
