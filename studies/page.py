@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -27,10 +28,15 @@ def write_page(studies: Sequence[Study], folder: Path, page: Path) -> None:
 
 def _section(study: Study, numbers: dict[str, Any]) -> str:
     figure = f"![{study.title}](images/studies/{study.name}.png)"
-    verdicts = [f"- {_verdict(v)}" for v in numbers["verdicts"]]
+    verdicts = [_wrapped(f"- {_verdict(v)}", "  ") for v in numbers["verdicts"]]
     tables = [_table(t) for t in numbers["tables"]]
-    paper = f"**The paper:** {study.paper}"
+    paper = _wrapped(f"**The paper:** {study.paper}")
     return "\n".join([f"## {study.title}\n", figure + "\n", paper + "\n", *verdicts, "", *tables])
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    """Lines of at most 120 columns."""
+    return textwrap.fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _verdict(verdict: dict[str, Any]) -> str:
@@ -42,7 +48,7 @@ def _table(table: dict[str, Any]) -> str:
     head = "| " + " | ".join(table["header"]) + " |"
     rule = "|" + "---|" * len(table["header"])
     rows = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in table["rows"]]
-    return "\n".join([table["caption"] + ":\n", head, rule, *rows, ""])
+    return "\n".join([_wrapped(table["caption"] + ":") + "\n", head, rule, *rows, ""])
 
 
 def _cell(cell: Any) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from dataclasses import asdict
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def page(results: dict[Case, dict[str, Score]], seeds: int) -> str:
     parts.append(
         f"A minimal fit, which all methods except the EKF need in addition, takes {1e6 * fit_s:.0f} µs per response."
     )
-    parts.append(starts.sentence())
+    parts.append(textwrap.fill(starts.sentence(), 120, break_on_hyphens=False))
     for case in CASES[:2]:
         parts.append(
             f"### Targets: error in Keff, {case.name[0].lower()}{case.name[1:]}\n\n{table.targets(results[case])}"
