@@ -124,7 +124,7 @@ def _verdicts(cases: dict[str, list[Validation]], found: dict[str, dict[str, flo
         "fitted to another run",
     )
     why = "too few runs, or the limit is wrong"
-    wide = "the sigma of the tracker is too high near the resonance (estimators.md), and so is the widened limit"
+    wide = "the bounds of a fit also contain the choice of its model (fits.md), so the widened limit is too wide"
     fails = share("Keff 10 % wrong", "fails")
     return [
         Verdict(
