@@ -33,7 +33,7 @@ def examine(subject: Subject, directory: Path) -> list[Check]:
     return [
         check_configuration(subject),
         check_run(subject),
-        *check_sources(axes),
+        *check_sources(subject.sourced),
         check_extras(),
         check_instruction_set(),
         check_disk(directory, sum(budget or 0 for budget in budgets)),

@@ -23,7 +23,7 @@ _AT_ONCE = 16
 def check_sources(axes: Mapping[str, Axis]) -> list[Check]:
     """A check for each axis; a single one where there is none. At most a connection is opened, and closed again."""
     if not axes:
-        return [Check(NAME, "not applicable", "there is no valid configuration of an axis")]
+        return [Check(NAME, "not applicable", "there is no valid configuration of an axis that still runs")]
     with ThreadPoolExecutor(_AT_ONCE, "livebode doctor") as threads:
         return list(threads.map(_check, axes, [axis.source for axis in axes.values()]))
 

@@ -47,6 +47,12 @@ class Subject:
     run_path: Path | None = None
     problems: Mapping[str, LivebodeError] = field(default_factory=dict)
 
+    @property
+    def sourced(self) -> Mapping[str, Axis]:
+        """The axes whose sources are still needed: those of a finished run are not."""
+        ended = self.configuration is None and self.run is not None and self.run.finished
+        return {} if ended else self.axes
+
     @classmethod
     def of(cls, paths: Sequence[Path]) -> Subject:
         """From a TOML file, the directory of a run, both, or neither.
