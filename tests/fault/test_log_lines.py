@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.cli.log_output import LineFormatter, log_output
@@ -37,6 +37,7 @@ def test_a_program_that_asks_for_no_log_sees_none() -> None:
     assert done.stderr == ""
 
 
+@settings(max_examples=50, deadline=None)
 @given(st.text(), st.text(min_size=1), st.floats(0, 4e9))
 def test_a_record_is_one_printable_line_whatever_it_holds(message: str, fact: str, at_s: float) -> None:
     try:

@@ -13,7 +13,7 @@ from livebode.records.segments.disk import why
 from livebode.records.segments.limits import Limits
 
 NAME = "disk"
-FREE_BYTES_MIN = 1 << 30
+FREE_BYTES_MIN = 10**9
 """Below this much a warning is due."""
 SYNC_S_MAX = Limits.interval_s
 """A record is synced this often; a slower disk loses more at a power cut."""
