@@ -33,7 +33,7 @@ class FmuAxis:
 
     At every tick the FMU's angle and velocity are read, the controllers updated, the torque set, and one step of a
     tick computed. The FMU starts with its own start values, and the motion begins there. There is no truth, and
-    stability is not checked in advance; a value that is not finite stops the run with a DivergenceError.
+    stability is not checked in advance; a value that is not finite stops the run with a SimulationError ("diverged").
 
     Parameters
     ----------
