@@ -22,7 +22,7 @@ from livebode.kernel import SlidingDFT
         ({"bins": [1.5]}, "bin 1.5 is not an integer from 0 to 7, as window=8 has"),
         ({"bins": [1, 8]}, "bin 8 is not an integer from 0 to 7"),
         ({"bins": [-1]}, "bin -1 is not an integer from 0 to 7"),
-        ({"bins": [1, 2, 1]}, "bin 1 is given twice"),
+        ({"bins": [1, 2, 1]}, "bin 1 is duplicated"),
         ({"bins": [None]}, "bin None is not an integer"),
         ({"bins": [[1, 2]]}, "is not an integer"),
         ({"channels": 0}, "channels=0 is not an integer from 1 to 1024"),

@@ -84,7 +84,7 @@ def test_a_true_model_passes_in_the_loop(colour: float) -> None:
         # Without the excitation a verdict against the model says that it may be the noise.
         blind = judged(fitted(1e-6), loop(100, 0.02, colour)[0], excitation=None)
         assert blind.doubtful
-        assert "name the excitation" in blind.sentence or blind.verdict == "passes"
+        assert "specify the excitation" in blind.sentence or blind.verdict == "passes"
 
 
 def test_in_a_loop_lags_at_which_the_residual_comes_first_are_not_for_judging() -> None:
