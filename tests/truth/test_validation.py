@@ -142,7 +142,7 @@ def test_a_drift_that_rules_the_residual_neither_hides_a_wrong_machine_nor_makes
             if found.fit_percent <= 0:
                 assert found.verdict in ("fails", "cannot be judged")
             if found.verdict == "cannot be judged":
-                assert "excite" in found.sentence
+                assert "increase the excitation" in found.sentence
 
 
 def test_the_missed_share_is_the_error_of_the_response() -> None:
