@@ -142,7 +142,7 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
     _, err = process.communicate(timeout=PATIENCE_S)
     said = err.decode().splitlines()
     assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
-    assert sum("the sender started again at its sample 0" in line for line in said) == 1
+    assert sum("the sender restarted at its sample 0" in line for line in said) == 1
 
 
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):

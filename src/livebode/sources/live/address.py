@@ -1,4 +1,4 @@
-"""Where a live source is: the URL taken apart."""
+"""Address of a live source: the parts of its URL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PORTS: dict[str, int | None] = {
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and what stands behind them; `path` is the topic of MQTT, or a file."""
+    """Kind of source, host, port and path; `path` is the MQTT topic, or a file."""
 
     scheme: str
     host: str = ""
@@ -34,7 +34,7 @@ def parse_address(url: str) -> Address:
     Raises
     ------
     ConfigError
-        For a kind that is not supported, an invalid port, or a password in it; a password is never repeated.
+        For a kind that is not supported, an invalid port, or a password in the URL; the password is never shown.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def parse_address(url: str) -> Address:
         raise ConfigError(
             "secret-in-url",
             "source.url has a user or password",
-            "take it out, and set source.username and source.password_env or source.password_file",
+            "remove it, and set source.username and source.password_env or source.password_file",
             key="source.url",
         )
     if not url.isprintable() or len(url) > 2000:
@@ -59,23 +59,23 @@ def parse_address(url: str) -> Address:
             "give the URL of the machine",
             key="source.url",
         )
-    shown = url.split("?")[0].split("#")[0]  # what stands behind may be a secret
+    shown = url.split("?")[0].split("#")[0]  # the rest may be a secret
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
     except ValueError as error:
         raise url_error(shown, f"is not an address: {error}", "give kind://host:port") from None
     if parts.scheme not in PORTS:
-        raise url_error(shown, "is of a kind that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
+        raise url_error(shown, "has a scheme that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
         raise url_error(shown, "is not a complete address", f"give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):
-        raise url_error(shown, f"has a path, which {parts.scheme} does not take", f"leave out /{path}")
+        raise url_error(shown, f"has a path, but {parts.scheme} has none", f"remove /{path}")
     return Address(parts.scheme, host, port, path)
 
 
 def url_error(shown: str, wrong: str, remedy: str) -> ConfigError:
-    """The error for a URL of which only `shown` may be repeated."""
+    """The error for a URL of which only `shown` may be printed."""
     return ConfigError("value-invalid", f"source.url = {shown!r} {wrong}", remedy, key="source.url", value=shown)
