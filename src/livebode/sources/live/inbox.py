@@ -51,7 +51,7 @@ class Inbox:
             return self._closed and not self._batches
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
-        """Whether the batch was accepted. A full inbox rejects batches until a quarter is free; with `wait` it blocks."""
+        """Whether it was accepted. A full inbox rejects batches until a quarter is free, or with `wait` waits."""
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._closed or self._has_room(batch))
