@@ -342,5 +342,5 @@ def test_a_lost_journal_is_told(tmp_path: Path) -> None:
         path.write_bytes(b"rubbish")
     with refused(RecordError, "not-continuable"):
         record_machine(machine(SAMPLES), tmp_path / "run")
-    with pytest.warns(DamageWarning, match="7 bytes at its beginning"):
+    with pytest.warns(DamageWarning, match="its first 7 bytes are lost"):
         check_beginning(tmp_path / "run", SAMPLES, 1000)  # what is closed can be read all the same

@@ -92,10 +92,10 @@ def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("axis", "more", "said"),
     [
-        (RATED, ("--rate", 1000, "--amplitude", 1), "is 1000 Hz, but source.rate_hz 2000 Hz"),
+        (RATED, ("--rate", 1000, "--amplitude", 1), "is 1000 Hz, but source.rate_hz is 2000 Hz"),
         (AXIS, ("--rate", 4000, "--amplitude", 1), "gives 1000 Hz, but the sampling rate is 4000 Hz"),
-        (AXIS, ("--rate", 4000, FILE), "is 4000 Hz, but the designed excitation 1000 Hz"),
-        (RATED, (FILE,), "the designed excitation is 1000 Hz, but source.rate_hz 2000 Hz"),
+        (AXIS, ("--rate", 4000, FILE), "is 4000 Hz, but the designed excitation is 1000 Hz"),
+        (RATED, (FILE,), "the designed excitation is 1000 Hz, but source.rate_hz is 2000 Hz"),
         (AXIS.replace("window = 20", "window = 40"), (FILE,), "lines.window is 40, but the design's period has 20"),
         (AXIS.replace("50, 150, 350", "50, 100"), (FILE,), "the design does not excite 100 Hz"),
         (AXIS, (FILE, "--amplitude", 1), "both or neither of amplitude and designed"),
