@@ -196,8 +196,8 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
     if responses and not valid and "spectra" in counts:
         raise SignalError(
             "no-valid-response",
-            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
-            f"whole and {counts['spike']} contain a spike",
+            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are "
+            f"incomplete and {counts['spike']} contain a spike",
             "check the drive's samples, or configure a shorter window in the drive",
             reason="windows-not-whole",
             responses=responses,

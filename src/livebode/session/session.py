@@ -175,7 +175,7 @@ class Session:
                 thread.orders.say(kind, message)
 
     def _report(self, name: str, event: Event) -> None:
-        """Log what became of an edit, and tell it."""
+        """Log and publish the result of an edit."""
         level = logging.WARNING if event.kind == "configuration-refused" else logging.INFO
         _logger.log(level, "%s%s", f"axis {name}: " if name else "", event.message)
         self._tell(name, event)

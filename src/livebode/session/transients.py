@@ -57,7 +57,7 @@ def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
     if np.count_nonzero(np.isfinite(x)) < window:
         return 0
     blocks = cut(filled(x), window)
-    # An interpolated period differs from the others, which says nothing about the machine.
+    # An interpolated period differs from the others, but not because of the machine.
     whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
     count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
     return int(whole[count - 1]) + 1 if count else 0

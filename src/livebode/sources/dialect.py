@@ -137,7 +137,7 @@ def find_encoding(sample: bytes) -> tuple[str, int]:
 
 
 def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:
-    """The lines of the sample that are neither blank nor comment; the last one only if the sample is the whole file."""
+    """Lines of the sample that are neither blank nor comment; the last one only if the sample is the complete file."""
     lines, at = [], 0
     for number, line in enumerate(text.splitlines(keepends=True) if "\r" not in text else split_ends(text), start=1):
         complete = whole or line.endswith(("\n", "\r"))

@@ -104,7 +104,7 @@ class FrameSplitter:
         self.skipped = 0
         """Bytes that did not belong to a frame."""
         self.damaged = 0
-        """Frames with a wrong CRC since the last whole one."""
+        """Frames with a wrong CRC since the last intact one."""
 
     def feed(self, piece: bytes) -> list[bytes]:
         """Frames completed by `piece`."""

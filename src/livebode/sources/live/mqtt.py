@@ -130,7 +130,7 @@ class MqttSource(LiveSource):
         self._answered, self._unanswered = True, 0
         if reason.value in _REFUSALS:
             self._refusal = SourceError(
-                "refused", f"the broker refused: {reason}", "check source.username and its password"
+                "refused", f"the broker rejected the connection: {reason}", "check source.username and its password"
             )
         elif not reason.is_failure:
             client.subscribe(self.address.path, qos=1)

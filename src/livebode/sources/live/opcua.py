@@ -179,7 +179,7 @@ class OpcUaSource(LiveSource):
             if name.startswith(_REFUSALS):
                 raise SourceError(
                     "refused",
-                    f"the server refused ({name})",
+                    f"the server rejected the connection ({name})",
                     "check user, password, certificates and the server's security policies",
                     status=name,
                 ) from None

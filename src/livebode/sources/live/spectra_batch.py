@@ -38,7 +38,7 @@ class SpectraBatch:
     Raises
     ------
     SourceError
-        If there are no spectra or too many, shapes disagree, or a number cannot be.
+        If there are no spectra or too many, shapes disagree, or a number is invalid.
     """
 
     first_sample: int
