@@ -75,8 +75,8 @@ class EventRow:
     ----------
     newest
         The newest of them with sample, time and message; for those that were only counted, these are not known.
-        count
-            Number of events.
+    count
+        Number of events.
     first_s, last_s
         Times of the first and of the newest, or of the line that counts it.
     """

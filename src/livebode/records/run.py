@@ -53,12 +53,12 @@ class Run:
     ----------
     path
         Its directory.
-        summary
-            run.json.
-        damages
-            Damage found so far, as events of kind "record-damaged"; everything else is read.
-        told
-            Called once with each of them; a `DamageWarning` by default.
+    summary
+        run.json.
+    damages
+        Damage found so far, as events of kind "record-damaged"; everything else is read.
+    told
+        Called once with each of them; a `DamageWarning` by default.
     """
 
     path: Path

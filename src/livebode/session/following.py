@@ -72,30 +72,30 @@ class Tracking:
     ----------
     source
         Source of the samples.
-        pipeline
-            Processes the samples.
-        to
-            Directory and receivers of the run.
-        about
-            Additional entries of run.json.
-        kept
-            Settings of a record in segments; None for a run in one piece.
-        again
-            Whether the source begins with the same samples each time; else its numbers continue.
-        started
-            `time.perf_counter()` when opening the source began, to include it in the speed.
-        orders
-            Requests from outside.
-        position
-            Where a live source continues.
-        before
-            The run that this one continues.
-        noticed
-            Events on the whole recording, found before tracking.
-        relation
-            The clock of a live source while it is open.
-        delivery
-            Arguments for the source's `blocks`.
+    pipeline
+        Processes the samples.
+    to
+        Directory and receivers of the run.
+    about
+        Additional entries of run.json.
+    kept
+        Settings of a record in segments; None for a run in one piece.
+    again
+        Whether the source begins with the same samples each time; else its numbers continue.
+    started
+        `time.perf_counter()` when opening the source began, to include it in the speed.
+    orders
+        Requests from outside.
+    position
+        Where a live source continues.
+    before
+        The run that this one continues.
+    noticed
+        Events on the whole recording, found before tracking.
+    relation
+        The clock of a live source while it is open.
+    delivery
+        Arguments for the source's `blocks`.
     """
 
     def __init__(

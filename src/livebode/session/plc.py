@@ -34,16 +34,16 @@ def plc_project(
     ----------
     axis
         Signals, lines and window; its rate and its controllers' rates are compared with that of the task.
-        limit
-            Largest magnitude of the excitation.
-        ring_length
-            Number of samples in the ring.
-        rate_hz
-            Rate of the task, if neither the axis nor the design has it.
-        amplitude
-            Amplitude of each line of a flat multisine with Schroeder's phases.
-        designed
-            Instead of `amplitude` (see `read_designed`): its period is used unchanged, and ramped up over its `ramp_s`.
+    limit
+        Largest magnitude of the excitation.
+    ring_length
+        Number of samples in the ring.
+    rate_hz
+        Rate of the task, if neither the axis nor the design has it.
+    amplitude
+        Amplitude of each line of a flat multisine with Schroeder's phases.
+    designed
+        Instead of `amplitude` (see `read_designed`): its period is used unchanged, and ramped up over its `ramp_s`.
 
     Raises
     ------

@@ -21,16 +21,16 @@ class Status(Relay):
     ----------
     state
         "waiting", "tracking", "finishing", "done", "refused", or "ended" before there was anything to record.
-        directory
-            Directory of its newest run.
-        samples, responses
-            Number of tracked samples and published responses.
-        rate_hz
-            Samples per second of the Blocks; None before the first.
-        event
-            The newest event.
-        health
-            State of its live source; None for a recording.
+    directory
+        Directory of its newest run.
+    samples, responses
+        Number of tracked samples and published responses.
+    rate_hz
+        Samples per second of the Blocks; None before the first.
+    event
+        The newest event.
+    health
+        State of its live source; None for a recording.
     """
 
     def __init__(self, audience: Audience) -> None:

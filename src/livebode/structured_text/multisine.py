@@ -104,12 +104,12 @@ def multisine(
     limit
         Limit of |w|, unit of `period`: default of the block's input w_max. A scale that would exceed it is rejected at
         the start; if w_max is lowered later, w is clamped, and `limited` reports it.
-        name
-            Name of the function block.
-        ramp_periods
-            Periods of a ramp.
-        note
-            Lines for the top of the file: the seed, the author.
+    name
+        Name of the function block.
+    ramp_periods
+        Periods of a ramp.
+    note
+        Lines for the top of the file: the seed, the author.
 
     Raises
     ------

@@ -42,17 +42,17 @@ class Project:
         Bins and window of the sliding DFT, and the rate of the task.
     channels
         Names of the recorded channels, in the ring's order.
-        excitation
-            The channel that the block generates; the program reads the others from the drive.
-        tracked
-            Channels of the sliding DFT.
-        ring_length
-            Number of samples in the ring.
-        ramp_periods
-            Periods of the ramps of the excitation.
-        counter
-            Name of an additional channel: the excitation's sample counter; multiples of the window are borders of
-            periods.
+    excitation
+        The channel that the block generates; the program reads the others from the drive.
+    tracked
+        Channels of the sliding DFT.
+    ring_length
+        Number of samples in the ring.
+    ramp_periods
+        Periods of the ramps of the excitation.
+    counter
+        Name of an additional channel: the excitation's sample counter; multiples of the window are borders of
+        periods.
     note
         Lines for the top of the excitation's file.
     """

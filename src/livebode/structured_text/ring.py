@@ -40,8 +40,8 @@ def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str 
         Calls of the block per second.
     length
         Number of samples in the ring: livebode must read it at least once in that time.
-        name
-            Name of the type.
+    name
+        Name of the type.
 
     Raises
     ------
@@ -85,10 +85,10 @@ def ring_block(
     ----------
     channels
         Names of the inputs in the order of the ring's columns: at most 64, valid in Structured Text.
-        length
-            As in the type.
-        name, type_name
-            Name of the function block, and of the ring's type.
+    length
+        As in the type.
+    name, type_name
+        Name of the function block, and of the ring's type.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def ring_block(
     _check_size(len(channels), length)
     check_names(channels, "channel", (*_OWN, name, type_name))
     return (
-        comment(f"Writes a sample of each channel to the ring, once per cycle:  {', '.join(channels)}")
+        comment(f"Writes a sample of each channel to the ring, once per cycle: {', '.join(channels)}")
         + f"FUNCTION_BLOCK {name}\n"
         + section(
             "VAR_INPUT",

@@ -133,8 +133,8 @@ def sliding_dft(
         The bins, and the window N.
     channels
         Names of the inputs: at most 16, valid in Structured Text.
-        name
-            Name of the function block.
+    name
+        Name of the function block.
     phase
         "fixed": referred to sample counts that are multiples of N; ratios between channels are the same, without
         extra cost. "window": that of numpy.fft of the window, with six more operations per bin, channel and sample.

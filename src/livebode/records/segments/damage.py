@@ -27,8 +27,8 @@ class Damage:
     begin, end
         The first sample of the span between the two commits, and the first one after it. None if the damage is at
         the journal's beginning or end, so that one of the two commits is missing.
-        rows
-            Number of lost rows of each table. Empty if there are none, or if they cannot be counted.
+    rows
+        Number of lost rows of each table. Empty if there are none, or if they cannot be counted.
     at_least
         Whether more may be lost than is counted.
     """

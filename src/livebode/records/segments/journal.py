@@ -40,10 +40,10 @@ class Commit:
         Time of writing, seconds since 1970.
     events_bytes
         Length of events.jsonl at that time.
-        states
-            States that continue from there, as named bytes.
-        rows
-            Number of rows of each table recorded since the run began.
+    states
+        States that continue from there, as named bytes.
+    rows
+        Number of rows of each table recorded since the run began.
     waiting
         Events as plain data that are not in events.jsonl yet, because they will share a line.
     """
@@ -96,8 +96,8 @@ class Journal:
         The first and the last one; the journal counts up to the end of the last.
     length
         Bytes up to there; later bytes were being written when the run ended.
-        damages
-            Damaged places.
+    damages
+        Damaged places.
     """
 
     rows: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
@@ -117,11 +117,11 @@ class Journal:
         ----------
         run
             Directory of the run.
-            number
-                Number of the journal.
-            after
-                Called if the end is damaged: returns the commit with which the next journal begins, if there is one. It
-                shows what the damaged end contained.
+        number
+            Number of the journal.
+        after
+            Called if the end is damaged: returns the commit with which the next journal begins, if there is one. It
+            shows what the damaged end contained.
 
         Raises
         ------

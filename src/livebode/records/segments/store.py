@@ -358,7 +358,7 @@ class Store:
             "record-resumed",
             sample,
             time_s,
-            f"recording resumes at sample {sample};  {what + ' are lost' if lost else 'nothing is lost'}",
+            f"recording resumes at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
             paused_at=self._pause.sample,
             lost=lost,
             lost_events=self._log.take_given_up(),

@@ -44,13 +44,13 @@ def pause(before: ClockReading, now: ClockReading) -> Pause:
     """The time between two readings.
 
     >>> pause(ClockReading(1e9, 50.0, "a"), ClockReading(1e9 - 3580.0, 70.0, "a"))
-    Pause(seconds=20.0, remark="this computer's clock was set by -3600 s during the pause;  check its date and time")
+    Pause(seconds=20.0, remark="this computer's clock was set by -3600 s during the pause; check its date and time")
     """
     by_clock_s = now.unix_s - before.unix_s
     if before.boot and before.boot == now.boot:
         by_uptime_s = max(0.0, now.uptime_s - before.uptime_s)
         step_s = by_clock_s - by_uptime_s
-        remark = f"this computer's clock was set by {step_s:+.0f} s during the pause;  check its date and time"
+        remark = f"this computer's clock was set by {step_s:+.0f} s during the pause; check its date and time"
         return Pause(by_uptime_s, remark if abs(step_s) > SET_S else "")
     if 0 <= by_clock_s <= LONGEST_S:
         return Pause(by_clock_s)

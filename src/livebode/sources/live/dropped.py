@@ -20,7 +20,7 @@ class Dropped:
             self._said.say(
                 "overflow",
                 f"the queue is full; samples from the sender's number {batch.first_sample} are dropped until a quarter "
-                "of it is free;  use a longer tracking.hop, fewer lines or fewer axes on this computer",
+                "of it is free; use a longer tracking.hop, fewer lines or fewer axes on this computer",
                 sender_first=batch.first_sample,
             )
         self._samples += batch.samples

@@ -111,7 +111,7 @@ class MqttSource(LiveSource):
             close_left(error)
             raise SourceError(
                 "refused",
-                f"TLS with the broker failed:  {getattr(error, 'verify_message', '') or error.reason}",
+                f"TLS with the broker failed: {getattr(error, 'verify_message', '') or error.reason}",
                 "check source.ca_file and the broker's certificate",
             ) from None
 
