@@ -26,10 +26,10 @@ class Tally:
     before
         The run that this one continues.
 
-        Attributes
-        ----------
-        stop
-            Number of the sample after the last tracked one.
+    Attributes
+    ----------
+    stop
+        Number of the sample after the last tracked one.
     groups
         The events of each cause.
     left_out_samples
