@@ -119,7 +119,7 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
         if one != other:
             raise BaselineError(
                 "runs-differ",
-                f"{str(run.path)!r} has a different {name} than {str(first.path)!r}",
+                f"{str(run.path)!r} and {str(first.path)!r} differ in {name}",
                 "learn from runs with the same configuration",
                 path=str(run.path),
                 other=str(first.path),
