@@ -53,7 +53,7 @@ def test_learn_and_tell(tmp_path: Path) -> None:
     log, faulty = write(tmp_path / "healthy.parquet", healthy()), tmp_path / "faulty.parquet"
     write(faulty, recorded((0.3, 0.25), TensionLoss(start_s=6.0, loss=0.02), seed=61))
     without = run(log, tmp_path / "one", *MOVING)
-    assert "Without a baseline no change can be told" in without.out
+    assert "Without a baseline no change can be detected" in without.out
     assert json.loads((tmp_path / "one" / "run.json").read_text("utf-8"))["monitoring"]["baseline"] is None
 
     learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "healthy.json")
