@@ -71,7 +71,7 @@ def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Brow
         assert not tab.page.locator("#alarm-count").is_visible()
         for key in ("2", "ArrowRight", "f", " ", "d", "Escape", "p", "g", "m"):  # nothing to act on, and no error
             tab.page.keyboard.press(key)
-        hubs[1].write_event(Event("waiting", 0, time.time(), "no samples came within 30 s; switch the machine on"))
+        hubs[1].write_event(Event("waiting", 0, time.time(), "no samples arrived within 30 s; switch the machine on"))
         waiting = tab.page.locator("#events li.alarm", has_text="switch the machine on")
         assert re.fullmatch(r"\d\d:\d\d:\d\d \S+", waiting.locator("time").inner_text())
         begin(hubs[1], Path("/nowhere"), ONE)  # its machine is switched on

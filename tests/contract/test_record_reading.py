@@ -217,7 +217,7 @@ def test_the_command_goes_on_where_it_was_ended(
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == (-number if number == signal.SIGKILL else 128 + number), done.stderr
     assert "Traceback" not in done.stderr
-    assert ("goes on with" in done.stderr) == (number != signal.SIGKILL)
+    assert ("continues the run" in done.stderr) == (number != signal.SIGKILL)
     run = Run.open(tmp_path / "run")
     assert run.responses().sample[-1] > 40_000 - RATE_HZ
     assert livebode("run", *given).code == 0

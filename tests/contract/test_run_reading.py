@@ -48,7 +48,7 @@ def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) 
     table = run / "responses.parquet"
     whole = table.read_bytes()
     table.write_bytes(whole[: len(whole) // 2])
-    with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is, and nothing of it can be read"):
+    with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is damaged, so it cannot be read"):
         assert len(Run.open(run).responses()) == 0
     (run / "run.json").write_text("{")
     with pytest.warns(DamageWarning, match=r"run\.json' is damaged: it has no checksum; its copy"):

@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "control"), "control is not a file format; in Python use mean_response(Run"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean exclude each other"),
         (("--to", "csv", "--at", "nan"), "nan is not finite; give seconds in the recording's clock"),
-        (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; take the nearest"),
+        (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; use the nearest"),
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )

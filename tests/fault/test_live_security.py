@@ -304,4 +304,4 @@ def test_an_answer_of_a_plc_that_is_too_short_is_a_connection_that_is_tried_agai
         with Feeding(script), source.open():
             assert next(source.blocks()).rate_hz == RATE_HZ
         (event,) = [event for event in source.drain_events() if event.kind == "disconnected"]
-    assert "the PLC's answer cannot be used" in event.message
+    assert "the PLC's answer is invalid" in event.message

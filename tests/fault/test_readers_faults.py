@@ -93,7 +93,7 @@ def test_tables_that_are_refused(tmp_path, content, code, facts):
 
 
 def test_a_table_without_channels_names_what_was_left_out(tmp_path):
-    assert "('u': it holds text)" in str(refusal(text(tmp_path, "t;u\n0;1.234,5\n1;2.345,6\n")))
+    assert "('u': it contains text)" in str(refusal(text(tmp_path, "t;u\n0;1.234,5\n1;2.345,6\n")))
 
 
 def test_text_far_down_is_found_with_its_line(tmp_path):

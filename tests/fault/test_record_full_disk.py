@@ -144,7 +144,7 @@ def test_a_journal_that_holds_what_no_run_writes_ends_no_run(tmp_path: Path) -> 
         (event, *_) = store.drain_events()
     assert all(taken)
     assert event.kind == "record-unclosed"
-    assert "does not hold what a run writes" in event.message
+    assert "has invalid content" in event.message
 
 
 def _second(store: Store, k: int, limit: int | None, hard: int) -> bool:

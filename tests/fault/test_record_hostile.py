@@ -214,7 +214,7 @@ def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
         del line["crc32"]
     (run / "manifest.jsonl").write_bytes(b"".join(to_line(line) * 2 for line in lines))
     assert len(content) < n // 8
-    with pytest.warns(DamageWarning, match="more than a segment holds"):
+    with pytest.warns(DamageWarning, match="more than a segment can have"):
         assert sum(table.num_rows for table in Run.open(run).tables("samples")) < 2600
 
 

@@ -137,7 +137,7 @@ def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:
     ("change", "more", "said"),
     [
         (("", ""), ("--rate", 0), "rate"),
-        (("", ""), (), "the rate of the PLC's task is missing"),
+        (("", ""), (), "the rate of the PLC task is missing"),
         (('excitation = "w"', ""), ("--rate", 1000), "signals.excitation is missing"),
         (("window = 20", ""), ("--rate", 1000), "lines or window are 'auto'"),
         (('"100, 200"', '"100, 600"'), ("--rate", 1000), "600 Hz is not between 0 and the Nyquist frequency 500 Hz"),

@@ -165,4 +165,4 @@ def test_a_loop_that_is_not_the_run_s_own_is_noted(runs):
     path.write_text(f'{EXCITATION}[measured]\nrun = "run-speed"\n{LOOP.format(gain=0.5)}')
     done = livebode("design", path, "--out", runs / "loop")
     assert done.code == 0, done.err
-    assert "stable is not looked at" in done.out
+    assert "its stability is not checked" in done.out

@@ -53,7 +53,7 @@ def test_learn_and_tell(tmp_path: Path) -> None:
     log, faulty = write(tmp_path / "healthy.parquet", healthy()), tmp_path / "faulty.parquet"
     write(faulty, recorded((0.3, 0.25), TensionLoss(start_s=6.0, loss=0.02), seed=61))
     without = run(log, tmp_path / "one", *MOVING)
-    assert "Without a baseline no change can be told" in without.out
+    assert "Without a baseline no change can be detected" in without.out
     assert json.loads((tmp_path / "one" / "run.json").read_text("utf-8"))["monitoring"]["baseline"] is None
 
     learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "healthy.json")
@@ -156,9 +156,9 @@ def _refusals(tmp_path: Path, log: Path) -> None:
     twice = livebode("learn", tmp_path / "one", "--out", base)
     assert (twice.code, "--force" in twice.err) == (2, True)
     same = livebode("learn", tmp_path / "one", f"{tmp_path / 'one'}/.", "--out", tmp_path / "x.json")
-    assert (same.code, "name each recording once" in same.err) == (2, True)
+    assert (same.code, "give each recording once" in same.err) == (2, True)
     also = livebode("learn", tmp_path / "one", tmp_path / "three", "--out", tmp_path / "x.json")
-    assert (also.code, "name each recording once" in also.err) == (2, True)
+    assert (also.code, "give each recording once" in also.err) == (2, True)
     none = livebode("learn", tmp_path, "--out", tmp_path / "x.json")
     assert (none.code, "not the directory of a run" in none.err) == (2, True)
 
@@ -168,7 +168,7 @@ def test_without_a_schedule_the_lines_are_watched_alone(tmp_path: Path) -> None:
     assert run(write(tmp_path / "a.parquet", still), tmp_path / "one", *OPTIONS).code == 0
     learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "base.json", "--json")
     assert json.loads(learned.out)["model"] is None
-    assert "position to schedule by" in json.loads(learned.out)["remark"]
+    assert "scheduling position" in json.loads(learned.out)["remark"]
     baseline = Baseline.load(tmp_path / "base.json")
     assert baseline.tables[0].count.tolist() == [[0, baseline.tables[0].count.sum(), 0]]
 

@@ -88,7 +88,7 @@ def test_a_transient_is_judged_only_where_nothing_was_excited_before(recorded: n
     late = np.hstack([silent, np.zeros_like(burst), silent, np.zeros_like(burst), np.zeros((3, 2000)), recorded])
     (event,) = found(late, roles=False)
     assert 82_000 <= event.details["samples"] <= 82_000 + WINDOW
-    assert f"with what came before, {event.details['samples']} samples" in event.message
+    assert f"with the samples before them, {event.details['samples']} samples" in event.message
     bursts = late.copy()
     for at in (20_000, 60_000):  # too short to be judged
         bursts[:, at : at + burst.shape[1]] = burst
@@ -103,7 +103,9 @@ def test_a_slip_that_no_number_tells_is_named(recorded: np.ndarray, missing: int
     events = [event for event in found(slipped, roles=False, transient=False) if event.kind == "phase-slip"]
     assert [event.details["missing_samples"] for event in events] == [missing]
     assert f"{'forward' if missing > 0 else 'back'} by {abs(missing)} sample" in events[0].message
-    assert f"samples are {'missing' if missing > 0 else 'repeated'}, or the generator was started" in events[0].message
+    assert (
+        f"samples are {'missing' if missing > 0 else 'repeated'}, or the generator was restarted" in events[0].message
+    )
     assert abs(events[0].sample - at) <= WINDOW
 
 

@@ -108,7 +108,7 @@ def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
         ("", "needs either a log or a url"),
         ('log = "a"\nurl = "udp://h:1"', "needs either a log or a url"),
         ('url = "udp://h"', "give udp://host:port"),
-        ('url = "udp://h:1"\nsymbol = "x"', "source.symbol has no meaning for udp"),
+        ('url = "udp://h:1"\nsymbol = "x"', "source.symbol does not apply to udp"),
         ('url = "udp://h:1"\nreorder_batches = 1000', "source.reorder_batches = 1000 is not usable"),
         ('url = "mqtt://me:secret@h/t"', "source.url has a user or password"),
         ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
@@ -142,7 +142,7 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
     _, err = process.communicate(timeout=PATIENCE_S)
     said = err.decode().splitlines()
     assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
-    assert sum("the sender started again at its sample 0" in line for line in said) == 1
+    assert sum("the sender restarted at its sample 0" in line for line in said) == 1
 
 
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):

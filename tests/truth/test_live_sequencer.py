@@ -174,7 +174,7 @@ def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strang
     back = [event for event in said.drain() if event.kind == "restart"]
     assert [event.details["epoch"] for event in back] == ["0x2", "0x1"]
     assert back[1].details["lost_samples"] == 10 * strange
-    assert "name its address in source.sender" in back[1].message
+    assert "set its address in source.sender" in back[1].message
 
 
 @settings(deadline=None)

@@ -251,7 +251,7 @@ def test_the_model_of_the_machine_is_left_out_and_said_to_be(tmp_path: Path) -> 
     tracker_settings = settings()
     told = make_watching(axis, tracker_settings, samples=False).finish(lambda _: None)
     assert told["judged_by"] == "tables"
-    assert "model of the machine is left out: it needs samples, and the drive sends spectra" in told["message"]
+    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in told["message"]
     assert make_watching(axis, tracker_settings).finish(lambda _: None)["judged_by"] == "model"
 
 

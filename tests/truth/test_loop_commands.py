@@ -117,7 +117,7 @@ def test_a_run_with_a_delay_gets_margins_with_it_and_none_where_it_is_held_at_ze
     assert held["status"] == "contradicted by the lines"
     assert held["margins"]["gain_margin"]["value"] is None
     assert held["tuning"]["verdict"] == "refused"
-    assert "free what it lacks" in held["message"]
+    assert "free a parameter" in held["message"]
     assert "no margins: the two-mass model contradicts the lines" in livebode("margins", folder / "held").out
 
 

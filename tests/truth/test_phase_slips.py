@@ -100,7 +100,7 @@ def test_a_run_realigns_what_was_dropped_and_reports_it(tmp_path: Path) -> None:
     signals = ("--rate", 4000, "--excitation", "w", "--input", "u", "--output", "y")
     done = livebode("run", log, *signals, "--average", "--forgetting", 1, "--out", tmp_path / "run")
     assert done.code == 0, done.err
-    assert "the phase of 'w' leaps 18 times" in " ".join(done.err.split())
+    assert "the phase of 'w' jumps 18 times" in " ".join(done.err.split())
     run = Run.open(tmp_path / "run")
     assert run.found["phase_slips"] == len(places)
     last = run.responses()[-1]

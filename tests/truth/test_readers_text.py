@@ -80,7 +80,7 @@ def test_a_delimiter_that_ends_each_line(tmp_path):
 
 def test_empty_cells_are_nan_and_text_columns_are_named(tmp_path):
     log = opened(tmp_path, "t,u,state\n0,1,ok\n0.1,,ok\n0.2,NaN,\n0.3,-inf,bad\n")
-    assert [(skipped.name, skipped.reason) for skipped in log.skipped] == [("state", "it holds text")]
+    assert [(skipped.name, skipped.reason) for skipped in log.skipped] == [("state", "it contains text")]
     np.testing.assert_array_equal(samples(log, "u"), [[1, np.nan, np.nan, -np.inf]])
 
 

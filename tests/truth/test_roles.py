@@ -112,7 +112,7 @@ def ran(tmp_path: Path, columns: dict, *arguments: object) -> Result:
         (("--excitation", "w", "--input", "u", "--output", "w"), "'w' is both the excitation and the output"),
         (
             ("--excitation", "w", "--input", "w", "--output", "y"),
-            "to 'direct' and name that input alone",
+            "to 'direct' and name only that input",
         ),
         (
             ("--excitation", "w", "--input", "u", "--output", "copy"),
@@ -156,7 +156,7 @@ def test_a_doubt_is_an_event_of_the_run_and_printed_behind_it(tmp_path: Path) ->
     columns["y"] = np.random.default_rng(5).standard_normal(4000)
     done = ran(tmp_path, columns, "--excitation", "w", "--input", "u", "--output", "y")
     assert done.code == 0, done.err
-    assert "does not answer to 'w' at any line" in " ".join(done.err.split())
+    assert "does not respond to 'w' at any line" in " ".join(done.err.split())
     assert events(tmp_path) == ["roles-doubtful"]
 
 

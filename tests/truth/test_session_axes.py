@@ -77,7 +77,7 @@ def test_a_machine_that_is_switched_on_late_is_picked_up(tmp_path: Path) -> None
                 code, out, err = running.end()
     assert code == 0
     assert json.loads(out)["axes"]["late"]["counts"]["samples"] >= 500
-    assert err.count("no samples came within 0.2 s") == 1
+    assert err.count("no samples arrived within 0.2 s") == 1
     assert "livebode: late: tcp://127.0.0.1" in err
     assert "switch the machine on" in err
 

@@ -130,7 +130,7 @@ def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
         running.tracked("x-2", 1500)
         code, out, err = running.end()
     assert code == 0, err
-    assert "z: the axis was taken out, and ends" in err
+    assert "z: the axis was removed and ends" in err
     assert json.loads(out)["axes"]["x"]["counts"]["samples"]
 
 

@@ -104,8 +104,8 @@ def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_said_
     assert [block.start for block in blocks] == list(range(0, 240, 20))
     messages = [event.message for event in said.drain() if event.kind == "layout-changed"]
     assert messages == [
-        "the sender now sends samples; they are left out until it sends what it began with",
-        "the sender now sends spectra of another layout; they are left out until it sends what it began with",
+        "the sender now sends samples; they are skipped until the first layout is back",
+        "the sender now sends spectra of another layout; they are skipped until the first layout is back",
     ]
     # The other way round.
     said = Said()

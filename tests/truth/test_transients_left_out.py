@@ -55,7 +55,7 @@ def test_a_transient_is_left_out_of_averages_and_bounds_and_reported(tmp_path: P
     assert np.max(np.abs(careful.value - 2)) < 5 * np.max(careful.sigma)
     events = [json.loads(line) for line in (tmp_path / "run0" / "events.jsonl").read_text().splitlines()]
     assert [event["kind"] for event in events] == ["transient"]
-    assert "--all-periods keeps them" in events[0]["message"]
+    assert "--all-periods includes them" in events[0]["message"]
 
 
 @pytest.mark.parametrize("transient", [0.0, 5.0])

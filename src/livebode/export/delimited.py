@@ -22,8 +22,8 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
 
     Columns: ``time [s]``, ``schedule``, ``frequency [Hz]``, ``re``, ``im``, ``magnitude [dB]``, ``phase [deg]``,
     ``sigma``, ``dof``, ``coherence``, ``valid`` (1 or 0), ``first``, ``sample``; re, im and sigma with the
-    response's unit in brackets, where it has one. A number is the shortest decimal that gives the same double; what
-    is not known is ``nan``.
+    response's unit in brackets, where it has one. A number is the shortest decimal that gives the same double; an
+    unknown value is ``nan``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The formats by name, and a file that appears in its place when it is whole."""
+"""The formats by name, and a file that appears in its place when it is complete."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], W
     "netcdf": write_netcdf,
     "uff": write_uff,
 }
-"""What writes responses, by the name of the format."""
+"""Functions that write responses, by the name of the format."""
 
 TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], Written]] = {
     "csv": write_parameters_csv,
     "mat": write_parameters_mat,
 }
-"""What writes parameters, by the name of the format."""
+"""Functions that write parameters, by the name of the format."""
 
 ENDINGS: Mapping[str, str] = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc", "uff": ".uff"}
 
@@ -40,22 +40,22 @@ _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used
 
 
 def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> Done:
-    """Let `write` make a file beside its place, and move it there when it is whole.
+    """Let `write` create a file next to its place, and move it there when it is complete.
 
     Parameters
     ----------
     path
-        Where the file is to stand; directories above it are made.
+        Path of the file; missing parent directories are created.
     write
-        Is called with the path to write to, whose name is that of `path`.
+        Called with the path to write to, which has the name of `path`.
     force
-        Whether to replace a file that stands there.
+        Whether to replace an existing file.
 
     Raises
     ------
     OutputError
-        If something stands there that is not to be replaced or is no file, or the disk refuses. Nothing is left of
-        what was written then, and what stood there still stands.
+        If the path exists and must not be replaced or is not a file, or the disk reports an error. Nothing is written
+        then, and an existing file is unchanged.
     """
     _check_free(path, force)
     try:
@@ -69,8 +69,8 @@ def save(path: Path, write: Callable[[Path], Done], *, force: bool = False) -> D
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
         raise OutputError(
             "not-written",
-            f"{str(path)!r} could not be written: {why}; nothing was left there",
-            "make room, or choose another path",
+            f"{str(path)!r} could not be written: {why}; nothing was changed there",
+            "free some space, or choose another path",
             path=str(path),
             reason=why,
             errno=error.errno,

@@ -22,8 +22,8 @@ _NAMES = {
     "valid": "whether the window allows an estimate at this line",
     "dof": "complex degrees of freedom of sigma",
     "schedule": "scheduling signal at time_s",
-    "first": "number of the oldest sample that went in",
-    "sample": "number of the newest sample that went in",
+    "first": "number of the oldest sample in the window",
+    "sample": "number of the newest sample in the window",
     "time_s": "centre of the window",
     "frequency_hz": "line",
 }
@@ -35,7 +35,7 @@ def to_xarray(responses: Responses, about: Mapping[str, Any] | None = None) -> x
     Dimensions ``time_s`` and ``frequency_hz``, both coordinates; ``schedule``, ``first`` and ``sample`` are
     coordinates along time. Variables ``response`` (complex), ``sigma``, ``coherence`` and ``valid`` over both,
     ``dof`` over time. Each has attributes ``units`` and ``long_name``. The Dataset's attributes are ``quantity``,
-    ``rate_hz``, ``window`` and, where `about` (as `Run.summary`) is given, ``run``: run.json as text.
+    ``rate_hz``, ``window`` and, if `about` (as `Run.summary`) is given, ``run``: run.json as text.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def to_xarray(responses: Responses, about: Mapping[str, Any] | None = None) -> x
     units = {"response": responses.unit, "sigma": responses.unit, "time_s": "s", "frequency_hz": "Hz"}
 
     def labelled(dims: str | tuple[str, ...], name: str, values: Any) -> tuple[Any, ...]:
-        # "1" is what the CF conventions write for a number without a unit; the schedule's is not known.
+        # In the CF conventions, "1" is the unit of a number without a unit; the schedule's unit is not known.
         attrs = {"long_name": _NAMES[name]} | ({} if name == "schedule" else {"units": units.get(name) or "1"})
         return dims, values, attrs
 
@@ -75,7 +75,7 @@ def to_xarray(responses: Responses, about: Mapping[str, Any] | None = None) -> x
 def write_netcdf(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
     """Write responses as NetCDF 3 with 64-bit offsets, which needs no other library (extra `xarray`).
 
-    As `to_xarray`, but NetCDF 3 knows neither complex numbers nor 64-bit integers: ``response`` is ``response_re`` and
+    As `to_xarray`, but NetCDF 3 has neither complex numbers nor 64-bit integers: ``response`` is ``response_re`` and
     ``response_im``, and sample numbers are doubles.
 
     Raises

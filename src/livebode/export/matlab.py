@@ -1,4 +1,4 @@
-"""MATLAB: a struct whose fields `frd` and `idfrd` take as they are."""
+"""MATLAB: a struct with fields for `frd` and `idfrd`."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ VARIABLE = "livebode"
 def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
     """Write responses as a MATLAB v5 file with one struct `livebode`.
 
-    Fields: ``H`` (1, 1, lines, responses) complex and ``w`` (lines, 1) in rad/s, as `frd(H, w)` takes them;
+    Fields: ``H`` (1, 1, lines, responses) complex and ``w`` (lines, 1) in rad/s, for `frd(H, w)`;
     ``sigma``, ``coherence`` and ``valid`` (lines, responses); ``f_hz`` (lines, 1); ``time_s``, ``schedule``,
     ``dof``, ``first``, ``sample`` (1, responses); ``Ts`` in seconds, ``window``, ``quantity``, ``unit``, and
-    ``run``, run.json as text. A single response has only its valid lines, many have NaN where a line is not valid.
+    ``run``, run.json as text. A single response has only its valid lines; several have NaN at invalid lines.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def _struct(responses: Responses) -> dict[str, Any]:
     frequency_hz = lines.frequency_hz[kept]
     over_lines = {name: getattr(responses, name).T[kept] for name in ("sigma", "coherence", "valid")}
     over_time = {name: getattr(responses, name)[np.newaxis] for name in ("time_s", "schedule", "dof")}
-    # MATLAB counts in doubles; int64 would make every sum with them an int64.
+    # MATLAB counts in doubles; with int64, every sum would become int64.
     samples = {name: getattr(responses, name)[np.newaxis].astype(np.float64) for name in ("first", "sample")}
     return {
         "H": responses.value.T[kept][np.newaxis, np.newaxis],

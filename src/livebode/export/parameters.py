@@ -1,4 +1,4 @@
-"""parameters.parquet: what models fitted to the responses say, one row for each moment and parameter."""
+"""parameters.parquet: parameters of the models fitted to the responses, one row for each time and parameter."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ParameterTable:
             if missing:
                 raise RecordError(
                     "unexpected-content",
-                    f"the parameters of {str(self.run)!r} have no column {missing[0]!r}, which a run writes",
+                    f"the parameters of {str(self.run)!r} have no column {missing[0]!r}",
                     "run the recording again",
                     path=str(self.run),
                     column=missing[0],
@@ -58,7 +58,7 @@ class ParameterTable:
 
 
 def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
-    """Write parameters in long form, part by part, under the names of `COLUMNS`; units stand in their own column.
+    """Write parameters in long form, part by part, with the names of `COLUMNS`; units have their own column.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
 
 
 def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
-    """Write parameters as a MATLAB struct `livebode` of columns, as `struct2table` takes it; text is in cells.
+    """Write parameters as a MATLAB struct `livebode` of columns, for `struct2table`; text is in cells.
 
     Raises
     ------

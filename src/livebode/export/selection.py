@@ -1,4 +1,4 @@
-"""One response of many."""
+"""Select one response of many."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from livebode.core import Response, Responses, SignalError, UsageError
 
 
 def at(parts: Iterable[Responses], time_s: float) -> Response:
-    """The response nearest to a moment that has a valid line.
+    """The response with a valid line that is nearest to a time.
 
-    It speaks for its own `time_s`, the centre of its window; nothing is interpolated.
+    Its effective time is its own `time_s`, the centre of its window; nothing is interpolated.
 
     Parameters
     ----------
     parts
-        Responses in order, such as `Run.batches()`; they are read once and not kept.
+        Responses in order, such as `Run.batches()`; they are read once and not stored.
     time_s
-        The moment in the recording's clock.
+        The time in the recording's clock.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
         raise SignalError(
             "no-response-there",
             f"no valid response is within half a window ({reach_s:g} s) of {time_s:g} s",
-            f"take the nearest, at {nearest.time_s:.9g} s",
+            f"use the nearest, at {nearest.time_s:.9g} s",
             argument="time_s",
             time_s=time_s,
             nearest_s=nearest.time_s,

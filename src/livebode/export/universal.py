@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from livebode.core import ExtraError, Response, Responses, SignalError
 from livebode.export.written import Written
 
-_LABEL, _ID = 20, 80  # letters that the format has for a unit and for a line of text
+_LABEL, _ID = 20, 80  # longest unit and line of text in the format
 _LINES_MIN = 2
 _UNKNOWN, _TIME, _FREQUENCY = 0, 17, 18  # specific data types
 _FRF, _SCALAR = 4, 0
@@ -25,13 +25,12 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
 
     Function type 4 (frequency response function), complex in double precision (12 digits), abscissa in Hz, response
     and reference node 1, scalar. The ordinate's unit is its label, cut at 20 letters; ID line 1 is the quantity
-    with its channels, ID line 2 the quantity's unit in full, ID line 4 the moment, schedule and extent; the moment
-    is the z-axis value as well.
+    with its channels, ID line 2 the quantity's unit in full, ID line 4 the time, schedule and extent; the time is
+    also the z-axis value.
 
-    Lines that are not valid are left out, since the format knows no NaN. The spacing is even where the valid lines
-    are evenly spaced and the format's six digits hold start and step exactly, else uneven, with each frequency to
-    six digits. Responses with fewer than two valid lines are left out. Sigma and coherence have no place in a
-    frequency response function.
+    Invalid lines are omitted, because the format has no NaN. The spacing is even if the valid lines are evenly spaced
+    and six digits represent start and step exactly; else it is uneven, with six digits per frequency. Responses with
+    fewer than two valid lines are omitted. The format has no field for sigma and coherence.
 
     Raises
     ------
@@ -48,7 +47,7 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
         ) from None
     functions = left_out = 0
     with path.open("wb") as file, TemporaryDirectory(prefix=f"{path.name}-", dir=path.parent) as folder:
-        # pyuff reads a file anew after each set that it adds to it; sets may simply follow each other.
+        # pyuff reads the file again after each set that it appends; sets can simply be concatenated.
         scratch = os.path.join(folder, "set")
         for response in (response for part in parts for response in part):
             if np.count_nonzero(response.valid) < _LINES_MIN:
@@ -64,14 +63,14 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
         raise SignalError(
             "too-few-lines",
             f"no response has {_LINES_MIN} valid lines, which UFF 58 needs",
-            "export csv or mat, which take a response with fewer",
+            "export csv or mat, which accept a response with fewer",
             lines_min=_LINES_MIN,
         )
     return Written(functions, left_out)
 
 
 def _cause(error: BaseException) -> BaseException:
-    """What went wrong first: pyuff turns a full disk and even the end of the program into an error of its own."""
+    """The original error: pyuff converts a full disk, and even the end of the program, to its own error."""
     while error.__context__ is not None:
         error = error.__context__
     return error
@@ -129,6 +128,6 @@ def _moment(response: Response) -> str:
 
 
 def _text(text: str, length: int) -> str:
-    """What a line of the format can hold: ASCII, no line breaks, not blank."""
+    """Text that a line of the format can contain: ASCII, no line breaks, not blank."""
     plain = text.replace("µ", "u").replace("μ", "u").replace("°", "deg").encode("ascii", "replace").decode()
     return "".join(c if c.isprintable() else "?" for c in plain).strip()[:length] or "NONE"

@@ -1,4 +1,4 @@
-"""What an export came to, and the limit on what is held at once."""
+"""Result of an export, and the limit of what is in memory at once."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import NamedTuple
 from livebode.core import OutputError, RecordError, Responses
 
 VALUES_MAX = 1 << 23
-"""Most values (responses times lines) that a format takes which is not written in parts: some 2 GB of memory."""
+"""Most values (responses times lines) of a format that is not written in parts: about 2 GB of memory."""
 
 
 class Written(NamedTuple):
-    """How many rows stand in a file, and how many the format could not take."""
+    """Number of rows in a file, and of rows that the format could not represent."""
 
     rows: int
     left_out: int = 0
 
 
 def whole(parts: Iterable[Responses], format: str) -> Responses:
-    """All parts as one, while they are few enough.
+    """All parts as one, if their size is allowed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a run leaves on disk, written and read back."""
+"""Write and read the directory of a run."""
 
 from livebode.records.parameter_table import PARAMETERS, parameter_rows
 from livebode.records.plain_json import to_json

@@ -1,4 +1,4 @@
-"""events.jsonl read back: line by line, each checked, a damaged one named in its place."""
+"""Read events.jsonl: line by line, each checked; a damaged line is reported in its place."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _LINE_BYTES_MAX = 1 << 20
 
 
 def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Iterator[Event]:
-    """The events of a run in order; in the place of a damaged line an event of kind "record-damaged", told as well.
+    """The events of a run in order; a damaged line becomes an event of kind "record-damaged", which is also reported.
 
-    A last line without an end is being written, unless the run is finished.
+    A last line without an end is still being written, except if the run is finished.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Itera
 
 
 def to_event(value: Any) -> Event | None:
-    """The event in this plain data; None where a run does not write such a one."""
+    """The event in this plain data; None if a run cannot have written it."""
     if not isinstance(value, dict):
         return None
     try:

@@ -1,4 +1,4 @@
-"""How the events of one cause are written in one line of events.jsonl, and read back one by one or counted."""
+"""Events of one cause in one line of events.jsonl: how they are written, and read one by one or counted."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}  # that 
 
 
 def each_event(event: Event) -> Iterator[Event]:
-    """Every event that a recorded one reports, as it was before it was grouped, in the order in which they happened.
+    """Every event in a recorded one, as it was before grouping, in order of time.
 
-    Those of a flood that were only counted are not among them: see `event_counts`.
+    Events of a flood that were only counted are missing: see `event_counts`.
     """
     repeats = _repeats(event)
     if not repeats:
@@ -24,7 +24,7 @@ def each_event(event: Event) -> Iterator[Event]:
 
 
 def event_counts(event: Event) -> Counter[str]:
-    """How many events of each kind a recorded one reports, with those that were only counted.
+    """Number of events of each kind in a recorded one, including those that were only counted.
 
     >>> line = Event("gap", 9, 0.9, "a gap", {"repeats": [["gap", 8, 0.8, "", {}], ["loss", 9, 0.9, "", {}]],
     ...                                       "counted": {"gap": 40}})
@@ -38,7 +38,7 @@ def event_counts(event: Event) -> Counter[str]:
 
 
 def _repeats(event: Event) -> list[Event]:
-    """Those in the event's details; none where they are not what a run writes, for a record may come from anybody."""
+    """Events in the event's details; none if they are not in the form of a run, because a record is untrusted data."""
     repeats = event.details.get("repeats")
     try:
         found = [Event(*repeat) for repeat in repeats] if isinstance(repeats, list) else []
@@ -50,13 +50,13 @@ def _repeats(event: Event) -> list[Event]:
 
 
 def group_of(event: Event) -> tuple[str, int] | None:
-    """Name of the group that an event belongs to, and how many events the group had with it; None without a group."""
+    """Name of an event's group, and number of events of the group up to it; None without a group."""
     name, count = event.details.get("group"), event.details.get("count")
     return (name, count) if isinstance(name, str) and type(count) is int else None
 
 
 def still_waiting(events: Iterable[Event], waiting: Iterable[Event]) -> Iterator[Event]:
-    """These events, and behind them those of `waiting` that no line of their group reports yet."""
+    """These events, then those of `waiting` that no line of their group reports yet."""
     reported: dict[str, int] = {}
     for event in events:
         if (group := group_of(event)) is not None:
@@ -74,9 +74,9 @@ class EventRow:
     Attributes
     ----------
     newest
-        The newest of them with sample, time and message; of those that were only counted, these are not known.
+        The newest of them with sample, time and message; for those that were only counted, these are not known.
     count
-        How many they are.
+        Number of events.
     first_s, last_s
         Times of the first and of the newest, or of the line that counts it.
     """
@@ -88,7 +88,7 @@ class EventRow:
 
 
 def event_rows(events: Iterable[Event]) -> list[EventRow]:
-    """One row for each kind of event in a group, and for each event without a group, in the order of their first."""
+    """One row for each kind of event in a group, and for each event without a group, in order of the first event."""
     rows: list[EventRow] = []
     of: dict[tuple[str, str], EventRow] = {}
     for event in events:

@@ -1,6 +1,6 @@
-"""Files of a run: regular ones, by plain name inside its directory, through no link.
+"""Files of a run: only regular files, by plain name inside its directory, not through links.
 
-A run may come from anybody. A link in it, a pipe or a device would let it name what is outside.
+A run is untrusted data. A link, a pipe or a device in it could refer to something outside.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ _SAFE |= getattr(os, "O_BINARY", 0)
 
 
 def open_read(run: Path, name: str) -> BinaryIO:
-    """A file of a run, to be read.
+    """Open a file of a run for reading.
 
     Raises
     ------
     RecordError
-        If it is no regular file, or reached through a link.
+        If it is not a regular file, or reached through a link.
     OSError
-        If it cannot be opened; FileNotFoundError where it is not there.
+        If it cannot be opened; FileNotFoundError if it is missing.
     """
     check_folder(run, name)
     try:
@@ -41,14 +41,14 @@ def open_read(run: Path, name: str) -> BinaryIO:
 
 
 def read_bytes(run: Path, name: str, size_bytes_max: int | None = None) -> bytes:
-    """All that a file of a run holds; RecordError where it is longer than this."""
+    """Content of a file of a run; RecordError if it is longer than this."""
     with open_read(run, name) as file:
         small = size_bytes_max is None or os.fstat(file.fileno()).st_size <= size_bytes_max
         data = file.read(-1 if size_bytes_max is None else size_bytes_max + 1) if small else b""
     if not small or (size_bytes_max is not None and len(data) > size_bytes_max):
         raise RecordError(
             "too-large",
-            f"{str(run / name)!r} is longer than the {size_bytes_max} bytes that a run writes at most",
+            f"{str(run / name)!r} is longer than {size_bytes_max} bytes, the limit for a file of a run",
             "move it away",
             path=str(run / name),
             limit_bytes=size_bytes_max,
@@ -62,19 +62,19 @@ def is_folder(path: Path) -> bool:
 
 
 def check_folder(run: Path, name: str) -> None:
-    """RecordError where the directory of a run's file is a link, or a file."""
+    """RecordError if the directory of a run's file is a link, or a file."""
     folder = (run / name).parent
     if folder != run and os.path.lexists(folder) and not is_folder(folder):
         raise RecordError(
             "not-own-file",
-            f"{str(folder)!r} is a link or a file, where a run has a directory",
+            f"{str(folder)!r} is a link or a file instead of a directory",
             "remove it",
             path=str(folder),
         )
 
 
 def check_own(run: Path, name: str) -> None:
-    """RecordError where a file that is to be written is a link, no regular file, or has another name elsewhere."""
+    """RecordError if a file to be written is a link, not a regular file, or has another hard link."""
     check_folder(run, name)
     try:
         found = os.lstat(run / name)

@@ -1,4 +1,4 @@
-"""parameters.parquet: one row for each response and parameter, that any tool reads."""
+"""parameters.parquet: one row for each response and parameter, readable with any tool."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ SCHEMA = pa.schema(
         ("epsilon", pa.float64()),
     ]
 )
-"""Columns: those of the response; model, parameter or derived quantity, its value and standard deviation (NaN where the
-status is not "ok"), unit, status, and what the model lacks as a share of |G|."""
+"""Columns: those of the response; model, parameter or derived quantity, its value and standard deviation (NaN if the
+status is not "ok"), unit, status, and the model's misfit as a share of |G|."""
 
 PARAMETERS = Table(SCHEMA, ("sample", "time_s", "schedule", "model", "name", "unit", "status"))
 

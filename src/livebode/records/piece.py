@@ -1,4 +1,4 @@
-"""The checksums of a table in one Parquet file: of each row group and of the end, so that damage costs little."""
+"""Checksums of a table in one Parquet file: of each row group and of the end, so that damage loses few rows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _verified: dict[tuple[object, ...], list[bool]] = {}
 
 @dataclass(frozen=True)
 class Part:
-    """Consecutive bytes of a Parquet file: a row group, or, with no rows, what is behind the last one."""
+    """Consecutive bytes of a Parquet file: a row group, or, with no rows, the bytes after the last one."""
 
     rows: int
     size_bytes: int
@@ -30,7 +30,7 @@ class Part:
 
 
 def parts_of(path: Path) -> list[dict[str, Any]]:
-    """The parts of a file that has just been written, for run.json."""
+    """The parts of a newly written file, for run.json."""
     with path.open("rb") as file:
         about = pq.read_metadata(file)
         groups = [about.row_group(number) for number in range(about.num_row_groups)]
@@ -43,12 +43,12 @@ def parts_of(path: Path) -> list[dict[str, Any]]:
 
 
 class Piece:
-    """A table in one file, with what run.json says of its parts; None where it says nothing.
+    """A table in one file, with the entries of run.json on its parts; None without entries.
 
     Raises
     ------
     RecordError
-        If run.json says what a run does not write.
+        If these entries are not in the form of a run.
     """
 
     def __init__(self, run: Path, name: str, parts: Any, tell: Callable[[Event], None]) -> None:
@@ -61,14 +61,14 @@ class Piece:
         except (TypeError, LookupError, ValueError):
             raise RecordError(
                 "unexpected-content",
-                f"{str(run / 'run.json')!r} does not name the parts of {name} as a run does",
+                f"{str(run / 'run.json')!r} has invalid entries for the parts of {name}",
                 "run the recording again",
                 path=str(run / "run.json"),
                 key=f"files.{name}",
             ) from None
 
     def groups(self) -> list[int] | None:
-        """The numbers of the row groups that are whole; None for all. Damaged ones are reported.
+        """The numbers of the intact row groups; None for all. Damaged ones are reported.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Piece:
                 return None
             whole = self._whole(file, self._parts)
         if not whole[-1]:
-            self._tell_of("its end is, and nothing of it can be read", sum(part.rows for part in self._parts))
+            self._tell_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))
             return []
         begin = 0
         for part, sound in zip(self._parts, whole):
@@ -90,16 +90,16 @@ class Piece:
         return [number for number, sound in enumerate(whole[:-1]) if sound]
 
     def batches(self, rows: int) -> Iterator[pa.RecordBatch]:
-        """The rows that are whole, in parts of at most so many."""
+        """The intact rows, in parts of at most so many."""
         groups = self.groups()
         if groups == []:
             return
-        # Else what was read ahead of a long run stays in memory until its end.
+        # Otherwise the read-ahead data of a long run remains in memory until its end.
         with pq.ParquetFile(self._run / self._name, pre_buffer=False) as file:
             yield from file.iter_batches(rows, row_groups=groups)
 
     def _whole(self, file: BinaryIO, parts: list[Part]) -> list[bool]:
-        """Whether each part is; computed once in a process, as long as the file is not touched."""
+        """Whether each part is intact; computed once per process, as long as the file is unchanged."""
         status = os.fstat(file.fileno())
         key = (tuple(parts), status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
         if key not in _verified:

@@ -1,4 +1,4 @@
-"""JSON that every reader takes: NaN and infinity, which JSON cannot say, become null."""
+"""Standard JSON: NaN and infinity, which JSON does not have, become null."""
 
 from __future__ import annotations
 

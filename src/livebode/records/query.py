@@ -29,7 +29,7 @@ _SINGLE_EVENTS = pa.schema(
 )
 _COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
 _EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
-# Reads nothing but what it is given and writes nothing: a query that came by mail can be run.
+# It reads only the given tables and writes nothing, so that an untrusted query can be run.
 _CONFINED = (
     "SET memory_limit = '2GB'",
     "SET temp_directory = ''",
@@ -41,7 +41,7 @@ _CONFINED = (
 
 @dataclass(frozen=True)
 class Found:
-    """The rows that a query gave; `more` where there were others that were left out."""
+    """The rows of a query; `more`: there are others that were omitted."""
 
     columns: tuple[str, ...]
     rows: list[tuple[Any, ...]]
@@ -49,16 +49,16 @@ class Found:
 
 
 def query(run: Run, sql: str, rows_max: int) -> Found:
-    """The first rows that a query of the tables responses, parameters, samples, events and single_events gives.
+    """The first rows of a query on the tables responses, parameters, samples, events and single_events.
 
     Parameters
     ----------
     run
-        Finished, killed, or being written; what was committed when it is asked counts.
+        Finished, killed, or being written; the query uses what is committed at its start.
     sql
-        DuckDB's SQL. It sees these tables and no file.
+        DuckDB's SQL. It can read these tables and no files.
     rows_max
-        Most rows to give.
+        Most rows to return.
 
     Raises
     ------
@@ -83,14 +83,14 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
         try:
             asked = {str(name).lower() for name in database.get_table_names(sql)} or set(_TABLES)
         except duckdb.Error:
-            asked = set(_TABLES)  # it is no SELECT, and will be refused below
+            asked = set(_TABLES)  # it is not a SELECT, and is rejected below
         _show(run, database, asked)
         for setting in _CONFINED:
             database.execute(setting)
         try:
             found = _answered(database, sql, rows_max)
         except duckdb.Error as error:
-            # Below the sentence stands the query again, with an arrow.
+            # After the sentence the message repeats the query, with an arrow.
             sentence = " ".join(str(error).split("\n\n")[0].split())
             tables = _known(run)
             raise UsageError(
@@ -110,7 +110,7 @@ def query(run: Run, sql: str, rows_max: int) -> Found:
 
 
 def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
-    """The answer; None where the SQL is empty. Ctrl-C ends the query."""
+    """The result; None if the SQL is empty. Ctrl-C ends the query."""
 
     def ask() -> Found | None:
         answer = database.execute(sql)
@@ -119,7 +119,7 @@ def _answered(database: Any, sql: str, rows_max: int) -> Found | None:
         columns, rows = tuple(column[0] for column in answer.description or ()), answer.fetchmany(rows_max + 1)
         return Found(columns, rows[:rows_max], len(rows) > rows_max)
 
-    # In another thread, since DuckDB looks for signals now and then only.
+    # In another thread, because DuckDB checks for signals only occasionally.
     with ThreadPoolExecutor(1) as worker:
         running = worker.submit(ask)
         try:
@@ -134,7 +134,7 @@ def _known(run: Run) -> list[str]:
 
 
 def _show(run: Run, database: Any, asked: set[str]) -> None:
-    """Make the tables of the run that are asked for known to the database, and its events."""
+    """Register the requested tables of the run, and its events, in the database."""
     found = run.files([table for table in _TABLES if table in asked])
     for table, files in found.items():
         parts = ([_dataset(files)] if files.paths else []) + [pa.Table.from_batches([rows]) for rows in files.rows]
@@ -157,7 +157,7 @@ def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
 
 
 def _nan_as_null(schema: pa.Schema) -> str:
-    """All columns, with null where there is no value, which SQL's averages leave out."""
+    """All columns, with null for missing values, which SQL's averages ignore."""
     numbers = [field.name for field in schema if pa.types.is_float64(field.type)]
     return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"
 

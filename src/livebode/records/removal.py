@@ -1,4 +1,4 @@
-"""Removing a run: what livebode writes there, by name, and nothing else."""
+"""Remove a run: only files that livebode writes, by name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FOLDERS = {
 
 
 def foreign(run: Path) -> list[str]:
-    """What is in the directory of a run and was not written by livebode: other names, links, pipes, devices."""
+    """Entries in the directory of a run that livebode did not write: other names, links, pipes, devices."""
     found = []
     for path in sorted(run.iterdir()):
         inner = _FOLDERS.get(path.name)
@@ -39,7 +39,7 @@ def foreign(run: Path) -> list[str]:
 
 
 def check_removable(path: Path) -> None:
-    """RecordError where this is not an empty directory, or that of a run with nothing foreign in it."""
+    """RecordError if this is neither an empty directory nor that of a run without foreign files."""
     if not is_folder(path) or (any(path.iterdir()) and not os.path.lexists(path / "run.json")):
         raise RecordError(
             "not-a-run",
@@ -54,22 +54,22 @@ def check_removable(path: Path) -> None:
         named = ", ".join(others[:_SHOWN]) + f" and {len(others) - _SHOWN} more" * (len(others) > _SHOWN)
         raise RecordError(
             "foreign-files",
-            f"{str(path)!r} is not replaced, since it holds what livebode did not write: {named}",
-            "move that away, or choose another path",
+            f"{str(path)!r} is not replaced, because it contains files that livebode did not write: {named}",
+            "move them away, or choose another path",
             path=str(path),
             files=others,
         )
 
 
 def remove(run: Path, *, itself: bool = True) -> None:
-    """Remove what livebode wrote there, and the directory itself, if it is empty then.
+    """Remove what livebode wrote there, and the directory itself if it is then empty.
 
     Raises
     ------
     OSError
-        If something cannot be removed, or there is something else.
+        If something cannot be removed, or there are other files.
     """
-    # Without it the rest is not a run: it goes last, so that what was interrupted can be done again.
+    # Without it the rest is not a run: it is removed last, so that an interrupted removal can be repeated.
     for path in sorted(run.iterdir(), key=lambda path: path.name == "run.json"):
         inner = _FOLDERS.get(path.name)
         if inner is not None and is_folder(path):

@@ -1,4 +1,4 @@
-"""responses.parquet: one row for each response and line, that any tool reads."""
+"""responses.parquet: one row for each response and line, readable with any tool."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ SCHEMA = pa.schema(
         ("distortion", pa.float64()),
     ]
 )
-"""Columns: oldest and newest sample that went in, time of the centre (s), scheduling signal there, line (Hz), complex
+"""Columns: oldest and newest sample of the window, time of its centre (s), scheduling signal there, line (Hz), complex
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
-input, weight in a mean, distortion. NaN where there is no value."""
+input, weight in a mean, distortion. NaN for missing values."""
 
 ADDED = SCHEMA.names[SCHEMA.get_field_index("valid") + 1 :]
 """Columns that runs of earlier versions do not have."""

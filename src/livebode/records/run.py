@@ -1,4 +1,4 @@
-"""A run read back: what its directory holds, as the objects that were written."""
+"""Read a run: its directory as the objects that were written."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from livebode.records.summary_file import RUN, read_summary
 from livebode.records.summary_shape import what_is_wrong
 
 _logger = logging.getLogger(__name__)
-_ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
+_ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
 
 
 @dataclass(frozen=True)
 class Files:
-    """Where the rows of a table are: Parquet files, of a single one perhaps only some row groups, and batches."""
+    """Location of the rows of a table: Parquet files (of a single one possibly only some row groups), and batches."""
 
     paths: list[Path]
     groups: list[int] | None
@@ -39,7 +39,7 @@ class Files:
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
-    """The lines that run.json names under `found`."""
+    """The lines in `found` of run.json."""
     return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
 
 
@@ -47,18 +47,18 @@ def lines_in(found: Mapping[str, Any]) -> Lines:
 class Run:
     """The directory of a run: finished, stopped, killed, or still being written.
 
-    What is read is what was committed when it is read; a run that is being written has more a moment later.
+    Reading returns what is committed at that time; a run that is being written has more later.
 
     Attributes
     ----------
     path
-        Where it stands.
+        Its directory.
     summary
-        run.json as it is.
+        run.json.
     damages
-        What was found damaged so far, as events of kind "record-damaged"; the rest is read.
+        Damage found so far, as events of kind "record-damaged"; everything else is read.
     told
-        Called with each of them, once; a `DamageWarning` by default.
+        Called once with each of them; a `DamageWarning` by default.
     """
 
     path: Path
@@ -73,16 +73,16 @@ class Run:
         Raises
         ------
         RecordError
-            If no run wrote it, or run.json or the responses cannot be read.
+            If it is not from a run, or run.json or the responses cannot be read.
         GridError
-            If the lines in run.json cannot be a grid.
+            If the lines in run.json are not a valid grid.
         """
         summary, damaged = read_summary(path)
         run = cls(path, summary, told=told)
         if wrong := what_is_wrong(summary):
             raise RecordError(
                 "unexpected-content",
-                f"{str(path / RUN)!r} is not what a run writes ({wrong})",
+                f"{str(path / RUN)!r} has an invalid value ({wrong})",
                 "run the recording again",
                 path=str(path / RUN),
                 reason=wrong,
@@ -96,7 +96,7 @@ class Run:
         return run
 
     def tell(self, damage: Event) -> None:
-        """Note what was found damaged."""
+        """Record damage that was found."""
         if damage not in self.damages:
             self.damages.append(damage)
             _logger.warning("%s: %s", self.path, damage.message)
@@ -107,36 +107,36 @@ class Run:
 
     @property
     def found(self) -> dict[str, Any]:
-        """What run.json says of rate, window, lines, quantity and unit."""
+        """Rate, window, lines, quantity and unit from run.json."""
         return dict(self.summary["found"])
 
     @property
     def lines(self) -> Lines:
-        """Where it was measured."""
+        """Source of the measurement."""
         return lines_in(self.found)
 
     @property
     def finished(self) -> bool:
-        """Whether its source came to its end and everything is written."""
+        """Whether its source ended and everything is written."""
         return bool(self.summary.get("record", {}).get("finished", True))
 
     def responses(self) -> Responses:
-        """All responses, as they were written; none before the first."""
+        """All responses, as written; an empty batch before the first."""
         return Responses.join(list(self.batches()) or [self._responses(SCHEMA.empty_table(), self.lines)])
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
-        """All that can be read in order, in parts of bounded size; or the newest, from files of no more than this."""
+        """All readable responses in order, in parts of bounded size; or the newest, from files up to this size."""
         return self._in_parts(self.tables("responses", size_bytes_max))
 
     def steady_batches(self) -> Iterator[Responses]:
-        """The same without those from a transient at the start of a live run; those that the run averaged are all."""
+        """The same without a transient at the start of a live run; averaged responses are all included."""
         left_out = int(self.summary.get("left_out_samples") or 0)
         averages = (self.summary.get("configuration", {}).get("tracking") or {}).get("average")
         for part in self.batches():
             yield part if averages or not left_out else part[np.flatnonzero(part.first >= left_out)]
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
-        """Those that speak for a span of time, ends included, in parts; segments outside of it are not read."""
+        """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""
         for part in self._in_parts(self.tables("responses", span_s=(from_s, to_s))):
             if len(within := part.between(from_s, to_s)):
                 yield within
@@ -148,7 +148,7 @@ class Run:
             if part.schema.names not in (SCHEMA.names, [name for name in SCHEMA.names if name not in ADDED]):
                 raise RecordError(
                     "unexpected-content",
-                    f"the responses in {str(self.path)!r} have other columns than a run writes",
+                    f"the responses in {str(self.path)!r} have unexpected columns",
                     "run the recording again",
                     path=str(self.path),
                     columns=part.schema.names,
@@ -163,7 +163,7 @@ class Run:
         if rest is not None and rest.num_rows:
             raise RecordError(
                 "unexpected-content",
-                f"the record in {str(self.path)!r} ends within a response, which a run does not write",
+                f"the record in {str(self.path)!r} ends within a response",
                 "run the recording again",
                 path=str(self.path),
             )
@@ -171,15 +171,15 @@ class Run:
     def tables(
         self, name: str, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
     ) -> Iterator[pa.Table]:
-        """The rows of "responses", "parameters" or "samples" in order, part by part; none where it was not recorded.
+        """The rows of "responses", "parameters" or "samples" in order, part by part; none if it was not recorded.
 
-        With `span_s`, segments that lie wholly outside of that time are left out.
+        With `span_s`, segments completely outside of that time are skipped.
 
         Raises
         ------
         RecordError
-            While iterating, if nothing can be read, or it holds what a run does not write. A part that is damaged is
-            left out and noted in `damages`.
+            While iterating, if nothing can be read, or the content is not from a run. A damaged part is skipped and
+            reported in `damages`.
         """
         file = self.path / name
         try:
@@ -191,21 +191,21 @@ class Run:
             raise _unreadable(file, error) from None
 
     def _piece(self, name: str) -> Piece | None:
-        """A table that is in one file; None where it was not recorded, or the file is gone, which is reported."""
+        """A table in one file; None if it was not recorded, or if the file is missing, which is reported."""
         file, parts = f"{name}.parquet", self.summary.get("files", {})
         if os.path.lexists(self.path / file):
             return Piece(self.path, file, parts.get(file), self.tell)
         if name == "responses" or file in parts:
-            self.tell(Event(KIND, 0, 0.0, f"{file} is damaged: it is gone", {"file": file}))
+            self.tell(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
         return None
 
     @property
     def segments(self) -> list[Segment]:
-        """The closed segments that stand, by age; none where the run is not kept in segments."""
+        """The existing closed segments, by age; none if the run is not recorded in segments."""
         return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
 
     def files(self, tables: Collection[str]) -> dict[str, Files]:
-        """Of these tables, those that were recorded: the Parquet files that are whole, and the rows in none yet."""
+        """The recorded ones of these tables: the intact Parquet files, and the rows that are not in a file yet."""
         try:
             if not reading.in_segments(self.path):
                 groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
@@ -221,32 +221,32 @@ class Run:
         return {name: files for name, files in found.items() if files.paths or files.rows}
 
     def events(self) -> list[Event]:
-        """What was recorded, with an event of kind "record-damaged" in the place of each damaged line.
+        """Recorded events; each damaged line is replaced by an event of kind "record-damaged".
 
-        Of a run that goes on, or was killed, with those at the end that are not in events.jsonl yet.
+        For a run that continues or was killed, this includes the last events that are not in events.jsonl yet.
         """
         return list(self.each_event())
 
     def each_event(self) -> Iterator[Event]:
-        """The same one by one, however many they are."""
-        # Before the lines: what was written in between is then in both, and not in neither.
+        """The same one by one, in bounded memory."""
+        # Before the lines: events written in between are then in both instead of in neither.
         waiting = self.waiting_events()
         yield from still_waiting(self.event_lines(), waiting)
 
     def waiting_events(self) -> list[Event]:
-        """Those that will share a line of events.jsonl with others, as of the newest commit."""
+        """Events of the newest commit that will share a line of events.jsonl."""
         plain = [] if self.finished or not reading.in_segments(self.path) else reading.waiting_events(self.path)
         return [event for value in plain if (event := event_lines.to_event(value)) is not None]
 
     def event_lines(self) -> Iterator[Event]:
-        """What is in events.jsonl."""
+        """Events in events.jsonl."""
         try:
             yield from event_lines.events(self.path, self.tell, finished=self.finished)
         except OSError as error:
             raise _unreadable(self.path / event_lines.NAME, error) from None
 
     def each_event_and_damage(self) -> Iterator[Event]:
-        """The same, and behind them what else was found damaged in what was read so far."""
+        """The same, followed by other damage found so far."""
         yield from self.each_event()
         yield from (damage for damage in self.damages if damage.details.get("file") != event_lines.NAME)
 

@@ -1,4 +1,4 @@
-"""The directory that a run leaves: written beside its place, and moved there when it is whole."""
+"""The directory of a run: written next to its place, and moved there when it is complete."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ _logger = logging.getLogger(__name__)
 
 
 class RunDirectory:
-    """Responses, events and a summary of one run in a new directory that appears only when it is whole.
+    """Responses, events and a summary of one run in a new directory that appears only when it is complete.
 
-    Use it as a context manager: leaving it without an exception puts the directory in its place, any exception removes
-    what was written. What any tool reads: ``responses.parquet`` (see `RESPONSES`), ``events.jsonl`` (one object
-    a line: kind, sample, time_s, message, details) and ``run.json``.
+    Use it as a context manager: leaving it without an exception moves the directory to its place, any exception removes
+    what was written. Files, readable with any tool: ``responses.parquet`` (see `RESPONSES`), ``events.jsonl`` (one
+    object a line: kind, sample, time_s, message, details) and ``run.json``.
 
     Parameters
     ----------
     path
-        Where the directory is to stand.
+        Path of the directory.
     force
-        Whether to replace a directory that stands there already. Only a directory that a run left is replaced.
+        Whether to replace an existing directory. Only the directory of a run is replaced.
 
     Raises
     ------
     RecordError
-        If something stands there and is not to be or must not be replaced, or the disk refuses to take it.
+        If the path exists and must not be replaced, or the disk reports an error.
     """
 
     def __init__(self, path: Path, *, force: bool = False) -> None:
@@ -73,7 +73,7 @@ class RunDirectory:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         try:
             if kind is not None:
-                with contextlib.suppress(OSError, pa.ArrowException):  # what is closed here is removed below
+                with contextlib.suppress(OSError, pa.ArrowException):  # the closed files are removed below
                     self._close()
             else:
                 with _disk_errors(self.path):
@@ -92,7 +92,7 @@ class RunDirectory:
             self._responses.write(as_batch(responses))
 
     def write_parameters(self, *parts: Parameters) -> None:
-        """Append what was fitted and what follows; the file ``parameters.parquet`` is there once anything was."""
+        """Append fitted parameters and derived quantities; the first ones create ``parameters.parquet``."""
         with _disk_errors(self.path):
             if self._parameters is None:
                 self._parameters = TableFile(self.partial / "parameters.parquet", PARAMETERS)
@@ -141,7 +141,7 @@ class RunDirectory:
             )
         check_removable(self.path)
         if segments:
-            from livebode.records.segments.lock import Lock  # needs a POSIX system, as what left them did
+            from livebode.records.segments.lock import Lock  # needs a POSIX system, as the run that wrote them did
 
             Lock(self.path).release()
 
@@ -168,8 +168,8 @@ def _disk_sentence(path: Path, error: OSError) -> RecordError:
     why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
     return RecordError(
         "not-written",
-        f"the run could not be written to {str(path)!r}: {why}; nothing was left there",
-        "make room, or choose another path",
+        f"the run could not be written to {str(path)!r}: {why}; nothing was changed there",
+        "free some space, or choose another path",
         path=str(path),
         reason=why,
         errno=error.errno,

@@ -17,7 +17,7 @@ _OWN = ("sample", "time_s")
 def samples_of(channels: Sequence[Channel]) -> Table:
     """The table: number of the sample, its time (s), and a column for each channel with its unit in the metadata.
 
-    A channel that is called like one of the first two columns gets an underscore behind its name.
+    A channel with the name of one of the first two columns gets an underscore after its name.
     """
     own = [pa.field("sample", pa.int64()), pa.field("time_s", pa.float64())]
     columns = [

@@ -1,4 +1,4 @@
-"""run.json: what a run measured and how, with a checksum, and a copy of it that is read where it is damaged."""
+"""run.json: description of a run, with a checksum, and a copy that is read if it is damaged."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CHECKSUM = re.compile(r',\n  "crc32": "([0-9a-f]{8})"\n\}\n?\Z')
 
 
 def to_document(summary: dict[str, Any]) -> bytes:
-    """The summary as JSON over several lines, with the CRC-32 of its text without that key as its last one.
+    """The summary as JSON over several lines; its last key is the CRC-32 of the text without that key.
 
     >>> print(to_document({"found": {}}).decode(), end="")
     {
@@ -32,9 +32,9 @@ def to_document(summary: dict[str, Any]) -> bytes:
 
 
 def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
-    """The summary again, without its checksum; ValueError where it is not what was written.
+    """The summary without its checksum; ValueError if it is not as it was written.
 
-    One without a checksum is taken where it need not be `checked`. What is null is as if it was not there.
+    Without `checked`, a summary without a checksum is accepted. Null values are treated as missing.
 
     >>> from_document(to_document({"found": {"rate_hz": 1000}}))
     {'found': {'rate_hz': 1000}}
@@ -60,7 +60,7 @@ def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
 
 
 def read_summary(run: Path) -> tuple[dict[str, Any], str]:
-    """What run.json says, or its copy where it is damaged; then also a sentence that says so.
+    """Content of run.json, or of its copy if it is damaged; then also a message on this.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
         raise RecordError(
             "not-a-run",
             f"{str(run)!r} is not the directory of a run: it has no run.json",
-            "name the directory of a run",
+            "give the directory of a run",
             path=str(run),
         ) from None
     except RecordError as error:

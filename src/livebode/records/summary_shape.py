@@ -1,4 +1,4 @@
-"""What run.json holds, by name and type: a file that came from anybody is refused before anything relies on it."""
+"""Names and types in run.json: an untrusted file is checked before it is used."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class _Summary(_Part):
 
 
 def what_is_wrong(summary: dict[str, Any]) -> str:
-    """The first value that a run does not write, in words; empty where there is none.
+    """Description of the first invalid value; empty if there is none.
 
     >>> what_is_wrong({"found": {"rate_hz": "fast", "window": 10, "bins": [1], "quiet_bins": []}})
     'found.rate_hz: Input should be a valid number'

@@ -1,4 +1,4 @@
-"""Table: how the rows of one kind are laid out, in the journal, in Parquet and in Arrow alike."""
+"""Table: layout of the rows of one kind, in the journal, in Parquet and in Arrow."""
 
 from __future__ import annotations
 

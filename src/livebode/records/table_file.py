@@ -1,4 +1,4 @@
-"""A table as one Parquet file, that any tool reads."""
+"""A table as one Parquet file, readable with any tool."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TableFile:
 
     def _flush(self) -> None:
         waiting, rows = self._waiting, self._rows
-        self._waiting, self._rows = [], 0  # first, so that rows which a disk refused are not written again by `close`
+        self._waiting, self._rows = [], 0  # first, so that `close` does not write rows again after a disk error
         if waiting:
-            # One group, so that it ends with a whole response: a damaged one is then left out without cutting the next.
+            # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
             self._file.write_table(pa.Table.from_batches(waiting, self._schema), row_group_size=rows)

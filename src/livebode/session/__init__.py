@@ -1,4 +1,4 @@
-"""From a source to the record: what one run of livebode does."""
+"""One run of livebode: from a source to the record."""
 
 from livebode.session.audience import Audience, Relay
 from livebode.session.axis import Axis

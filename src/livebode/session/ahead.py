@@ -1,4 +1,4 @@
-"""Losses of a live source wait until the samples behind them are tracked."""
+"""Losses of a live source wait until the samples after them are tracked."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from livebode.session.event_groups import CAUSES
 
 
 class LossesAhead:
-    """Holds back each loss that is reported before the samples that show it are part of the record.
+    """Delays each loss that is reported before the samples after it are recorded.
 
-    A process that is killed in between records the samples before the loss only. The next process finds the same loss
-    again, and longer: with both in the record, it would be counted twice.
+    A process that is killed in between has recorded only the samples before the loss. The next process detects the same
+    loss again, and longer: with both in the record, it would be counted twice.
 
     Examples
     --------
@@ -25,7 +25,7 @@ class LossesAhead:
         self._held: list[Event] = []
 
     def released(self, events: list[Event], tracked: int) -> list[Event]:
-        """Those that may be recorded when all samples before number `tracked` were tracked."""
+        """Events that may be recorded when all samples before number `tracked` were tracked."""
         due: list[Event] = []
         held: list[Event] = []
         for event in self._held + events:
@@ -34,6 +34,6 @@ class LossesAhead:
         return due
 
     def finish(self) -> list[Event]:
-        """The others, at the end of the run."""
+        """The remaining events, at the end of the run."""
         held, self._held = self._held, []
         return held

@@ -1,4 +1,4 @@
-"""A recording on one grid of periods: what was dropped becomes a gap, a known transient is left out."""
+"""A recording on one grid of periods: dropped samples become gaps, a known transient is excluded."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
 from livebode.sources import Log
 
-_PART = 1 << 20  # samples that are searched at a time
-_OVERLAP = 8  # periods of two parts, so that a leap at their border is seen with its neighbours
+_PART = 1 << 20  # samples per search
+_OVERLAP = 8  # periods common to two parts, so that a phase slip at their border is detected
 _LISTED_MAX = 1000
 
 
 def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
-    """Leaps of the excitation's phase by the period of the lines; none where the reference is no excitation."""
+    """Phase slips of the excitation at the period of the lines; none if the reference is not an excitation."""
     name, period = settings.excitation, settings.lines.window
     if settings.method.reference != "excitation" or name is None:
         return ()
@@ -27,17 +27,17 @@ def slips_of(log: Log, settings: Settings) -> tuple[Slip, ...]:
 
 
 class SlipSearch:
-    """Finds the leaps of a signal that comes in parts, each once.
+    """Finds the phase slips of a signal that arrives in parts, each once.
 
     Parameters
     ----------
     period
-        Of the signal, in samples.
+        Period of the signal, in samples.
 
     Attributes
     ----------
     begins_at
-        Number of its first sample; 0 where not set before the first part.
+        Number of its first sample; default 0.
     """
 
     def __init__(self, period: int) -> None:
@@ -47,7 +47,7 @@ class SlipSearch:
         self._newest = -2 * period
 
     def take(self, part: np.ndarray) -> list[Slip]:
-        """The leaps that this part shows, all of it finite."""
+        """The phase slips in this part, whose samples are all finite."""
         period, found, begins = self._period, list[Slip](), self.begins_at or 0
         self._held = np.concatenate([self._held, part])
         for slip in find_slips(self._held, period):
@@ -62,7 +62,7 @@ class SlipSearch:
 
 
 def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
-    """The samples of a channel in parts of about this size, NaN where some are missing."""
+    """The samples of a channel in parts of about this size, NaN for missing ones."""
     parts: list[np.ndarray] = []
     held, stop = 0, 0
     for block in log.blocks([channel]):
@@ -76,13 +76,13 @@ def _whole_parts(log: Log, channel: str, size: int) -> Iterator[np.ndarray]:
 
 
 def bridged(x: np.ndarray) -> np.ndarray:
-    """The same, 0 where a sample is missing."""
+    """The same, 0 for missing samples."""
     return np.where(np.isfinite(x), x, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class AlignedLog:
-    """A recording from a sample on, with its leaps as gaps: numbers count what is missing, not what came twice."""
+    """A recording from a given sample, with phase slips as gaps: numbers count missing samples, not repeated ones."""
 
     log: Log
     slips: tuple[Slip, ...]
@@ -98,7 +98,7 @@ class AlignedLog:
         return None if known is None else known - self.first - sum(max(-slip.missing, 0) for slip in self.slips)
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
-        """The Blocks of the recording behind its first samples, cut at the leaps."""
+        """The Blocks of the recording after its first samples, cut at the phase slips."""
         for block in self._aligned(channels):
             if block.stop > self.first:
                 yield block.cut(max(self.first - block.start, 0), len(block))
@@ -123,14 +123,14 @@ class AlignedLog:
 
 
 def slip_event(slips: Sequence[Slip], settings: Settings) -> Event:
-    """All leaps in one Event, at the first of them."""
+    """One Event for all phase slips, at the first of them."""
     first = slips[0]
     missing, again = (sum(max(sign * slip.missing, 0) for slip in slips) for sign in (1, -1))
     what = " and ".join(
         f"{counted(many, 'sample')} {word}" for many, word in ((missing, "missing"), (again, "repeated")) if many
     )
     message = (
-        f"the phase of {settings.excitation!r} leaps {counted(len(slips), 'time')}, first at sample {first.sample}: "
+        f"the phase of {settings.excitation!r} jumps {counted(len(slips), 'time')}, first at sample {first.sample}: "
         f"{what} without a gap in the recording; each is realigned and treated as a gap"
     )
     details = {"count": len(slips), "slips": [[slip.sample, slip.missing] for slip in slips[:_LISTED_MAX]]}

@@ -1,4 +1,4 @@
-"""Which events of a live source the terminal shows at once, beside the record."""
+"""Events of a live source that the terminal shows immediately, in addition to the record."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _FIRST = {"foreign"}
 
 
 class Announcing:
-    """Picks the events after which samples are missing or another sender's, for somebody must look after them.
+    """Selects events after which samples are missing or are from another sender, because a person must act on them.
 
-    Of those that come again with every batch only the first is shown.
+    Of events that repeat with every batch only the first is shown.
     """
 
     def __init__(self) -> None:
         self._shown: set[str] = set()
 
     def of(self, events: Iterable[Event]) -> Iterator[Event]:
-        """Those of these events that the terminal shows."""
+        """The events that the terminal shows."""
         for event in events:
             if event.kind in _EACH or (event.kind in _FIRST and event.kind not in self._shown):
                 self._shown.add(event.kind)

@@ -1,4 +1,4 @@
-"""Audience: who sees what a run publishes while it goes: a dashboard, a terminal."""
+"""Audience: receivers of what a run publishes while it runs, such as a dashboard or a terminal."""
 
 from __future__ import annotations
 
@@ -22,46 +22,46 @@ _logger = logging.getLogger(__name__)
 
 
 class Audience:
-    """Hears what a run publishes; this one does nothing with it.
+    """Receives what a run publishes; this class ignores it.
 
-    It is called in the thread that tracks, after the record has taken the same, so every method must return at once and
-    may not raise. What it needs time for it does elsewhere, on what it kept; all that it is given is immutable.
+    Its methods are called in the tracking thread, after the record was written, so they must return at once and must
+    not raise. Longer work must be done in another thread; all arguments are immutable.
     """
 
     def share(self, overview: Overview) -> None:
-        """The thinned copy of the run that begins next, which grows with it: there need not be another one."""
+        """Receives the thinned copy of the next run, which grows with it, so that no second copy is needed."""
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
-        """The run begins: where it is recorded, run.json as it begins, and how a live source is doing, at any time.
+        """The run begins: its directory, the initial run.json, and a function for the present health of a live source.
 
-        It comes again behind a `finish` where an edited configuration makes another run go on with the next sample.
+        It is called again after `finish` if an edited configuration makes another run continue with the next sample.
         """
 
     def set_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
-        """Which time of day the run's seconds are, as `RunClock` keeps it; again when it is known better."""
+        """Relation of the run's seconds to the time of day, as in `RunClock`; called again when it is more accurate."""
 
     def write(self, responses: Responses) -> None:
-        """New responses; of a run that is gone on with first the newest from before."""
+        """New responses; when a run continues, first the newest previous ones."""
 
     def write_parameters(self, *parts: Parameters) -> None:
-        """What was fitted to them, what follows from that, and margins."""
+        """Fitted parameters of the responses, quantities derived from them, and margins."""
 
     def write_event(self, event: Event) -> None:
-        """What a person should know."""
+        """An event that a person should know."""
 
     def drain_events(self) -> list[Event]:
-        """What the audience has to say since the last call, to be recorded: that somebody acknowledged an event."""
+        """Events from the audience since the last call, to be recorded: a person acknowledged an event."""
         return []
 
     def followed(self, block: Block) -> None:
-        """All that comes of this Block has been published; a LiveBlock says when it arrived."""
+        """All results of this Block are published; a LiveBlock contains its time of arrival."""
 
     def finish(self, summary: Mapping[str, Any]) -> None:
-        """The run has ended: run.json as it ends."""
+        """The run ended: the final run.json."""
 
 
 class Relay(Audience):
-    """Passes everything on to another audience; a subclass looks at what goes by."""
+    """Forwards everything to another audience; a subclass can inspect it."""
 
     def __init__(self, audience: Audience) -> None:
         self._audience = audience
@@ -95,7 +95,7 @@ class Relay(Audience):
 
 
 class Outlet:
-    """Where a run puts what comes of its samples: into the record first, then before the audience.
+    """Publishes the results of a run: first to the record, then to the audience.
 
     Events go through `groups`, and are logged where their source has not done so.
     """
@@ -116,15 +116,15 @@ class Outlet:
         self._report(self._groups.take(event))
 
     def report_groups(self, time_s: float) -> None:
-        """Publish the events that have waited long enough at `time_s` of the machine."""
+        """Publish the events that waited long enough at machine time `time_s`."""
         self._report(self._groups.due(time_s))
 
     def report_groups_while_silent(self, now_s: float) -> None:
-        """The same at `now_s` of this computer, while the machine's time does not pass."""
+        """The same at `now_s` of this computer, while the machine time does not advance."""
         self._report(self._groups.due_while_silent(now_s))
 
     def finish_groups(self) -> None:
-        """Publish all events that wait: nothing more will come."""
+        """Publish all waiting events, at the end of the run."""
         self._report(self._groups.finish())
 
     def _report(self, events: list[Event]) -> None:
@@ -136,5 +136,5 @@ class Outlet:
             self._audience.write_event(event)
 
     def drain_events(self) -> list[Event]:
-        """What the audience wants recorded."""
+        """Record the events from the audience."""
         return self._audience.drain_events()

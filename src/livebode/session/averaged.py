@@ -1,4 +1,4 @@
-"""What a run averages to, read once and in parts, so that a long one needs no more memory than a short one."""
+"""Average of a run, read once and in parts, so that memory does not depend on the length of the run."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from livebode.session.overview import Overview
 
 @dataclass(frozen=True, eq=False)
 class Averaged:
-    """A run in one response, and what it is the average of.
+    """The average response of a run, and a description of what was averaged.
 
     Attributes
     ----------
     response
-        The mean of all responses; of a run that averages by itself the newest valid one.
+        The mean of all responses; for a run with tracking.average the newest valid one.
     words
-        What that is, for people.
+        Description of the average.
     overview
         Responses of the whole run, thinned to at most 2048.
     count, valid
-        How many responses there are, and how many of them at each line are valid, (lines,).
+        Number of responses, and number of valid ones at each line, (lines,).
     incomplete
-        How many have a line that is not valid.
+        Number of responses with an invalid line.
     spans_s, spans
-        The first and last moment; lowest and highest schedule at a valid response, NaN without one.
+        The first and last time; lowest and highest schedule at a valid response, NaN without one.
     moved
         Whether the machine moved at a valid response, as `Movement` finds it.
     """
@@ -81,7 +81,7 @@ def averaged(run: Run) -> Averaged:
 
 
 class _Counted:
-    """What else there is to know of a run's responses."""
+    """Further properties of a run's responses."""
 
     def __init__(self, run: Run) -> None:
         self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))

@@ -1,4 +1,4 @@
-"""Axis: the configuration of one machine as plain data, read from TOML and validated whole before anything starts."""
+"""Axis: configuration of one machine as plain data, read from TOML and validated completely before the start."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LinesSection(_Section):
 
 
 class TrackingSection(_Section):
-    """[tracking]: the options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
+    """[tracking]: options of `livebode.estimation.Settings`, and whether the roles of the channels are accepted."""
 
     estimator: Literal["direct", "joint", "indirect"] = "joint"
     quantity: Quantity = "plant"
@@ -63,7 +63,7 @@ class TrackingSection(_Section):
 
 
 class MotionSection(_Section):
-    """[motion]: responses freed from the axis's motion; see `livebode.motion.MotionCorrection`."""
+    """[motion]: removes the effect of the axis's motion from responses; see `livebode.motion.MotionCorrection`."""
 
     radius_m: Positive
     chunk_s: Positive = 4.0
@@ -71,8 +71,8 @@ class MotionSection(_Section):
 
 
 class MonitoringSection(_Section):
-    """[monitoring]: the baseline to compare with, how often a false alarm may come, in words, and the channels that a
-    baseline's parameters may depend on."""
+    """[monitoring]: the baseline, the rate of false alarms as text, and the channels that a baseline's parameters may
+    depend on."""
 
     baseline: File | None = None
     covariates: Annotated[list[str], Field(max_length=4)] = []
@@ -105,7 +105,7 @@ class PositionPDSection(_ControllerSection):
 
 
 class LoopSection(_Section):
-    """[loop]: what feeds back, where the excitation enters, and when signals were logged."""
+    """[loop]: the controllers, the injection point of the excitation, and the times at which signals are logged."""
 
     excitation_at: Literal["plant input", "velocity reference", "output"] = "plant input"
     entry_gain: float = 1.0
@@ -117,16 +117,16 @@ class LoopSection(_Section):
     position_pd: PositionPDSection | None = None
 
     def build(self, rate_hz: float) -> Loop:
-        """The Loop that this describes, recorded at `rate_hz`; ConfigError where the parts do not make one."""
+        """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
             if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
                 held = counted(part.held_ticks, "tick")
                 raise ConfigError(
                     "rate-mismatch",
-                    f"loop.{name} runs at {part.rate_hz:g} Hz and holds {held}, which makes "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the samples come at {rate_hz:g} Hz",
-                    "set held_ticks to the rate of the samples over that of the controller",
+                    f"loop.{name} has a rate of {part.rate_hz:g} Hz and holds {held}, which gives "
+                    f"{part.rate_hz * part.held_ticks:g} Hz, but the sampling rate is {rate_hz:g} Hz",
+                    "set held_ticks to the sampling rate divided by the rate of the controller",
                     key=f"loop.{name}",
                     rate_hz=rate_hz,
                     controller_rate_hz=part.rate_hz,
@@ -146,7 +146,7 @@ class LoopSection(_Section):
                 raise ConfigError(
                     "key-conflict",
                     "loop.position_pd is the whole controller",
-                    "leave out loop.velocity and loop.position",
+                    "remove loop.velocity and loop.position",
                     key="loop.position_pd",
                 )
             return PositionPD(**self.position_pd.model_dump())
@@ -155,7 +155,7 @@ class LoopSection(_Section):
                 raise ConfigError(
                     "incomplete",
                     "loop.position needs loop.velocity inside it",
-                    "describe the velocity controller too",
+                    "describe the velocity controller also",
                     key="loop.velocity",
                 )
             return None
@@ -170,7 +170,7 @@ class LoopSection(_Section):
                 raise ConfigError(
                     "incomplete",
                     "loop.excitation_at = 'velocity reference' needs loop.velocity",
-                    "describe that controller",
+                    "describe the velocity controller",
                     key="loop.velocity",
                 )
             return self.entry_gain * PID(**self.velocity.model_dump())
@@ -186,7 +186,7 @@ class LoopSection(_Section):
 
 
 class RecordSection(_Section):
-    """[record]: where it stands, the run is kept in segments that outlast a kill (docs/run-directory.md)."""
+    """[record]: with this section, the run is recorded in segments that survive a kill (docs/run-directory.md)."""
 
     samples: bool = False
     budget_bytes: Annotated[int, Field(ge=BUDGET_BYTES_MIN)] | None = None
@@ -194,7 +194,7 @@ class RecordSection(_Section):
 
 
 class ServeSection(_Section):
-    """[serve]: where `livebode run --serve` listens, and who may look (docs/dashboard.md)."""
+    """[serve]: address of `livebode run --serve`, and access to it (docs/dashboard.md)."""
 
     address: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8765
@@ -214,7 +214,7 @@ class ServeSection(_Section):
 
 
 class FitSection(_Section):
-    """[fit]: which model is fitted to every response; see `livebode.fitting.Fitter`."""
+    """[fit]: the model that is fitted to every response; see `livebode.fitting.Fitter`."""
 
     model: str = "auto"
     output: Literal["auto", "velocity", "position"] = "auto"
@@ -228,7 +228,7 @@ class FitSection(_Section):
 
 
 class Axis(_Section):
-    """One machine: where its samples come from, which signals and lines, how they are tracked, and its loop."""
+    """One machine: its source, signals, lines, tracking and loop."""
 
     source: SourceSettings
     signals: SignalsSection
@@ -248,10 +248,10 @@ class Axis(_Section):
         Raises
         ------
         ConfigError
-            If the file cannot be read, is not TOML, or has an unknown key or a value out of range; the message names
+            If the file cannot be read, is not TOML, or has an unknown key or a value out of range; the message gives
             the key, the value and what is allowed.
         SourceError
-            If the address of the source cannot be used.
+            If the address of the source is invalid.
         """
         return cls.of(read_table(path), str(path)).beside(path.parent)
 
@@ -284,16 +284,16 @@ class Axis(_Section):
 
 
 def _first_of(error: ValidationError) -> ConfigError:
-    """The first thing that is wrong, with its key and value; what is missing last: a misspelt key leaves a gap."""
+    """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
     first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
-    # Behind a choice of types pydantic puts the name of the type that it tried.
+    # After a union, pydantic adds the name of the type that it tried.
     place = one_line(".".join(str(part) for part in first["loc"] if part != "int" and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
         return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
     secret = MAY_BE_SECRET & {str(part) for part in first["loc"]}
-    value = "what it holds" if secret else shortened(first["input"])
+    value = "its value" if secret else shortened(first["input"])
     facts = {"key": place} | ({} if secret else {"value": value})
     return ConfigError(
         "value-invalid", f"{place} = {value} is not usable: {first['msg'].lower()}", "correct it", **facts
@@ -301,7 +301,7 @@ def _first_of(error: ValidationError) -> ConfigError:
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:
-    """What a key that is not known, at this place of an axis, may have been meant for."""
+    """Suggestion for an unknown key at this place of an axis."""
     section: Any = Axis
     for part in loc[:-1]:
         annotation = section.model_fields[part].annotation

@@ -18,20 +18,20 @@ _logger = logging.getLogger(__name__)
 
 
 class AxisThread:
-    """Runs an axis until it ends, is told to end, or fails, without a consequence for the others.
+    """Runs an axis until it ends, is stopped, or fails, without effect on the others.
 
     Attributes
     ----------
     axis
-        Its configuration as it is now.
+        Its present configuration.
     orders
-        What it is told.
+        Requests to it.
     status
-        How it is doing.
+        Its status.
     outcome, error
-        What it came to; of both one, once it has ended.
+        Result; one of the two after the end.
     ended_early
-        Whether it was told to end before it had anything to leave.
+        Whether it was stopped before there was anything to record.
     """
 
     def __init__(self, name: str, axis: Axis, to: Destination, status: Status) -> None:
@@ -41,7 +41,7 @@ class AxisThread:
         self.error: Exception | None = None
         self.ended_early = False
         self._to = to
-        # Not to be waited for at the end of the process: what is recorded is safe, and a second signal means at once.
+        # The process does not wait for it: recorded data is safe, and a second signal ends the process at once.
         self._thread = threading.Thread(target=self._work, name=f"livebode axis {name}", daemon=True)
 
     def start(self) -> None:
@@ -52,13 +52,13 @@ class AxisThread:
         return self._thread.is_alive()
 
     def end(self) -> None:
-        """Tell it to end."""
+        """Request its end."""
         if self.alive:
             self.status.state = "finishing"
         self.orders.end()
 
     def result(self) -> Outcome:
-        """What it came to, once it has ended; raises what it failed with."""
+        """Its result after the end; raises the error with which it failed."""
         if self.outcome is None:
             assert self.error is not None
             raise self.error
@@ -70,7 +70,7 @@ class AxisThread:
         try:
             job = run_live if self.axis.source.live else run
             self.outcome = job(self.axis, self._to, self.orders)
-        except Exception as error:  # a sentence for the user, or a fault of ours: the other axes go on
+        except Exception as error:  # a usage error or an internal error: the other axes continue
             self.error = error
             nothing = isinstance(error, StoppedError) or self.status.directory is None
             self.ended_early = self.orders.ended and nothing

@@ -1,4 +1,4 @@
-"""Change: what an edit of the configuration means for an axis that runs."""
+"""Change: effect of an edited configuration on a running axis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KIND = "configuration-applied"
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What an axis is told: to cut its record otherwise (`kept`), or to go on in another run (`pipeline`)."""
+    """Request to an axis: use other record settings (`kept`), or continue in another run (`pipeline`)."""
 
     sections: tuple[str, ...]
     kept: RecordSection | None = None
@@ -23,13 +23,13 @@ class Change:
 
     @property
     def event(self) -> Event:
-        """What is to be said of it."""
+        """The event that reports it."""
         names = " and ".join(f"[{name}]" for name in self.sections)
-        how = "in place" if self.pipeline is None else "in another run, from the very next sample on"
+        how = "in place" if self.pipeline is None else "in another run, from the next sample"
         return Event(_KIND, 0, 0.0, f"{names} changed: applied {how}", {"sections": list(self.sections)})
 
     def tell(self, orders: Orders) -> None:
-        """Tell it; the event comes into the record that it finds."""
+        """Send the request; the event goes to the current record."""
         orders.say(_KIND, self.event.message, **self.event.details)
         if self.kept is not None:
             orders.keep(self.kept)
@@ -38,12 +38,12 @@ class Change:
 
 
 def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
-    """What turns one configuration into the other; None where they are the same.
+    """The change from one configuration to the other; None if they are equal.
 
     Raises
     ------
     LivebodeError
-        Where the new one cannot be applied without losing samples, or does not fit the source.
+        If the new one cannot be applied without losing samples, or does not fit the source.
     """
     if old == new:
         return None
@@ -51,29 +51,29 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
     if source is None and old.source.live:
         raise ConfigError(
             "change-too-early",
-            "the live source has sent no samples yet with which the new configuration could be checked",
-            "wait for them and save the file again, or take the axis out",
+            "the live source has sent no samples yet, which are needed to check the new configuration",
+            "wait for them and save the file again, or remove the axis",
             key="source",
         )
     if source is None:
         raise ConfigError(
             "change-needs-restart",
             "the configuration of a recording cannot be changed while it is tracked",
-            "end livebode and start it again",
+            "stop livebode and start it again",
             keys=list(sections),
         )
     if "source" in sections:
         raise ConfigError(
             "change-needs-restart",
             "[source] cannot be changed without losing samples",
-            "end livebode, or take the axis out and put it in again under another name",
+            "stop livebode, or remove the axis and add it again with another name",
             keys=["source"],
         )
     if "serve" in sections:
         raise ConfigError(
             "change-needs-restart",
             "[serve] belongs to the whole session, and cannot be changed while it runs",
-            "end livebode first",
+            "stop livebode first",
             keys=["serve"],
         )
     kept, before = new.record or RecordSection(), old.record or RecordSection()

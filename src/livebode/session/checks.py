@@ -1,4 +1,4 @@
-"""What a recording must have for its responses to mean anything, said in one sentence where it has not."""
+"""Conditions that a recording must meet for valid responses; each one that is not met gives one error message."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, rms
 from livebode.estimation import Settings
 from livebode.session.follower import Follower
 
-# A DFT leaves 1e-30 of a signal's power at a line where there is none.
+# Rounding of a DFT gives 1e-30 of a signal's power at an empty line.
 POWERLESS_SHARE = 1e-20
-# Excitation this far below the strongest line is rounding or distortion, and no one's design.
+# Power this far below the strongest line is rounding or distortion, not excitation.
 _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
-_LAGS = 8  # samples around the window among which the true period is looked for
+_LAGS = 8  # samples around the window in which the true period is searched
 _ROUNDING = 1e-12
 PERIODS_COMPARED = 4
 
 
 class ChannelCheck:
-    """Whether each signal varies and is finite somewhere, and how strong the reference is, over all blocks of a run."""
+    """Statistics over all blocks of a run: whether each signal varies and is finite, and the power of the reference."""
 
     def __init__(self, names: tuple[str, ...], reference: str) -> None:
         self._unvaried = dict.fromkeys(names, np.nan)
@@ -30,7 +30,7 @@ class ChannelCheck:
         self._moments = np.zeros(3)
 
     def take(self, block: Block) -> None:
-        """Look at the signals that have been constant up to here."""
+        """Check the signals that were constant so far."""
         if isinstance(block, Spectra):
             self._take_spectra(block)
             return
@@ -47,7 +47,7 @@ class ChannelCheck:
                 del self._unvaried[name]
 
     def _take_spectra(self, block: Spectra) -> None:
-        """The same of spectra, where a constant signal is nothing at the lines."""
+        """The same for spectra, where a constant signal has no power at the lines."""
         for signal, level in zip(block.layout.signals, rms(block.sums, block.layout)):
             level = level[(block.state & NOT_WHOLE == 0) & np.isfinite(level)]
             if signal.name == self._reference:
@@ -58,7 +58,7 @@ class ChannelCheck:
                     del self._unvaried[signal.name]
 
     def state(self) -> dict[str, Any]:
-        """All that was seen, as plain data."""
+        """State as plain data."""
         return {"unvaried": self._unvaried, "moments": self._moments.tolist()}
 
     def load(self, state: dict[str, Any]) -> None:
@@ -67,12 +67,12 @@ class ChannelCheck:
 
     @property
     def variance(self) -> float:
-        """Of the reference, over all its finite samples."""
+        """Variance of the reference over all its finite samples."""
         count, total, squares = self._moments
         return float(max(squares / count - (total / count) ** 2, 0.0)) if count else 0.0
 
     def finish(self) -> None:
-        """SignalError where a signal held no number, or always the same one."""
+        """SignalError if a signal had no finite sample, or a constant value."""
         for name, value in self._unvaried.items():
             if np.isnan(value):
                 raise SignalError(
@@ -84,14 +84,14 @@ class ChannelCheck:
             raise SignalError(
                 "channel-constant",
                 f"channel {name!r} is constant at {value:g}",
-                "choose one that carries the signal",
+                "choose the channel with the signal",
                 channel=name,
                 value=float(value),
             )
 
 
 def check_length(samples: int | None, window: int) -> None:
-    """SignalError where the recording is known to be shorter than the window."""
+    """SignalError if the recording is shorter than the window."""
     if samples is not None and samples < window:
         raise SignalError(
             "too-short",
@@ -103,11 +103,12 @@ def check_length(samples: int | None, window: int) -> None:
 
 
 def check_excitation(tracker: Follower, variance: float) -> None:
-    """SignalError where a line has no excitation, or the excitation does not repeat from window to window.
+    """SignalError if a line has no excitation, or the excitation does not repeat from window to window.
 
     `variance` is that of the reference over the whole recording.
 
-    The input of a direct estimate carries the machine's motion and noise and is not asked to repeat; sigma tells.
+    The input of a direct estimate contains the machine's motion and noise and need not repeat; sigma shows their
+    effect.
     """
     settings = tracker.settings
     name, f = settings.channel(settings.method.reference), settings.lines.frequency_hz
@@ -118,7 +119,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
         raise SignalError(
             "line-not-excited",
             f"{name!r} has no power at {f[0]:g} Hz or any other of these lines",
-            "set lines.frequencies to 'auto', or look at the recording with `livebode inspect`",
+            "set lines.frequencies to 'auto', or check the recording with `livebode inspect`",
             channel=name,
             frequency_hz=float(f[0]),
         )
@@ -129,7 +130,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
         raise SignalError(
             "line-not-excited",
             f"{name!r} has no power at {f[worst]:g} Hz ({-level_db[worst]:.0f} dB below its strongest line)",
-            "leave out that line, or set lines.frequencies to 'auto'",
+            "remove that line, or set lines.frequencies to 'auto'",
             channel=name,
             frequency_hz=float(f[worst]),
         )
@@ -142,7 +143,7 @@ def check_excitation(tracker: Follower, variance: float) -> None:
             "not-periodic",
             f"{name!r} does not repeat every {settings.lines.window} samples at {f[worst]:g} Hz "
             f"({100 * repeats[worst]:.0f} % of its power does)",
-            "leave out that line, or set lines.window to 'auto'",
+            "remove that line, or set lines.window to 'auto'",
             channel=name,
             frequency_hz=float(f[worst]),
             window=settings.lines.window,
@@ -158,9 +159,9 @@ _SPOILS = {
 
 
 def check_period(samples: np.ndarray, settings: Settings) -> None:
-    """SignalError where the beginning of an excitation repeats after another number of samples than the window.
+    """SignalError if the beginning of an excitation repeats after another number of samples than the window.
 
-    Over a window that is a sample off, every estimate is wrong by more than its bounds say, and looks healthy.
+    With a window that is wrong by one sample, every estimate is wrong by more than its bounds, without other symptoms.
     """
     window = settings.lines.window
     lags = range(max(1, window - _LAGS), window + _LAGS + 1)
@@ -190,14 +191,14 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
 
 
 def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
-    """SignalError with the reason where no response of the whole run is valid."""
+    """SignalError with the reason if no response of the run is valid."""
     counts, window = tracker.counts, tracker.settings.lines.window
     if responses and not valid and "spectra" in counts:
         raise SignalError(
             "no-valid-response",
-            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are not "
-            f"whole and {counts['spike']} contain a spike",
-            "check the drive's samples, or let it use a shorter window",
+            f"none of {responses} responses is valid: of {counts['spectra']} windows {counts['not-whole']} are "
+            f"incomplete and {counts['spike']} contain a spike",
+            "check the drive's samples, or configure a shorter window in the drive",
             reason="windows-not-whole",
             responses=responses,
             window=window,
@@ -208,9 +209,9 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
         lines = "; ".join(f"{kind} at {', '.join(f'{f:g}' for f in at)} Hz" for kind, at in judged.items())
         raise SignalError(
             "no-valid-response",
-            f"none of {responses} responses is valid, and lines are invalid by what repeats with the excitation: "
-            f"{lines}",
-            "see events.jsonl for what to do at each",
+            f"none of {responses} responses is valid, and lines are invalid because a disturbance repeats with the "
+            f"excitation: {lines}",
+            "see events.jsonl for the remedy at each",
             reason="lines-invalid",
             responses=responses,
             window=window,
@@ -221,16 +222,16 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             "no-valid-response",
             f"none of {responses} responses is valid: no stretch of {window} samples has excitation and is free of the "
             f"{', '.join(spoiled)}",
-            "choose a shorter window, or look at the recording with `livebode inspect`",
+            "choose a shorter window, or check the recording with `livebode inspect`",
             reason="samples-spoiled",
             responses=responses,
             window=window,
         )
     raise SignalError(
         "no-valid-response",
-        f"none of {responses} responses is valid, although no sample is missing or left out: no window of {window} "
+        f"none of {responses} responses is valid, although no sample is missing or excluded: no window of {window} "
         "samples has excitation at its lines",
-        "choose other lines, or look at the recording with `livebode inspect`",
+        "choose other lines, or check the recording with `livebode inspect`",
         reason="no-excitation",
         responses=responses,
         window=window,

@@ -1,4 +1,4 @@
-"""The clock of a live run: which time of day its samples are, by their arrival at this computer."""
+"""The clock of a live run: time of day of its samples, from their arrival at this computer."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from livebode.core.clock import RunClock
 from livebode.sources.live import LiveBlock, Origin
 
 REFINED_FOR_S = 10.0
-"""From its first Block on the relation is that of the Block with the least delay of so many seconds."""
+"""The relation is that of the Block with the least delay in the first so many seconds."""
 REFINED_S = 0.05
-"""By so much it is better before it is recorded again meanwhile."""
+"""Smallest improvement, in this time, that is recorded again."""
 STEP_S = 1.0
-"""By so much the relation is wrong before another one is used from there on."""
+"""Error of the relation from which a new one is used."""
 _JUDGED_S = 60.0
 _DRIFT_MAX = 0.005
-"""Of a sender's rate: what is delayed more from minute to minute waits somewhere."""
+"""Largest error of a sender's rate: samples whose delay grows faster are waiting in a queue."""
 _PIECES_MAX = 1000
 
 
 class ClockRelation:
-    """Keeps `clock` from the arrival of the Blocks of a live source.
+    """Updates `clock` from the arrival of the Blocks of a live source.
 
-    Samples wait on the way (a broker, a queue), never the other way round, so that the least delayed Block tells the
-    most. A pause of unknown length, a sender whose rate is not exact, and a computer whose clock is set begin another
-    piece of the clock.
+    Samples can be delayed (broker, queue) but never early, so the Block with the least delay is the most accurate. A
+    pause of unknown length, a sender with an inexact rate, and a change of the computer's clock begin another piece of
+    the clock.
 
     Attributes
     ----------
     clock
-        The relation as it is known.
+        The present relation.
     """
 
     def __init__(self) -> None:
@@ -51,21 +51,21 @@ class ClockRelation:
         arrived_s, start_s = block.arrived_s, block.origin_s + block.start / block.rate_hz
         unix_s = self._unix_s + arrived_s - (block.origin_s + block.stop / block.rate_hz)
         pieces = self.clock.pieces
-        # Where the sender's numbers go on, they tell how long a pause was.
+        # If the sender's numbers continue, they give the length of a pause.
         unknown = block.gap and (block.start == self._stop or block.origin != self._origin)
         paused = self._since_s is None or unknown
         self._stop, self._origin = block.stop, block.origin
         if not pieces or (paused and abs(unix_s - pieces[-1][1]) > STEP_S):
             self._begin(start_s, unix_s, arrived_s)
             return True
-        self._since_s = -inf if self._since_s is None else self._since_s  # a run that is continued has its relation
+        self._since_s = -inf if self._since_s is None else self._since_s  # a continued run has its relation
         if arrived_s - self._since_s <= REFINED_FOR_S:
             pieces[-1] = pieces[-1][0], min(unix_s, pieces[-1][1])
             return self._is_to_be_recorded(REFINED_S)
         return self._is_to_be_recorded(0.0) or self._judged(unix_s, start_s, block)
 
     def drain_events(self) -> list[Event]:
-        """What is to be said of this computer's clock since the last call."""
+        """Events on this computer's clock since the last call."""
         found, self._set = self._set, []
         return found
 
@@ -82,7 +82,7 @@ class ClockRelation:
         self._followed = inf
 
     def _judged(self, unix_s: float, start_s: float, block: LiveBlock) -> bool:
-        """Whether the relation is another one after a minute: the sender drifts, waited, or the clock was set."""
+        """Whether the relation changed after a minute: the sender drifts, waited, or the clock was set."""
         if self._least == inf:
             self._least_from_s, self._least_since_s = start_s, block.arrived_s
         self._least = min(self._least, unix_s)
@@ -94,7 +94,7 @@ class ClockRelation:
         piece_s = self.clock.pieces[-1][1]
         before_s = piece_s if self._followed == inf else self._followed
         self._followed = min(least, before_s + _DRIFT_MAX * _JUDGED_S)
-        if before_s - least > STEP_S:  # so much at once: all before had waited
+        if before_s - least > STEP_S:  # a large step: all previous samples had waited
             self.clock.pieces[-1] = self.clock.pieces[-1][0], least
             return True
         if abs(self._followed - piece_s) <= STEP_S:
@@ -103,12 +103,12 @@ class ClockRelation:
         return True
 
     def _was_set(self, start_s: float, block: LiveBlock) -> bool:
-        """Whether this computer's clock was set since the last minute; then a piece begins here."""
+        """Whether this computer's clock was set in the last minute; then a new piece begins here."""
         by_s = _unix_s_of_monotonic() - self._unix_s
         if abs(by_s) <= STEP_S:
             return False
         self._unix_s += by_s
-        message = f"this computer's clock was set by {by_s:+.4g} s; times of day before {start_s:.6g} s remain"
+        message = f"this computer's clock was set by {by_s:+.4g} s; times of day before {start_s:.6g} s are unchanged"
         self._set.append(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
         self._begin(start_s, self._unix_s + block.arrived_s - (block.origin_s + block.stop / block.rate_hz), -inf)
         return True

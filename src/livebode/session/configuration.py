@@ -1,4 +1,4 @@
-"""The axes of a file: one, or several under [axes], each with what the file says for all of them."""
+"""The axes of a file: one, or several under [axes], each with the common sections of the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ AXES_MAX = 64
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _SUCCESSOR = re.compile(r".*-[0-9]+")
 Axes = Mapping[str, Axis]
-"""By name; the only axis of a file without [axes] has no name: it is the empty text."""
+"""Axes by name; the only axis of a file without [axes] has the empty name."""
 
 
 class ConfigurationFile:
@@ -27,7 +27,7 @@ class ConfigurationFile:
     path
         The file; relative paths in it are from its folder.
     over
-        Sections whose keys are put over those of every axis: options of the command line.
+        Sections whose keys replace those of every axis: options of the command line.
     """
 
     def __init__(self, path: Path, over: Mapping[str, Mapping[str, Any]]) -> None:
@@ -40,15 +40,15 @@ class ConfigurationFile:
         Raises
         ------
         ConfigError
-            If it cannot be read, is not TOML, or an axis cannot be used; the message names axis, key and value.
+            If it cannot be read, is not TOML, or an axis is invalid; the message gives axis, key and value.
         LivebodeError
-            If a value cannot be used for another reason, such as the address of a source.
+            If a value is invalid for another reason, such as the address of a source.
         """
         self._used = self._seen = read_bytes(self.path)
         return axes_of(self._used, self.path, self._over)
 
     def changed(self) -> bool:
-        """Whether it is not what was read last, and is the same as a look ago: nobody is writing it just now."""
+        """Whether it differs from what was read last, and was not written since the last check."""
         try:
             data = read_bytes(self.path)
         except ConfigError:
@@ -75,7 +75,7 @@ def axes_of(data: bytes, path: Path, over: Mapping[str, Mapping[str, Any]]) -> d
 
 
 def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]:
-    """Each axis's sections: those outside [axes] hold for all, and its own go over them key by key."""
+    """Sections of each axis: those outside [axes] apply to all, and its own replace them key by key."""
     if "axes" not in data:
         return {"": dict(data)}
     axes = data["axes"]
@@ -99,7 +99,7 @@ def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]
     if twice := [name for name in axes if folded.count(name.casefold()) > 1]:
         raise ConfigError(
             "axis-name-invalid",
-            f"the axes {' and '.join(map(repr, twice[:2]))} differ only in capitals",
+            f"the axes {' and '.join(map(repr, twice[:2]))} differ only in upper and lower case",
             "rename one of them",
             key="axes",
             names=twice[:2],
@@ -108,7 +108,7 @@ def tables_of(data: Mapping[str, Any], origin: str) -> dict[str, dict[str, Any]]
 
 
 def merged(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Both, key by key down to single values, with those of `over` where both have one.
+    """Both merged key by key, down to single values; `over` has priority.
 
     >>> merged({"lines": {"window": 400}, "fit": {}}, {"lines": {"window": 800, "frequencies": "20"}})
     {'lines': {'window': 800, 'frequencies': '20'}, 'fit': {}}

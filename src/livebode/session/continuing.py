@@ -1,4 +1,4 @@
-"""The samples of a run that is gone on with."""
+"""The samples of a run that is continued."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from livebode.sources.live import LiveBlock, Position
 from livebode.sources.live.computer_clock import ClockReading
 
 SOURCE = "source"
-"""The name of a live source's position among the parts of a run's state."""
+"""Name of a live source's position in the state of a run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Before:
-    """Where a run goes on with the very next sample of another one.
+    """The run that another run continues with the next sample.
 
-    `name` is the other's directory, `sample` and `time_s` are the next sample's, `counts` what the follower that was
-    taken over had counted.
+    `name` is its directory, `sample` and `time_s` are those of the next sample, `counts` are the counts of its
+    follower.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Before:
 
 
 def offered_again(blocks: Iterable[Block], sample: int) -> Iterator[Block]:
-    """From a source that begins with the same samples again: those from number `sample` on."""
+    """Blocks from number `sample` of a source that begins with the same samples again."""
     for block in blocks:
         if block.stop > sample:
             yield block if block.start >= sample else block.cut(sample - block.start, len(block))
@@ -46,12 +46,12 @@ def in_pieces(blocks: Iterable[Block], samples: int) -> Iterator[Block]:
 class StreamPosition:
     """Where a live source continues, as a part of the run's state.
 
-    One for as long as the source is open, over all runs that it is recorded in.
+    One instance while the source is open, for all runs that record it.
 
     Parameters
     ----------
     state
-        What the record to be continued says; empty for a new one.
+        State in the record to be continued; empty for a new one.
     """
 
     def __init__(self, state: bytes = b"") -> None:
@@ -67,12 +67,12 @@ class StreamPosition:
         return Position(**said | {"arrived": ClockReading(**said["arrived"])})
 
     def take(self, block: Block) -> None:
-        """The next sample is the one behind this block."""
+        """The next sample is the one after this block."""
         if isinstance(block, LiveBlock):
             self._newest = block
 
     def snapshot(self) -> bytes:
-        """All of it as bytes; see `restore`."""
+        """State as bytes; see `restore`."""
         block = self._newest
         if block is None or block.origin is None:
             return self._state
@@ -82,7 +82,7 @@ class StreamPosition:
         return json.dumps(asdict(place)).encode()
 
     def restore(self, snapshot: bytes) -> None:
-        """Check that the source continues where the record does."""
+        """Check that the source continues where the record ends."""
         if snapshot != self._state:
             raise RecordError(
                 "changed-meanwhile", "the record changed while its source was opened", "run the same command again"
@@ -90,7 +90,7 @@ class StreamPosition:
 
 
 def stream_position(run: Path) -> StreamPosition:
-    """Where the source of this run continues, from its newest commit; of a new run where there is none to continue."""
+    """Position at which the source continues, from the newest commit of this run; of a new run if there is none."""
     from livebode.records.segments.last_commit import last_commit  # needs a POSIX system
 
     commit = last_commit(run)

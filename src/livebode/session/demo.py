@@ -1,4 +1,4 @@
-"""The main job without hardware: a simulated axis in motion is tracked while its belt loses stiffness."""
+"""Demonstration without hardware: a simulated axis in motion is tracked while its belt loses stiffness."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from livebode.session.watching import Watching
 from livebode.simulation import BeltAxis, Drive, Fault, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
 RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 800, 200, 0.1
-SECONDS_MIN = 16.0  # the alarm comes with the second stroke after the loss
+SECONDS_MIN = 16.0  # the alarm is raised in the second stroke after the loss
 LEARNED_S = 48.0
-_SPEEDS_M_PER_S = 0.38, 0.3  # learned at both: equal strokes meet the windows at the same places again and again
+_SPEEDS_M_PER_S = 0.38, 0.3  # learned at both: equal strokes would put the windows always at the same positions
 _AMPLITUDE_N_M = 0.5  # per line; 3 N m at the peaks
 
 
 def check_seconds(seconds: float) -> None:
-    """UsageError if a demo cannot be that long."""
+    """UsageError for a length that is out of range."""
     if not SECONDS_MIN <= seconds <= 3600:
         raise UsageError(
             "out-of-range",
@@ -51,13 +51,13 @@ def demo_axis(seconds: float, seed: int, *faults: Fault, speed_m_per_s: float = 
 
 
 def demo_settings() -> Settings:
-    """Joint estimates at 21 lines, twenty a second, in a window of 0.2 s; the noise from the bins between the lines."""
+    """Joint estimates at 21 lines, 20 per second, window 0.2 s; the noise is measured at the bins between the lines."""
     return Settings(lines=_lines(), output="velocity", input="u", excitation="w", schedule="x", hop=HOP, noise="quiet")
 
 
 def demo_baseline(seed: int) -> Baseline:
     """The model of the healthy axis, learned from its strokes at two speeds."""
-    # Learning goes through its runs eight times: they are simulated once.
+    # Learning reads its runs eight times: they are simulated once.
     healthy = [
         list(
             SimulatedAxis(demo_axis(LEARNED_S / len(_SPEEDS_M_PER_S), seed + i, speed_m_per_s=speed)).blocks(
@@ -86,7 +86,7 @@ def demo(
     """Track the simulated axis into a run directory; halfway its belt loses 10 % of its stiffness.
 
     `audience` receives what is published. An earlier demo in `directory` is replaced. The baseline's alarm is in the
-    run's events and summary, as that of any run.
+    run's events and summary.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def demo(
 
 
 def _described(drive: Drive) -> LoopSection:
-    """The axis's loop as a person would write it down."""
+    """The axis's loop as in a configuration file."""
     velocity = PIDSection(
         gain=drive.velocity_gain_n_m_s, integral_time_s=drive.integral_time_s, rate_hz=drive.velocity_rate_hz
     )
@@ -129,5 +129,5 @@ def _described(drive: Drive) -> LoopSection:
 
 
 def _lines() -> Lines:
-    """Odd multiples of 5 Hz: the bins between them measure the noise, and 50 and 60 Hz are among these."""
+    """Odd multiples of 5 Hz: the bins between them, including 50 and 60 Hz, measure the noise."""
     return Lines.parse("15:215:10", rate_hz=RATE_HZ, window=WINDOW)

@@ -1,4 +1,4 @@
-"""The excitation that `livebode design` left, read back for a PLC."""
+"""Read the excitation of `livebode design` for a PLC."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _RAMP_S_MAX = 3600.0
 
 
 def read_designed(path: Path) -> Waveform:
-    """The excitation in an .npz of `livebode design`; its `about` is all that the file says of it.
+    """The excitation in an .npz of `livebode design`; `about` is its description in the file.
 
     Raises
     ------
     RecordingError
-        If the file cannot be read, or is not one of those.
+        If the file cannot be read, or is not written by `livebode design`.
     """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as held:

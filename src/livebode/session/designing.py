@@ -20,16 +20,16 @@ Picture = Callable[[Design, Path], None]
 
 @dataclass(frozen=True)
 class Designed:
-    """What was made.
+    """Result of a design.
 
     Attributes
     ----------
     design
         The experiment.
     directory, files
-        Where it stands.
+        Its location.
     left_out
-        In a sentence what is not among the files of one that named no formats; empty where nothing is.
+        Sentence on the formats that were not written by default; empty if there are none.
     """
 
     design: Design
@@ -47,18 +47,18 @@ def design_experiment(
     force: bool = False,
     draw: Picture | None = None,
 ) -> Designed:
-    """Choose the experiment, and leave its files in a new directory that appears when it is whole.
+    """Design the experiment, and write its files to a new directory, which appears when it is complete.
 
     Raises
     ------
     DesignError
-        If nothing can be chosen (see `choose`).
+        If there is no solution (see `choose`).
     UsageError
-        If a format is not known or forbids the name.
+        If a format is not supported or does not allow the name.
     ConfigError
-        If the recording cannot be named so.
+        If the name of the recording is invalid.
     OutputError
-        If something is in the directory's place that is not to be replaced, or the disk refuses. Nothing is left then.
+        If the directory exists and must not be replaced, or the disk reports an error. Nothing is written then.
     """
     kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
     for kind in kinds or ():
@@ -77,9 +77,9 @@ def design_experiment(
     lines = design.waveform.lines
     left_out = ""
     if kinds is None and lines.window > PERIOD_MAX:
-        left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} that a PLC's table takes"
+        left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} of a PLC's table"
     try:
-        there = directory.absolute()  # "." has no parent to stand beside in
+        there = directory.absolute()  # "." has no parent in which a sibling can be created
         there.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{there.name[:100]}.partial-", dir=there.parent) as folder:
             partial = Path(folder) / "whole"
@@ -113,7 +113,7 @@ def design_experiment(
 
 
 def _put(made: Path, there: Path, aside: Path) -> None:
-    """Make it stand there; what stood there goes, or stays where that fails."""
+    """Put it in its place; the previous directory is removed, or remains if this fails."""
     before = there.exists()
     if before:
         there.rename(aside)
@@ -153,7 +153,7 @@ def _check_names(name: str, log: str) -> None:
 
 
 def _all_that_hold(window: int) -> list[str]:
-    """The formats for one that names none: a PLC's compiler takes no period of any length."""
+    """The default formats: a PLC's compiler limits the length of the period."""
     return [kind for kind in FORMATS if kind != ".st" or window <= PERIOD_MAX]
 
 
@@ -177,7 +177,7 @@ def _check_free(directory: Path, force: bool) -> None:
     if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / _MARK)):
         raise OutputError(
             "not-replaceable",
-            f"{str(directory)!r} also contains {others[0]!r}, which no design wrote",
+            f"{str(directory)!r} also contains {others[0]!r}, which is not from a design",
             "move it, or choose another directory",
             path=str(directory),
             name=others[0],

@@ -1,4 +1,4 @@
-"""Destination: where a run goes, and who hears of it."""
+"""Destination: directory and receivers of a run."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ Tell = Callable[[Event], None]
 
 @dataclass(frozen=True)
 class Destination:
-    """Where a run goes, and who hears of it.
+    """Directory and receivers of a run.
 
     Parameters
     ----------
     directory
-        Where the run is to stand. In one piece it appears only when whole; in segments it is there from the beginning,
-        and an unfinished one of the same axis is gone on with.
+        Directory of the run. In one piece it appears only when complete; in segments it exists from the beginning,
+        and an unfinished one of the same axis is continued.
     draw
-        Called with the thinned responses, the directory before it is put in place, the scheduling signal's name
-        with its unit, and the newest fit, to add pictures.
+        Called to add pictures: with the thinned responses, the directory before it is renamed, the scheduling signal's
+        name with its unit, and the newest fit.
     force
         Replace an earlier run there.
     progress
-        Called after each block with samples done and in all (None where not known).
+        Called after each block with the number of tracked samples and of all samples (None if not known).
     tell
-        Called with what the record in segments itself has to say: that it goes on, pauses or removes what is oldest.
+        Called with messages of the record in segments: it continues, pauses, or removes its oldest segments.
     audience
-        Sees all that the run publishes.
+        Receives everything that the run publishes.
     """
 
     directory: Path

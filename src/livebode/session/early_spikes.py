@@ -1,4 +1,4 @@
-"""Spikes in the first periods of a recording, where a gate that does not look ahead cannot tell them yet."""
+"""Spikes in the first periods of a recording, which a causal gate cannot detect yet."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from livebode.excitation.prepare import filled
 from livebode.session.aligned import AlignedLog
 from livebode.session.plan import beginnings
 
-_PERIODS, _PERIODS_MIN = 18, 12  # that are looked at, the last first
-_EARLY = 9  # periods after which the gate itself knows what is usual
+_PERIODS, _PERIODS_MIN = 18, 12  # that are searched, backwards
+_EARLY = 9  # periods after which the gate has learned the usual level
 
 
 def early_spikes(log: AlignedLog, settings: Settings) -> NDArray[np.int64]:

@@ -10,15 +10,15 @@ from typing import Any
 from livebode.core import Event
 
 QUIET_S = 60.0
-"""A cause that is silent for so long has ended; the next event of it begins another group."""
+"""A cause without events for this time has ended; its next event begins another group."""
 AT_ONCE = 20
-"""So many events of a group are reported one by one; those behind them share lines."""
+"""Events of a group that are reported one by one; later ones share lines."""
 REPORT_S, STATE_S = 10.0, 1.0
-"""What shares a line is reported at the latest after so long, and a change of state after the shorter time."""
+"""Longest time until events that share a line are reported; the shorter one for a change of state."""
 REPEATS_MAX = 128
 """Most events that share a line with sample, time and message of each."""
 EXACT_MAX, EXACT_PER_S = 1000.0, 1.0
-"""So many events of a group are exact at once, and so many each second in the long run; the others are only counted."""
+"""Events of a group that are reported in full: at once, and per second over time; the others are only counted."""
 
 CAUSES = {
     kind: cause
@@ -37,7 +37,7 @@ CAUSES = {
 }
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
 _STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", "layout-changed", "unit-changed"}
-"""Changes of state, which are reported soon: until then the previous state would look like the present one."""
+"""Changes of state; they are reported soon, because the record shows the previous state until then."""
 
 
 @dataclass
@@ -55,7 +55,7 @@ class _Group:
     waiting: list[Event] = field(default_factory=list)
     counted: dict[str, int] = field(default_factory=dict)
     newest: Event | None = None
-    """The newest event where it was only counted."""
+    """The newest event if it was only counted."""
 
     @property
     def waits(self) -> bool:
@@ -80,9 +80,9 @@ class _Group:
         return time_s - self.reported_s >= (STATE_S if changed else REPORT_S)
 
     def report(self, time_s: float = 0.0) -> Event:
-        """One event at `time_s` for all that wait, which then do not wait any longer."""
+        """One event at `time_s` for all waiting ones, which are then removed."""
         exact, counted = self.waiting, Counter(self.counted)
-        if self.newest is not None:  # of the newest one everything is in the line anyway
+        if self.newest is not None:  # the line itself contains the newest one
             counted[self.newest.kind] -= 1
             exact = [*exact, self.newest]
         self.waiting, self.counted, self.newest = [], {}, None
@@ -99,16 +99,16 @@ class _Group:
 
 
 class EventGroups:
-    """Adds to each event of a run the group that it belongs to, and bounds how fast a cause is reported.
+    """Adds its group to each event of a run, and limits the rate of reports of one cause.
 
     A group is one cause (`CAUSES`) from its first event until it is silent for 60 s of the machine's time. Its first 20
-    events are reported at once, one by one, and so is the first event of each kind. What comes then shares a line: the
-    newest event, with the others in its details, after 10 s (after 1 s where a state changed; of this computer where
-    the machine is silent), with 128 of them, or at the end of the group or the run. Until then they are `waiting`,
-    which the record stores with every commit.
+    events are reported at once, one by one, and so is the first event of each kind. Later events share a
+    line: the newest event, with the others in its details, after 10 s (after 1 s for a change of state; by this
+    computer's clock if the machine sends nothing), with 128 of them, or at the end of the group or the run. Until then
+    they are `waiting`, which the record stores with every commit.
 
-    A flood is counted: of a group 1,000 events are reported with sample, time and message of each, and one more each
-    second. `livebode.records.grouped_events` reads events back one by one, or counts them.
+    In a flood, events are only counted: of a group, 1,000 events are reported with sample, time and message, and one
+    more each second. `livebode.records.grouped_events` reads events back one by one, or counts them.
 
     The details get ``group`` (name, unique in the run), ``count`` (events in the group up to this one), ``first_s``,
     ``last_s`` (times of the first and the newest) and, where events share the line, ``repeats``: kind, sample, time_s,
@@ -126,10 +126,10 @@ class EventGroups:
 
     def __init__(self) -> None:
         self._groups: dict[str, _Group] = {}
-        self._silent_s: dict[str, float] = {}  # since when each cause waits, in `due_while_silent`
+        self._silent_s: dict[str, float] = {}  # start of waiting of each cause, in `due_while_silent`
 
     def take(self, event: Event) -> list[Event]:
-        """What is to be reported now that this happened."""
+        """Take an event; returns the events to report now."""
         cause = CAUSES.get(event.kind)
         if cause is None:
             return [event]
@@ -147,7 +147,7 @@ class EventGroups:
         return found
 
     def due(self, time_s: float, cause: str | None = None) -> list[Event]:
-        """What is to be reported because the machine's time is now `time_s`; of one cause, or of all."""
+        """Events to report at machine time `time_s`; of one cause, or of all."""
         found = []
         for name, group in list(self._groups.items()):
             if cause not in (None, name):
@@ -160,7 +160,7 @@ class EventGroups:
         return found
 
     def due_while_silent(self, now_s: float) -> list[Event]:
-        """What is to be reported at `now_s` of this computer, while the machine's time does not pass."""
+        """Events to report at `now_s` of this computer, while the machine time does not advance."""
         found = []
         for cause, group in self._groups.items():
             if group.waits:
@@ -171,17 +171,17 @@ class EventGroups:
         return found
 
     def waiting(self) -> list[Event]:
-        """What is not reported yet, as it would be now."""
+        """Events that are not reported yet, as they would be now."""
         return [deepcopy(group).report() for group in self._groups.values() if group.waits]
 
     def finish(self) -> list[Event]:
-        """What still waits at the end of a run."""
+        """Waiting events at the end of a run."""
         found = [group.report() for group in self._groups.values() if group.waits]
         self._groups.clear()
         return found
 
     def state(self) -> dict[str, Any]:
-        """All of it as plain data; see `load`."""
+        """State as plain data; see `load`."""
         return {cause: asdict(group) for cause, group in self._groups.items()}
 
     def load(self, state: dict[str, Any]) -> None:

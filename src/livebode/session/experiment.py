@@ -1,4 +1,4 @@
-"""Experiment: the file in which a person describes a machine and what is to be measured of it."""
+"""Experiment: description of a machine and of the measurement, from a TOML file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
 
 
 class Experiment(BaseModel):
-    """A machine, either a belt axis by its constants or one that was measured, and a wish."""
+    """A machine, either a belt axis by its constants or a measured one, and the specification of the experiment."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -48,12 +48,12 @@ class Experiment(BaseModel):
 
     @classmethod
     def read(cls, path: Path, over: Mapping[str, Any] | None = None) -> Experiment:
-        """The Experiment in a TOML file; `over` goes over its [excitation].
+        """The Experiment in a TOML file; `over` replaces keys of its [excitation].
 
         Raises
         ------
         ConfigError
-            If the file cannot be read, is not TOML, or a key or a value cannot be used; the message names it.
+            If the file cannot be read, is not TOML, or a key or a value is invalid; the message contains it.
         """
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -98,7 +98,7 @@ class Experiment(BaseModel):
             raise _first_of(error).at(origin) from None
         if found.belt is not None and found.loop is not None:
             raise ConfigError(
-                "key-conflict", "a [belt] axis has its loop in [belt.drive]", "leave out [loop]", key="loop"
+                "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
             ).at(origin)
         if (found.belt is None) == (found.measured is None):
             raise ConfigError(
@@ -110,14 +110,14 @@ class Experiment(BaseModel):
         return found
 
     def wish(self) -> Wish:
-        """What [excitation] asks for."""
+        """Specification from [excitation]."""
         given = dict(self.excitation)
         if isinstance(given.get("band_hz"), list):
             given["band_hz"] = tuple(given["band_hz"])
         return _made(Wish, given, "excitation")
 
     def bearable(self) -> Bearable:
-        """[limits]; of a belt axis its own where they are not given."""
+        """[limits]; for a belt axis its own limits by default."""
         axis = self.axis()
         own = {} if axis is None else {
             "torque_n_m_max": axis.drive.torque_n_m_max,
@@ -128,7 +128,7 @@ class Experiment(BaseModel):
         return _made(Bearable, own | self.limits, "limits")
 
     def axis(self) -> BeltAxis | None:
-        """The belt axis, where it is one."""
+        """The belt axis; None for a measured one."""
         if self.belt is None:
             return None
         if unknown := [name for name in self.belt if name not in _BELT]:
@@ -143,14 +143,14 @@ class Experiment(BaseModel):
             raise ConfigError(
                 "key-conflict",
                 "[belt.strokes] and [belt.standstill] exclude each other",
-                "leave one out",
+                "remove one of them",
                 key="belt.standstill",
             )
         motion = parts.pop("strokes", None) or parts.pop("standstill", None) or Standstill()
         return BeltAxis(motion=motion, **parts)
 
     def machine(self) -> Machine:
-        """The machine that is described; a simulated cycle for a belt axis, a directory read for a measured one."""
+        """The described machine: simulates a cycle for a belt axis, reads a run directory for a measured one."""
         axis = self.axis()
         if axis is not None:
             return belt_machine(axis)
@@ -163,7 +163,7 @@ class Experiment(BaseModel):
         return MeasuredAxis(self.measured, self.loop)
 
     def loop_tables(self) -> dict[str, Any]:
-        """[loop] of the axis.toml, as docs/configuration.md has it."""
+        """[loop] of the axis.toml, as in docs/configuration.md."""
         axis = self.axis()
         if axis is None:
             return _finite(self._measured_axis.loop_tables())
@@ -176,7 +176,7 @@ class Experiment(BaseModel):
         return {"velocity": velocity, "position": position}
 
     def motion_table(self, window_s: float) -> dict[str, Any]:
-        """[motion] of the axis.toml, where a belt axis moves: a chunk is a stroke, and two windows at least."""
+        """[motion] of the axis.toml for a moving belt axis: a chunk is a stroke, at least two windows."""
         axis = self.axis()
         if axis is None or (cycle := axis.motion.cycle(axis.drive.rate_hz)[0].size) == 1:
             return {}
@@ -184,7 +184,7 @@ class Experiment(BaseModel):
         return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
 
     def signal_names(self) -> dict[str, str]:
-        """[signals] of the axis.toml; those of the simulated axis or of the run where nothing is said."""
+        """[signals] of the axis.toml; default: those of the simulated axis or of the run."""
         if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
             raise ConfigError(
                 "key-unknown",
@@ -217,13 +217,13 @@ class Experiment(BaseModel):
         return names
 
     def tracking(self) -> dict[str, Any]:
-        """What [tracking] of the axis.toml has to say of the recording."""
+        """[tracking] of the axis.toml: keys that depend on the recording."""
         return {} if self.belt is not None else self._measured_axis.tracking()
 
 
 def _first_of(error: ValidationError) -> ConfigError:
-    """The first thing that is wrong, with its key and value."""
-    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo is why the other is missing
+    """The first error, with its key and value."""
+    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo also causes a missing key
     place = ".".join(map(str, first["loc"]))
     if first["type"] == "extra_forbidden":
         if first["loc"][0] == "loop":
@@ -244,12 +244,12 @@ def _unusable(key: str, value: Any, why: str) -> ConfigError:
 
 
 def _plain(why: str) -> str:
-    # TOML has lists, whatever they become here.
+    # TOML has only lists; some become tuples here.
     return why.lower().replace("tuple", "list")
 
 
 def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
-    """The dataclass from plain data; ConfigError for a key it has not, or a value of another type."""
+    """The dataclass from plain data; ConfigError for an unknown key, or a value of another type."""
     known = get_type_hints(kind)
     for name, value in given.items():
         if name not in known:

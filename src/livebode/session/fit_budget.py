@@ -1,4 +1,4 @@
-"""FitBudget: how much processor time the fits of a live run may take."""
+"""FitBudget: limit of the processor time for the fits of a live run."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from contextlib import contextmanager
 from typing import ClassVar
 
 SHARE = 0.5
-"""Of one core, for the fits of all axes of a process: Python runs one thread at a time, and samples come first."""
+"""Share of one core for the fits of all axes of a process: Python runs one thread at a time, samples have priority."""
 CREDIT_S_MAX = 2.0
-"""What a pause may save up."""
+"""Most processor time that a pause can accumulate."""
 RELIEF_FROM_S, RELIEF_TO_S = 2.0, 8.0
-"""Fits get less time when the run is further behind than the first, and none from the second on."""
+"""Backlogs above which fits get less time, and no time."""
 _FIRST_ROW_S = 0.02
 _logger = logging.getLogger(__name__)
 
 
 class FitBudget:
-    """Processor time for fits, earned with real time and spent by them; axes of one process share it evenly.
+    """Processor time for fits: it accumulates with real time, and fits use it; axes of one process share it evenly.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class FitBudget:
         self._exceeded = False
 
     def rows(self, wanted: int, behind_s: float) -> int:
-        """How many of `wanted` responses there is time for, when the run is `behind_s` behind."""
+        """Number of the `wanted` responses that there is time to fit, at a backlog of `behind_s`."""
         FitBudget._open.add(self)
         now = self._clock()
         relief = (RELIEF_TO_S - behind_s) / (RELIEF_TO_S - RELIEF_FROM_S)
@@ -55,13 +55,13 @@ class FitBudget:
     def _affordable(self, share: float) -> int:
         if share <= 0 or self._credit_s <= 0:
             return 0
-        # With all that can be saved up one fit may be tried, however long it takes.
+        # With the largest possible saving one fit is allowed, however long it takes.
         least = int(self._credit_s >= CREDIT_S_MAX)
         return max(least, int(self._credit_s / self._row_s))
 
     @contextmanager
     def spending(self, rows: int) -> Iterator[None]:
-        """Fits of so many responses are made inside."""
+        """Context in which that many responses are fitted."""
         before = self._worked()
         yield
         spent = self._worked() - before

@@ -1,4 +1,4 @@
-"""A model fitted to every response of a run, or to a run that was made."""
+"""A model fitted to every response of a run, or to a finished run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from livebode.session.axis import FitSection
 from livebode.session.live_margins import live_margins
 
 _ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
-_REMEMBERED = 256  # ε of the newest fits, for what is usual
+_REMEMBERED = 256  # ε of the newest fits, for their median
 _UNUSUAL = 3.0
-_EPSILON_MIN = 0.003  # of |G|: what no fit is reproached with
+_EPSILON_MIN = 0.003  # of |G|: an ε that no fit is rejected for
 _POSITIONS = ("rad", "m", "deg", "mm")
 
 
@@ -31,9 +31,9 @@ class Out(Protocol):
 
 
 class Fits:
-    """The fits of one run, and the margins of a known loop around them: into its directory, and what they came to.
+    """The fits of one run, and the margins of a known loop with them: written to its directory and summarized.
 
-    The model is chosen at the first responses, whose unit tells it where the configuration does not.
+    The model is chosen at the first responses: from the configuration, else from their unit.
     """
 
     def __init__(self, section: FitSection, loop: Loop | None = None) -> None:
@@ -46,7 +46,7 @@ class Fits:
 
     @classmethod
     def of(cls, section: FitSection | None, loop: Loop) -> Fits | None:
-        """What a configuration asks for; margins where its loop says what feeds back."""
+        """From a configuration; with margins if its loop describes the feedback."""
         return None if section is None else cls(section, loop if loop.feedback else None)
 
     def take(self, responses: Responses, out: Out) -> Parameters:
@@ -70,7 +70,7 @@ class Fits:
         return found
 
     def snapshot(self) -> bytes:
-        """All that the next fit depends on as bytes; see `restore`."""
+        """State that the next fit depends on, as bytes; see `restore`."""
         if self._fitter is None:
             return b""
         newest = None if self._newest is None else {name: getattr(self._newest, name).tolist() for name in _ROWS}
@@ -78,7 +78,7 @@ class Fits:
         return json.dumps(state).encode() + b"\n" + self._fitter.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot."""
+        """Continue from a snapshot."""
         if not snapshot:
             return
         head, _, own = snapshot.partition(b"\n")
@@ -96,9 +96,9 @@ class Fits:
         return self._fitter
 
     def newest(self) -> Fit | None:
-        """The newest fit that is valid, and whose ε is no more than three times the usual one.
+        """The newest fit that is valid, and whose ε is at most three times the usual one.
 
-        Competing models are tried for this one alone, not for each response of a run.
+        Competing models are fitted only for this one, not for each response of a run.
         """
         if self._fitter is None or self._newest is None:
             return None
@@ -107,7 +107,7 @@ class Fits:
         return best_of(self._fitter, self._newest, self._newest_response)
 
     def summary(self, newest: Fit | None) -> dict[str, Any]:
-        """For run.json: the model, how often each status was, and the newest fit that is valid."""
+        """For run.json: the model, the number of fits of each status, and the newest valid fit."""
         return {
             "model": self._fitter.model.name if self._fitter else None,
             "statuses": self._counts,
@@ -121,13 +121,13 @@ def fitter_of(section: FitSection, unit: str) -> Fitter:
 
 
 def check_fit(section: FitSection) -> None:
-    """LivebodeError where nothing that is measured could let this model be fitted; of "auto" the unit decides later."""
+    """LivebodeError if this model can never be fitted; with "auto" the unit determines the model later."""
     if section.model != "auto":
         fitter_of(section, "")
 
 
 def chosen_model(section: FitSection, unit: str) -> PhysicalModel:
-    """The section's model; "auto" is two masses where the input is a torque, else two masses behind an unknown gain."""
+    """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain."""
     name = section.model
     if name == "auto":
         name = "two-mass" if unit.endswith("/(N m)") or section.radius_m else "two-mass-gain"
@@ -150,19 +150,19 @@ def output_of(unit: str) -> Literal["velocity", "position"] | None:
 
 
 def fit_run(directory: Path, section: FitSection) -> tuple[Fit, str]:
-    """A model fitted to a run that was made, and in words to what of it.
+    """A model fitted to a finished run, and a description of what it was fitted to.
 
-    Of a run that averages, the newest valid response; of another the mean of all. Where neither configuration nor unit
-    say whether the output is a velocity or a position, the one that lacks less of the response is taken.
+    For a run that averages, the newest valid response; else the mean of all. If neither configuration nor unit
+    determine whether the output is a velocity or a position, the one with the smaller misfit is used.
     """
     return fit_averaged(averaged(Run.open(directory)), section)
 
 
 def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
-    """The same of what a run averages to."""
+    """The same for the average of a run."""
     one, words = of.response, of.words
     if not one.unit:
-        words += "; the run names no units: taken as N m, and rad/s or rad"
+        words += "; the run has no units: N m, and rad/s or rad are assumed"
     sections = [section]
     if section.output == "auto" and not one.unit:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]

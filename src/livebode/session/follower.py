@@ -1,4 +1,4 @@
-"""What a run is followed by."""
+"""Interface of the object that turns samples into responses."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from livebode.estimation import Settings
 
 
 class Follower(Protocol):
-    """What turns the samples of a run into responses: a Tracker, or a MotionCorrection, which holds some back.
+    """Turns the samples of a run into responses: a Tracker, or a MotionCorrection, which delays some of them.
 
-    Or, of a drive that sends spectra, a SpectraTracker.
+    For a drive that sends spectra it is a SpectraTracker.
     """
 
     settings: Settings

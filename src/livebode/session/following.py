@@ -1,4 +1,4 @@
-"""Following: the samples of a source through a pipeline into the directory of a run, and what they came to."""
+"""Following: processes the samples of a source in a pipeline, writes the run directory, and returns the results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _SILENT_S = 0.2  # without a Block
 
 
 class Source(Protocol):
-    """What a run takes its samples from: a recording or a simulated machine."""
+    """Source of the samples of a run: a recording or a simulated machine."""
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...
@@ -56,8 +56,8 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run came to: its directory, its summary as in run.json, a thinned copy of its responses, and the newest
-    fit that holds."""
+    """Result of a run: its directory, its summary as in run.json, a thinned copy of its responses, and the newest valid
+    fit."""
 
     directory: Path
     summary: dict[str, Any]
@@ -71,31 +71,31 @@ class Tracking:
     Parameters
     ----------
     source
-        Where the samples come from.
+        Source of the samples.
     pipeline
-        What they go through.
+        Processes the samples.
     to
-        Where the run goes, and who hears of it.
+        Directory and receivers of the run.
     about
-        What run.json says of it besides.
+        Additional entries of run.json.
     kept
-        How it is kept in segments; None for a run in one piece.
+        Settings of a record in segments; None for a run in one piece.
     again
-        Whether the source begins with the same samples each time; else it numbers them on.
+        Whether the source begins with the same samples each time; else its numbers continue.
     started
-        `time.perf_counter()` when opening the source began, where that is to count in the speed.
+        `time.perf_counter()` when opening the source began, to include it in the speed.
     orders
-        What it is told meanwhile.
+        Requests from outside.
     position
         Where a live source continues.
     before
-        The run that it goes on from.
+        The run that this one continues.
     noticed
-        What is known of the recording as a whole before it is tracked.
+        Events on the whole recording, found before tracking.
     relation
-        The clock of a live source, for as long as it is open.
+        The clock of a live source while it is open.
     delivery
-        Goes to the source's `blocks`.
+        Arguments for the source's `blocks`.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class Tracking:
         recorder = self.recorder.__enter__()
         if not isinstance(recorder, RunDirectory):
             self._orders.left = recorder.stopped
-            if self._tally.left_out_samples is not None:  # run.json lacks it where the disk was full when it was found
+            if self._tally.left_out_samples is not None:  # missing in run.json if the disk was full when it was found
                 self._renew(left_out_samples=self._tally.left_out_samples)
             if recorder.clock:
                 self._relation.clock.pieces = recorder.clock
@@ -185,7 +185,7 @@ class Tracking:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """run.json as it ends; empty before `end`."""
+        """The final run.json; empty before `end`."""
         return self._done
 
     @property
@@ -195,7 +195,7 @@ class Tracking:
         return stop, self._origin_s + stop / self._follower.settings.lines.rate_hz
 
     def follow(self) -> None:
-        """Every Block through the pipeline into the record; SignalError where there is none."""
+        """Process and record every Block; SignalError if there is none."""
         fits = self.pipeline.fits
         begun = self._begun | ({} if self._kept is None else {"record": {"finished": False}})
         self.to.audience.share(self._overview)
@@ -208,10 +208,10 @@ class Tracking:
                 self._overview.add(responses)
                 self.to.audience.write(responses)
                 if fits is not None:
-                    fits.take(responses[0:0], self._out)  # which tells it the lines
+                    fits.take(responses[0:0], self._out)  # sets the lines
             blocks = self.recorder.feed(blocks)
         blocks = self._watched(blocks)
-        noticed = () if self._tally.stop else self._noticed  # a record that is continued has them
+        noticed = () if self._tally.stop else self._noticed  # a continued record already has them
         for block in _told(blocks, self.to.audience):
             for event in noticed:
                 time_s = block.origin_s + event.sample / self._follower.settings.lines.rate_hz
@@ -228,7 +228,7 @@ class Tracking:
             raise SignalError("empty", "the recording has no samples", "choose another one")
 
     def _watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """The same Blocks, which are checked and monitored on the way."""
+        """The same Blocks; each is checked and monitored."""
         if (checks := self._live_checks()) is not None:
             blocks = checks.over(blocks, self._found)
         if (watching := self.pipeline.watching) is not None:
@@ -241,14 +241,14 @@ class Tracking:
         if not isinstance(source, LiveSource) or source.spectra is not None or axis is None:
             return None
         tally, settings = self._tally, self._follower.settings
-        # Behind a response that is valid the excitation does not begin any more.
+        # After a valid response, the excitation has already begun.
         begins = not (tally.judged or tally.valid_lines or self._goes_on)
         transient = begins and not (axis.tracking.all_periods or axis.motion)
         channels = self.pipeline.channels
         return LiveChecks(settings, channels, roles=not tally.judged, transient=transient, judged=tally.judge)
 
     def _found(self, event: Event) -> None:
-        """Record and show what the signals of a live run show."""
+        """Record and publish the findings on the signals of a live run."""
         self.to.tell(event)
         self._out.write_event(event)
         if event.kind == "transient":
@@ -256,7 +256,7 @@ class Tracking:
             self._renew(left_out_samples=self._tally.left_out_samples)
 
     def _clocked(self) -> Iterator[Block]:
-        # What waits in a file or a pipe says by its arrival nothing of when it was sampled.
+        # The arrival of samples from a file or a pipe does not show when they were taken.
         paced = isinstance(self.source, LiveSource) and self.source.paced and not self.source.waits
         for block in self._blocks:
             if paced and isinstance(block, LiveBlock) and self._relation.take(block):
@@ -272,14 +272,14 @@ class Tracking:
         self._renew(clock=list(pieces))
 
     def _renew(self, **found: Any) -> None:
-        """Write what was found on the way to run.json, now and at the end."""
+        """Write findings during the run to run.json, now and at the end."""
         self._found_on_the_way |= found
         if not isinstance(self.recorder, RunDirectory):
-            with suppress(LivebodeError):  # where the disk is full, the end of the run writes it
+            with suppress(LivebodeError):  # if the disk is full, it is written at the end of the run
                 self.recorder.renew(**found)
 
     def _step(self, step: Callable[[], Responses | None]) -> None:
-        """Take one step of the follower, and publish its responses and what happened meanwhile."""
+        """Process one step of the follower, and publish its responses and events."""
         before = time.perf_counter()
         responses = step()
         if responses is not None:
@@ -290,7 +290,7 @@ class Tracking:
             self.recorder.keep(kept)
 
     def _until(self, changing: Callable[[], bool]) -> bool:
-        """Asked by a live source before each Block and while it waits: events of a silent machine are recorded too."""
+        """Called by a live source before each Block and while it waits, to record events of a silent machine."""
         if self._tally.stop and time.monotonic() - self._stepped_s > _SILENT_S:
             self._write_events()
             self._out.report_groups_while_silent(time.monotonic())
@@ -299,7 +299,7 @@ class Tracking:
         return changing()
 
     def _write_events(self) -> None:
-        """Publish what happened since the last call."""
+        """Publish events since the last call."""
         self._stepped_s = time.monotonic()
         events = self._drained() + self._follower.drain_events() + self._out.drain_events()
         if self._shedding is not None:
@@ -327,7 +327,7 @@ class Tracking:
             return fits.take(chosen, self._out)
 
     def _drained(self) -> list[Event]:
-        """What a live source has to say; a recording says it all at once."""
+        """Events of a live source; a recording has all of them at the start."""
         if not isinstance(self.source, LiveSource):
             return []
         events = self.source.drain_events()
@@ -336,19 +336,20 @@ class Tracking:
         return self._ahead.released([*events], self._tally.stop)
 
     def end(self, continued_in: str | None = None, *, handed_over: bool = False) -> None:
-        """Judge what came, and make the summary; `handed_over` says that another run goes on with the follower.
+        """Check the results, and create the summary; `handed_over`: another run continues with the follower.
 
         Raises
         ------
         SignalError
-            Where the signals mean nothing. In segments they are kept if there are responses, and an event says it.
+            If the signals are invalid. In segments they remain recorded if there are responses, and an event reports
+            it.
         """
         try:
             self._judge(hand_out=not handed_over)
         except LivebodeError as error:
             if self._kept is None or not (self._tally.responses or self._goes_on or continued_in):
                 raise
-            # What was recorded stays, and says what is wrong with it.
+            # Recorded data remains, with an event that reports the error.
             self._out.write_event(Event("doubtful", *self.position, str(error)))
         left = [] if self._shedding is None else self._shedding.finish(*self.position)
         ended = self._drained() + self._ahead.finish() + self._orders.drain_events(*self.position) + left
@@ -367,7 +368,7 @@ class Tracking:
             self._done["continued_in"] = continued_in
 
     def _judge(self, *, hand_out: bool) -> None:
-        """Hand out what is held back at the end; SignalError where the responses mean nothing."""
+        """Publish delayed results at the end; SignalError if the responses are invalid."""
         follower, tally = self._follower, self._tally
         window = follower.settings.lines.window
         tally.check.finish()
@@ -379,7 +380,7 @@ class Tracking:
         check_some_valid(tally.responses, tally.valid_lines, follower)
 
     def finish(self) -> Outcome:
-        """Draw the pictures and put the record in its place."""
+        """Draw the pictures and move the record to its place."""
         responses = self._overview.responses()
 
         def draw(into: Path) -> None:
@@ -394,7 +395,7 @@ class Tracking:
 
 
 def _told(blocks: Iterator[Block], audience: Audience) -> Iterator[Block]:
-    """The same blocks; `audience` hears of each when the next one is asked for."""
+    """The same blocks; `audience` is informed of each when the next one is requested."""
     for block in blocks:
         yield block
         audience.followed(block)
@@ -405,8 +406,8 @@ def _health(source: Source) -> Callable[[], Health] | None:
 
 
 def _keep_freed_memory() -> None:
-    # glibc gives the memory of freed arrays back, and takes it again page by page for the next block: a third of the
-    # tracker's time. Once an array of this size was freed, it keeps what smaller ones leave.
+    # glibc returns the memory of freed arrays, and requests it again page by page for the next block: a third of the
+    # tracker's time. After an array of this size was freed, glibc retains the memory of smaller ones.
     np.empty(31 << 20, dtype=np.uint8)
 
 

@@ -1,4 +1,4 @@
-"""What is in a recording, and what excitation one of its channels carries."""
+"""Content of a recording, and the excitation in one of its channels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from livebode.sources import Log, open_log
 
 @dataclass
 class ChannelSummary:
-    """One channel over the whole recording: extent of its finite samples, and how many are not finite."""
+    """One channel over the whole recording: range of its finite samples, and number of others."""
 
     name: str
     unit: str
@@ -37,7 +37,7 @@ class ChannelSummary:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What `livebode inspect` says; `unrecognised` is why an excitation beside a silent stretch is not recognised."""
+    """Result of `livebode inspect`; `unrecognised`: why an excitation next to a silent stretch is not recognised."""
 
     log: Log
     samples: int
@@ -103,14 +103,14 @@ def inspect(
     input: str | None = None,
     lines: tuple[str, int] | None = None,
 ) -> Inspection:
-    """Read a recording and say what it holds; LivebodeError where it cannot be read or nothing repeats in it.
+    """Read and describe a recording; LivebodeError if it cannot be read or has no periodic signal.
 
-    With lines (a text and the window) hum is looked for in `output` and `input` where there is no excitation.
+    With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
     """
     log = open_log(path, rate_hz=rate_hz, time=time)
     wanted = [name for name in (excitation, output, input) if name is not None]
     known = {channel.name for channel in log.channels}
-    # Named by a path or an alias, a channel is listed by that name.
+    # A channel given by a path or an alias is listed by that name.
     extra = [name for name in dict.fromkeys(wanted) if name not in known]
     names = [channel.name for channel in log.channels] + extra
     summaries: dict[str, ChannelSummary] = {}

@@ -15,22 +15,22 @@ from livebode.session.said import said
 from livebode.sources import open_log
 
 _ROLES = ("output", "input", "excitation", "schedule")
-# The belt's parameters as the motor's shaft feels them; what changes is told in percent.
+# The belt's parameters referred to the motor shaft; changes are reported in percent.
 _RADIUS_M = 1.0
 
 
 def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) -> Baseline:
-    """The Baseline of runs that hold the healthy machine, all with the same lines and signals.
+    """The Baseline of runs of the healthy machine, all with the same lines and signals.
 
-    Tables are learned from the runs' responses. Where there is a torque and a position to schedule by, a model of the
-    moving machine is learned from the recordings that the runs name, too; `say` hears what is being done.
+    Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
+    is also learned, from the recordings of the runs; `say` receives the progress.
 
     Raises
     ------
     RecordError
         If a run cannot be read.
     BaselineError
-        If runs do not fit each other, or they contain too little.
+        If the runs do not match, or contain too little data.
     """
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
@@ -51,9 +51,9 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
     if machine is None and (covariates := axes[0].monitoring.covariates):
         raise BaselineError(
             "covariates-without-machine",
-            f"covariates ({', '.join(covariates)}) need a model of the moving machine, and these runs give none: "
+            f"covariates ({', '.join(covariates)}) need a model of the moving machine, which these runs do not give: "
             f"{remark}",
-            "leave them out of [monitoring] to learn tables alone",
+            "remove them from [monitoring] to learn only tables",
             channels=list(covariates),
         )
     return Baseline(
@@ -76,7 +76,7 @@ def _axis(run: Run) -> Axis:
         raise BaselineError(
             "run-not-of-machine",
             f"{str(run.path)!r} is not the run of a machine",
-            "learn from what `livebode run` writes",
+            "learn from a directory that `livebode run` wrote",
             path=str(run.path),
         )
     axis = Axis.of(configuration, str(run.path / "run.json"))
@@ -91,15 +91,15 @@ def _axis(run: Run) -> Axis:
 
 
 def _check_once(runs: list[Run], axes: list[Axis]) -> None:
-    """What is there twice would be taken for twice as much."""
+    """Duplicated data would count as twice as much evidence."""
     seen: dict[Path, Run] = {}
     for run, axis in zip(runs, axes):
         for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
             if thing is not None and thing in seen:
                 raise BaselineError(
                     "run-repeated",
-                    f"{str(run.path)!r} contains the same as {str(seen[thing].path)!r}, which was given before it",
-                    "name each recording once",
+                    f"{str(run.path)!r} contains the same data as {str(seen[thing].path)!r}",
+                    "give each recording once",
                     path=str(run.path),
                     other=str(seen[thing].path),
                 )
@@ -119,7 +119,7 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
         if one != other:
             raise BaselineError(
                 "runs-differ",
-                f"{str(run.path)!r} has other {name} than {str(first.path)!r}",
+                f"{str(run.path)!r} and {str(first.path)!r} differ in {name}",
                 "learn from runs with the same configuration",
                 path=str(run.path),
                 other=str(first.path),
@@ -143,7 +143,7 @@ def _joined(batches: list[list[Rows]]) -> list[Rows]:
 
 
 def _parameters(runs: list[Run], section: FitSection) -> Table:
-    """The table of the fits, which are made again: a run's parameters.parquet has no covariance."""
+    """The table of the fits; they are repeated, because a run's parameters.parquet has no covariance."""
     model = fitter_of(section, runs[0].found["unit"])
     names = [name for name in model.model.names if name not in model.held]
     rows = []
@@ -155,15 +155,15 @@ def _parameters(runs: list[Run], section: FitSection) -> Table:
 
 
 def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:
-    """A model of the moving machine, or why there is none."""
+    """A model of the moving machine, or the reason why there is none."""
     signals = axes[0].signals
     covariates = axes[0].monitoring.covariates
     if signals.input is None or signals.schedule is None:
-        return None, "a model of the machine needs the torque and a position to schedule by"
+        return None, "a model of the machine needs the torque and a scheduling position"
     if axes[0].tracking.quantity != "plant":
-        return None, f"a model is of the plant, and the runs are of the {axes[0].tracking.quantity}"
+        return None, f"a model describes the plant, but the runs contain the {axes[0].tracking.quantity}"
     if any(axis.source.log is None for axis in axes):
-        return None, "a model is learned from recordings, and not all of these runs are of one"
+        return None, "a model is learned from recordings, but not all of these runs are from one"
     say("learning a model of the moving machine from the recordings")
     try:
         return (

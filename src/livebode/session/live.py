@@ -1,4 +1,4 @@
-"""One axis on a live source: until the source ends or somebody ends it, over all changes of its configuration."""
+"""One axis on a live source, until the source ends or is stopped, including changes of its configuration."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ _logger = logging.getLogger(__name__)
 
 
 def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
-    """Track a machine while it works and leave a run directory in segments.
+    """Track a machine while it works and write a run directory in segments.
 
-    Ends where the source ends, and whole, with what has come, when `orders` end it. The same axis in the same directory
-    continues the run with the sender's next sample; what is missing is a gap of the length that its numbers tell. A
-    change by `orders` finishes the run, and another one beside it, NAME-2 and so on, goes on with the very next sample
-    of the same source; the outcome is that of the last.
+    Ends with the source, or when `orders` request it; all received samples are then recorded. The same axis in the same
+    directory continues the run with the sender's next sample; missing samples are a gap whose length follows from the
+    sender's numbers. A change by `orders` finishes the run, and a new run next to it (NAME-2 and so on) continues with
+    the next sample of the same source; the result is that of the last run.
 
-    It waits for a machine that is not switched on yet, and reports that after `timeout_s`.
+    It waits for a machine that is not switched on yet, and reports this after `timeout_s`.
 
     Raises
     ------
     LivebodeError
-        Where the configuration cannot be, the machine refuses, or the run was ended before samples came.
+        If the configuration is invalid, the machine rejects the connection, or the run is stopped before samples
+        arrive.
     """
     orders = orders or Orders()
     source = make_source(axis.source)
@@ -52,7 +53,7 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
 
 
 def _late(to: Destination, why: str) -> None:
-    """Report that a machine has not sent yet; there is no run yet, so the time is that of this computer."""
+    """Report that a machine has not sent yet; without a run, the time is that of this computer."""
     event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
     _logger.warning("%s", event.message)
     to.tell(event)
@@ -60,7 +61,7 @@ def _late(to: Destination, why: str) -> None:
 
 
 class _Succession:
-    """The runs of one open source, each going on with the next sample of the one before."""
+    """The runs of one open source; each continues with the next sample after the previous one."""
 
     def __init__(
         self,
@@ -75,7 +76,7 @@ class _Succession:
         self._relation = ClockRelation()
 
     def run(self, pipeline: Pipeline) -> Outcome:
-        """The first run, and all that follow it, until the end."""
+        """The first run and all that follow, until the end."""
         with moments_by(self._relation.clock):
             return self._run(pipeline)
 
@@ -85,7 +86,7 @@ class _Succession:
         directory, before, force = self._to.directory, None, self._to.force
         if force:
             for later in successors.all_of(directory)[:0:-1]:
-                make_way(later)  # the newest first, so that what a kill leaves is still in a row
+                make_way(later)  # the newest first, so that after a kill the remaining ones are still consecutive
         else:
             directory = successors.newest(directory)
         while True:
@@ -110,7 +111,7 @@ class _Succession:
         axis = pipeline.axis
         assert axis is not None
         about = {
-            # Of a source's keys most are another's.
+            # Most keys of a source apply to other kinds of source.
             "configuration": axis.model_dump(mode="json", exclude={"serve", "source"})
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True)},
             "found": {"format": self._source.format, "rate_from": "the sender"},
@@ -130,7 +131,7 @@ class _Succession:
         )
 
     def _handed_over(self, tracking: Tracking, following: Pipeline, directory: Path) -> Before:
-        """End a run, and let the next one go on with its state as far as it can."""
+        """End a run; the next one continues with as much of its state as possible."""
         goes_on = following.take_over(tracking.pipeline)
         tracking.end(directory.name, handed_over=goes_on)
         tracking.to.audience.finish(tracking.summary)
@@ -138,7 +139,7 @@ class _Succession:
         return Before(tracking.to.directory.name, *tracking.position, counts)
 
     def _finish_beside(self, tracking: Tracking, leaving: contextlib.ExitStack) -> None:
-        """Draw its pictures and close it while the next one goes on."""
+        """Draw its pictures and close it while the next one continues."""
 
         def finish() -> None:
             try:

@@ -1,4 +1,4 @@
-"""What a live run finds out about its signals as they come: doubtful roles, a transient at the start, phase slips."""
+"""Checks of the signals of a live run: doubtful roles, a transient at the start, phase slips."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from livebode.session.role_spectra import role_spectra
 from livebode.session.roles import ROLES, suspicions
 from livebode.session.transients import transient_event, transient_periods
 
-_WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # of a stretch that is judged, whichever is longer
-_EXCITED_MIN = 16  # windows of it with power, to distinguish noise from an answer
+_WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # length of a stretch that is judged, whichever is longer
+_EXCITED_MIN = 16  # windows with power in it, to distinguish noise from a response
 _SLIP_PERIODS = 32  # that are searched at a time
 
 
 class LiveChecks:
-    """Judges stretches of the signals until one is excited, and searches the excitation for slips all the time.
+    """Judges stretches of the signals until one is excited, and always searches the excitation for phase slips.
 
-    Nothing is stopped or altered: what is found is an event.
+    It stops and changes nothing; findings are events.
 
     Parameters
     ----------
     settings
-        Of the follower.
+        Settings of the follower.
     channels
-        Those of the Blocks that are used.
+        Channels of the Blocks that are used.
     roles, transient
         Whether the roles are judged, and whether the run may begin with a transient.
     judged
-        Called when a stretch was judged, which is done once.
+        Called once, when a stretch was judged.
     """
 
     def __init__(
@@ -55,19 +55,19 @@ class LiveChecks:
         self._searched = _Stretch()
 
     def over(self, blocks: Iterable[Block], say: Callable[[Event], None]) -> Iterator[Block]:
-        """The same Blocks; what they show is reported before the next one is asked for."""
+        """The same Blocks; findings are reported before the next one is requested."""
         for block in blocks:
             yield block
             for event in self.take(block):
                 say(event)
 
     def take(self, block: Block) -> Iterator[Event]:
-        """What shows with this Block."""
+        """Findings with this Block."""
         if not len(block):
             return
         if self._roles or self._transient:
             if self._stretch.add(block, self._channels, self._size):
-                self._transient = False  # the excitation may have begun in what is not judged
+                self._transient = False  # the excitation may have begun in samples that are not judged
             if self._stretch.samples >= self._size:
                 yield from self._judged(block)
         if self._reference is not None:
@@ -80,9 +80,9 @@ class LiveChecks:
         by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
         spectra = role_spectra(by_role, settings)
         if spectra is None:
-            return  # nothing is excited yet, so that the next stretch is judged
+            return  # no excitation yet: the next stretch is judged
         if spectra.windows < _EXCITED_MIN:
-            self._transient = False  # the excitation began in this stretch, and not with the next one
+            self._transient = False  # the excitation began in this stretch, not with the next one
             return
         if self._roles:
             for one in suspicions(by_role, settings):
@@ -104,17 +104,17 @@ class LiveChecks:
         for slip in self._slips.take(bridged(data[0])):
             way, what = ("forward", "missing") if slip.missing > 0 else ("back", "repeated")
             message = (
-                f"the phase of {name!r} leaps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
-                f"where the source reports no gap: samples are {what}, or the generator was started again; the "
-                "responses of the windows around it are wrong; let the generator run on, and the sender number each "
-                "sample as it is taken"
+                f"the phase of {name!r} jumps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
+                f"where the source reports no gap: samples are {what}, or the generator was restarted; the "
+                "responses of the windows around it are wrong; do not restart the generator, and let the sender number "
+                "each sample when it is taken"
             )
             details = {"missing_samples": slip.missing}
             yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
 
 
 class _Stretch:
-    """Samples that follow each other, NaN where some are missing."""
+    """Consecutive samples, NaN for missing ones."""
 
     def __init__(self) -> None:
         self.start = self.samples = 0
@@ -122,13 +122,13 @@ class _Stretch:
         self._parts: list[NDArray[np.float64]] = []
 
     def hand_out(self) -> tuple[int, NDArray[np.float64]]:
-        """Number of the first sample, and all of them; the next sample is expected right behind them."""
+        """Number of the first sample, and all samples; the next sample is expected directly after them."""
         start, data = self.start, np.concatenate(self._parts, axis=1)
         self._begin(start + self.samples)
         return start, data
 
     def add(self, block: Block, channels: list[str], samples_max: int) -> bool:
-        """Append; True where it begins again instead, behind a loss that is too long, or of unknown length."""
+        """Append; True if it begins again instead, after a loss that is too long or of unknown length."""
         missing = block.start - self.start - self.samples
         again = self._begun and (not 0 <= missing <= samples_max or (block.gap and not missing))
         if again or not self._begun:

@@ -1,4 +1,4 @@
-"""Margins beside the fits of a run, as they come."""
+"""Margins with the fits of a run, during the run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from livebode.margins import OpenLoop, against_lines, margins
 
 
 def live_margins(fits: Parameters, responses: Responses, fitter: Fitter, loop: Loop) -> tuple[Parameters, ...]:
-    """Rows for parameters.parquet: each margin at each fit, of which the lines of its response show nothing else."""
+    """Rows for parameters.parquet: each margin at each fit that the lines of its response do not contradict."""
     grid = fitter.grid
     band_hz = float(grid.frequency_hz[0]), float(grid.frequency_hz[-1])
     found = margins(fits, OpenLoop(fitter.model, loop, grid.rate_hz, grid.hold), band_hz)

@@ -1,4 +1,4 @@
-"""The loop of a run: its margins, over its places, and what would widen them."""
+"""The loop of a run: its margins, also over the schedule, and a proposal that increases them."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ _PLACES = 12
 
 @dataclass(frozen=True, eq=False)
 class LoopReport:
-    """What a run says of its loop.
+    """Properties of the loop of a run.
 
     Attributes
     ----------
     fit, of
-        The fitted plant, and in words what it was fitted to.
+        The fitted plant, and a description of what it was fitted to.
     loop
         The open loop around it.
     margins
         One row, of `fit`.
     at_lines
-        Largest |S| at a line with its bound, and that line in Hz: what is known without a model.
+        Largest |S| at a line with its bound, and that line in Hz: known without a model.
     places
-        Margins over the schedule, for a run that has one; else the same as `margins`.
+        Margins over the schedule, if the run has one; else the same as `margins`.
     tuning
-        What is proposed, judged over the places.
+        Proposed change, judged over the places.
     responses
-        What was measured, one row.
+        Measured response, one row.
     """
 
     fit: Fit
@@ -62,13 +62,13 @@ class LoopReport:
 
     @property
     def message(self) -> str:
-        """Why there are no margins; empty where there are."""
+        """Why there are no margins; empty if there are."""
         status = str(self.margins.status[0])
         if status == CONTRADICTED:
             size, _, at_hz = self.at_lines
             return (
-                f"the {self.fit.model.name} model contradicts the lines: they alone show Ms of at least {size:.3g} at "
-                f"{at_hz:g} Hz, more than the model allows; free what it lacks (a delay: --free delay), choose another "
+                f"the {self.fit.model.name} model contradicts the lines: they show Ms of at least {size:.3g} at "
+                f"{at_hz:g} Hz, more than the model allows; free a parameter (a delay: --free delay), choose another "
                 "model, or correct the description of the controllers under [loop]"
             )
         return "" if self.margins.ok[0] else f"{status}; check the loop's description and the fit"
@@ -103,7 +103,7 @@ class LoopReport:
 def loop_of_run(
     directory: Path, section: FitSection | None = None, axis: Axis | None = None, peak_sensitivity: float = 2.0
 ) -> LoopReport:
-    """The report of a run that was made; its configuration says loop and model where `axis` and `section` do not.
+    """The report of a finished run; loop and model are from `axis` and `section`, else from its configuration.
 
     Raises
     ------
@@ -119,16 +119,16 @@ def loop_of_run(
         own = axis.fit if axis is not None else None
         section = own or FitSection.model_validate(own_words.get("fit", {}))
     found, words = fit_run(directory, section)
-    responses = Responses.join(list(run.steady_batches()))  # what was fitted
+    responses = Responses.join(list(run.steady_batches()))  # the fitted responses
     return loop_report(found, words, responses, loop.build(responses.lines.rate_hz), peak_sensitivity)
 
 
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sensitivity: float = 2.0) -> LoopReport:
-    """The report of a fit, and of the responses that it is of."""
+    """The report of a fit and of its responses."""
     if fit.status != "ok":
         raise FitError(
             "not-fitted",
-            f"margins need a fit, and there is none: {fit.sentence}",
+            f"margins need a valid fit: {fit.sentence}",
             "fit another model",
             models=[fit.model.name],
         )
@@ -139,7 +139,7 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sen
     if len(places := _by_place(responses)) > 1:
         free = [name for name in fit.model.names if name not in fit.held]
         over = Fitter(fit.model, fixed=fit.held, free=free, band_hz=fit.band_hz, hold=fit.hold).process(places)
-        # The fit may be of one moment, and no better than the least of them.
+        # The fit may belong to one time, and is not better than the worst of them.
         if over.ok.sum() > len(places) // 2:
             fits, measured = Parameters.join([over, fits]), Responses.join([places, fitted_to])
     every = against_lines(margins(fits, around, fit.band_hz), measured, loop)
@@ -158,16 +158,16 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop, peak_sen
 def _tuned(
     fits: Parameters, read: Margins, loop: OpenLoop, band_hz: tuple[float, float], peak_sensitivity: float
 ) -> Tuning:
-    """A filter by the fits; none where the lines contradict one of them."""
+    """A filter from the fits; none if the lines contradict one of them."""
     if wrong := int(np.count_nonzero(read.status == CONTRADICTED)):
-        sentence = f"the lines contradict {wrong} of {len(read)} fits: by such a model no filter can be judged"
+        sentence = f"the lines contradict {wrong} of {len(read)} fits: a filter cannot be judged with such a model"
         return Tuning("refused", sentence, read)
     rate_hz = getattr(getattr(loop.loop.feedback, "velocity", loop.loop.feedback), "rate_hz", None)
     return tuning(fits, loop, band_hz, controller_rate_hz=rate_hz, peak_sensitivity=peak_sensitivity)
 
 
 def _by_place(responses: Responses) -> Responses:
-    """The mean response at each of a dozen places of the schedule; one row where there is no schedule."""
+    """The mean response at each of twelve places of the schedule; one row without a schedule."""
     use = np.flatnonzero(responses.valid.all(axis=1) & np.isfinite(responses.schedule))
     if not use.size:
         return mean_response(responses)

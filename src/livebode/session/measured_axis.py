@@ -1,4 +1,4 @@
-"""The axis of an experiment that a run has measured: its machine, and what of the run's configuration goes on."""
+"""The axis of an experiment from a measured run: its machine, and what it uses of the run's configuration."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from livebode.session.axis import LoopSection
 from livebode.session.fits import output_of
 from livebode.session.said import said
 
-Number = Annotated[float, Field(strict=True)]  # true is none
+Number = Annotated[float, Field(strict=True)]  # true is not a number
 
-_KEPT = ("differenced", "spikes")  # of the run's [tracking]: what the recording needs, not what was wished of it
+_KEPT = ("differenced", "spikes")  # of the run's [tracking]: properties of the recording, not of the evaluation
 _UNITS = ("rad/s/(N m)", "rad/(N m)")
-_UNCHECKED = "the loop is not the run's own: whether it is stable is not looked at"
+_UNCHECKED = "the loop is not that of the run: its stability is not checked"
 
 
 class MeasuredSection(BaseModel):
-    """[measured]: a plant that a run measured, and what its motion does alone."""
+    """[measured]: a plant that a run measured, and the effect of its motion alone."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -42,14 +42,14 @@ class MeasuredSection(BaseModel):
 
 
 class MeasuredAxis:
-    """A run's mean plant, in the loop that the run was described with unless another is given.
+    """A run's mean plant, by default in the loop of the run.
 
     Raises
     ------
     RecordError
         If there is no such run.
     ConfigError
-        If the loop acts on another output than the run has, or the excitation is not a torque.
+        If the loop acts on an output that the run does not have, or the excitation is not a torque.
     """
 
     def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
@@ -77,7 +77,7 @@ class MeasuredAxis:
         )  # fmt: skip
 
     def loop_tables(self) -> dict[str, Any]:
-        """[loop] as the file or the run has it."""
+        """[loop] of the file or of the run."""
         if self._given is not None:
             return self._given.model_dump(exclude_unset=True, exclude_none=True)
         return dict(self._said.get("loop", {}))
@@ -87,7 +87,7 @@ class MeasuredAxis:
         return {"excitation": "w"} | dict(self._said.get("signals", {}))
 
     def tracking(self) -> dict[str, Any]:
-        """What of the run's [tracking] its recordings need."""
+        """The part of the run's [tracking] that its recordings need."""
         tracking = self._said.get("tracking", {})
         kept = {name: tracking[name] for name in _KEPT if tracking.get(name)}
         return kept if "input" in self.signal_names() else {"estimator": "indirect"} | kept
@@ -110,7 +110,7 @@ class MeasuredAxis:
             other = "loop.velocity" if acts_on == "position" else "loop.position_pd"
             raise ConfigError(
                 "value-mismatch",
-                f"the run's output is a {output}, and its loop as described acts on a {acts_on}",
+                f"the run's output is a {output}, but its loop as described acts on a {acts_on}",
                 f"describe {other}, or track the {acts_on}",
                 key=other,
                 value=output,
@@ -120,8 +120,8 @@ class MeasuredAxis:
     def _notes(self) -> tuple[str, ...]:
         notes = [] if self._given is None else [_UNCHECKED]
         if (unit := self._run.found.get("unit", "")) and unit not in _UNITS:
-            notes.append(f"the run's plant is in {unit}: what is called N m and rad here is to be read so")
+            notes.append(f"the run's plant is in {unit}: N m and rad here stand for these units")
         if not unit and self._section.output is None:
             taken = {"velocity": "a velocity in rad/s", "position": "a position in rad"}[self._output()]
-            notes.append(f"the run has no units: its output is taken as {taken}, its input as N m")
+            notes.append(f"the run has no units: its output is assumed to be {taken}, its input N m")
         return tuple(notes)

@@ -1,4 +1,4 @@
-"""Orders: what a run is told from outside while it goes."""
+"""Orders: requests to a run from outside."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from livebode.sources.live import LiveSource
 
 
 class StoppedError(Exception):
-    """Somebody ended a recording before its end."""
+    """A recording was stopped before its end."""
 
 
 class Orders:
-    """Tells one run to end, to go on otherwise, or to record what happened to it. Any thread may tell."""
+    """Requests a run to end, to continue with another configuration, or to record an event. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -26,46 +26,46 @@ class Orders:
         self._kept: RecordSection | None = None
         self._source: LiveSource | None = None
         self.ended = False
-        """Whether it was told to end."""
+        """Whether its end was requested."""
         self.left: Callable[[], Event] | None = None
-        """What is to be said of the run if it is left as it is now; None while there is none to be left."""
+        """Message if the run is stopped in its present state; None while there is no run."""
 
     def of(self, source: LiveSource) -> None:
-        """The run takes its samples from this one, which is not open yet."""
+        """Set the source of the run, which is not open yet."""
         with self._lock:
             self._source = source
             if self.ended:
                 source.stop()
 
     def end(self) -> None:
-        """End whole, with what has come. May be called from a signal handler's thread while nothing else is told."""
+        """Request the end; received samples are recorded. May be called from a signal handler's thread."""
         self.ended = True
         source = self._source
         if source is not None:
             source.stop()
 
     def say(self, kind: str, message: str, **details: Any) -> None:
-        """Record an event at the sample where the run is."""
+        """Record an event at the present sample of the run."""
         with self._lock:
             self._said.append((kind, message, details))
 
     def keep(self, kept: RecordSection) -> None:
-        """Cut the record otherwise from here on."""
+        """Use other record settings from now."""
         with self._lock:
             self._kept = kept
 
     def change(self, pipeline: Pipeline) -> None:
-        """Finish the run at the next Block, and go on in another one; of several the newest counts."""
+        """Finish the run at the next Block, and continue in another one; the newest request is used."""
         with self._lock:
             self._next = pipeline
 
     def changing(self) -> bool:
-        """Whether there is something to go on with."""
+        """Whether there is a pipeline to continue with."""
         return self._next is not None
 
     @property
     def source(self) -> LiveSource | None:
-        """Where the samples come from, once it is open."""
+        """Source of the samples, as soon as it is open."""
         source = self._source
         return source if source is not None and source.channels else None
 
@@ -80,7 +80,7 @@ class Orders:
         return taken
 
     def drain_events(self, sample: int, time_s: float) -> list[Event]:
-        """What was said since the last call, as events of this moment."""
+        """Requested events since the last call, at the present time."""
         with self._lock:
             said, self._said = self._said, []
         return [Event(kind, sample, time_s, message, details) for kind, message, details in said]

@@ -1,4 +1,4 @@
-"""A run in few rows, for pictures: memory stays bounded however long the run is."""
+"""A run in few rows, for pictures, in bounded memory."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _PARTS_MAX = 64
 
 
 class Overview:
-    """Every n-th response, evenly over the run, with n doubled whenever there are too many.
+    """Every n-th response, evenly over the run; n is doubled whenever there are too many.
 
-    It holds at most 2,048 rows in at most 64 parts, whatever the size of the batches. The thread that tracks adds;
-    any other may read meanwhile.
+    It contains at most 2,048 rows in at most 64 parts, for any size of batches. The tracking thread adds rows; any
+    other thread may read at the same time.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Overview:
     def _append(self, responses: Responses) -> None:
         if self._parts and not len(responses):
             return  # one empty part is enough to name the lines
-        # Joining copies: a view would hold the rows that are left out in memory.
+        # Joining copies: a view would keep the omitted rows in memory.
         self._parts.append(Responses.join([responses]))
         self._rows += len(responses)
         if len(self._parts) > _PARTS_MAX:

@@ -1,4 +1,4 @@
-"""Pipeline: what the samples of an axis go through, from the tracker to the alarms."""
+"""Pipeline: processing of the samples of an axis, from the tracker to the alarms."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from livebode.sources.live import LiveSource
 
 @dataclass(frozen=True, eq=False)
 class Pipeline:
-    """What the samples of an axis go through; nothing of it has begun when it is made.
+    """Processing of the samples of an axis; new, it has no state yet.
 
     Attributes
     ----------
     axis
-        What it was made from; None where it was put together by hand.
+        Configuration from which it was created; None if it was assembled in Python.
     follower
         Turns samples into responses.
     fits
-        A model fitted to each, where one is asked for.
+        A model fitted to each response, if one is configured.
     watching
-        Tells changes, or that it cannot.
+        Detects changes, or reports that it cannot.
     """
 
     follower: Follower
@@ -38,13 +38,13 @@ class Pipeline:
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
-        """What the axis asks for behind its follower, with or without `samples`; LivebodeError where it cannot be."""
+        """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
         settings = follower.settings
         return cls(follower, Fits.of(axis.fit, settings.loop), make_watching(axis, settings, samples=samples), axis)
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
-        """The same for a machine that sends, whose channels and rate are known; LivebodeError where they do not fit."""
+        """The same for a live source, whose channels and rate are known; LivebodeError if they do not fit."""
         pipeline = cls.of(axis, live_follower(axis, source.rate_hz, source.spectra), samples=source.spectra is None)
         names = [channel.name for channel in source.channels]
         for name in pipeline.channels:
@@ -73,14 +73,14 @@ class Pipeline:
 
     @property
     def parts(self) -> Mapping[str, Stateful]:
-        """What has a state, by name."""
+        """Stages with a state, by name."""
         optional = {"fits": self.fits, "watching": self.watching}
         return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
 
     def take_over(self, before: Pipeline) -> bool:
-        """Go on with the state of the one before, as far as the settings that it depends on are the same.
+        """Continue with the state of the previous one, if the settings that it depends on are unchanged.
 
-        Returns whether the follower goes on, so that no window is lost; else it begins anew.
+        Returns whether the follower continues, so that no window is lost; else it begins again.
         """
         try:
             self.follower.restore(before.follower.snapshot())

@@ -1,4 +1,4 @@
-"""From an Axis and its recording to the settings of a tracker: what is "auto" is found here."""
+"""Settings of a tracker from an Axis and its recording; "auto" values are determined here."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from livebode.session.spectra_plan import check_spectra
 from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
-"""Default of a live source: what a person sees, at a tenth of the work of a hop of a twentieth of the window."""
-_LOOKED_AT = 1 << 22  # samples that "auto" looks at: half an hour at 2 kHz, and 100 MB of work
-_ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # that the roles are judged by, whichever is longer
+"""Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
+_LOOKED_AT = 1 << 22  # samples that "auto" uses: half an hour at 2 kHz, and 100 MB of work
+_ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
 
 
 class Recorded(Protocol):
-    """What has Blocks to begin with."""
+    """A source of Blocks that begins at the first sample."""
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
 
 
 def make_follower(axis: Axis, log: Log) -> Follower:
-    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError where they do not fit."""
+    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
     return _follower(axis, make_settings(axis, log))
 
 
 def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
-    """The same for a machine that sends: samples, whose lines and window must be given, or spectra of a layout."""
+    """The same for a live source: samples, whose lines and window must be given, or spectra of a layout."""
     if layout is not None:
         lines = check_spectra(axis, layout, rate_hz)
         return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
@@ -43,7 +43,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
     if frequencies == "auto" or window == "auto":
         raise ConfigError(
             "auto-needs-recording",
-            "lines or window are 'auto', which needs a recording to look at first",
+            "lines or window are 'auto', which needs a recording",
             "set lines.frequencies and lines.window for a live source",
             key="lines",
         )
@@ -55,7 +55,7 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
 def _follower(axis: Axis, settings: Settings) -> Follower:
     if axis.motion is None:
         return Tracker(settings)
-    # The simulation, which its model is driven by, takes a while to import.
+    # The simulation, which its model needs, is slow to import.
     from livebode.motion import MotionCorrection
 
     chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
@@ -75,7 +75,7 @@ def _follower(axis: Axis, settings: Settings) -> Follower:
 
 
 def make_settings(axis: Axis, log: Log) -> Settings:
-    """The tracker's settings for this recording; LivebodeError where they do not fit it or each other."""
+    """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
     settings = _settings(axis, log.rate_hz, _lines(axis, log))
     if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
         check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
@@ -109,7 +109,7 @@ def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) 
 
 
 def _ripple(axis: Axis) -> tuple[RippleOrder, ...]:
-    """Orders that the configuration names, else those that its baseline has learned."""
+    """Ripple orders from the configuration, else those that its baseline has learned."""
     if axis.tracking.ripple or axis.monitoring.baseline is None or axis.signals.schedule is None:
         return tuple(RippleOrder(*order) for order in axis.tracking.ripple)
     from livebode.monitoring import Baseline  # with the simulation
@@ -131,11 +131,11 @@ def _lines(axis: Axis, log: Log) -> Lines:
     if reference is None:
         raise ConfigError(
             "auto-needs-recording",
-            "lines or window are 'auto', but no excitation is named to find them in",
+            "lines or window are 'auto', but signals.excitation is missing",
             "name its channel",
             key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
         )
-    # Its statistics take half a second to import, which a run with known lines is spared.
+    # Its statistics take half a second to import; a run with known lines does not need them.
     from livebode.excitation import recognise
 
     found = recognise(beginning(log, reference), log.rate_hz)
@@ -178,7 +178,7 @@ def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarr
 
 
 def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
-    """What speaks against the roles of the channels, in sentences; SignalError where it is certain and not accepted."""
+    """Doubts about the roles of the channels, as sentences; SignalError if one is certain and not accepted."""
     names = {role: name for role in ROLES if (name := settings.channel(role))}
     samples = min(_LOOKED_AT, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
     channels = list(dict.fromkeys(names.values()))

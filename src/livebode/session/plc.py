@@ -1,4 +1,4 @@
-"""From an Axis to the function blocks that excite and follow it on its PLC."""
+"""Function blocks for the PLC of an axis: excitation and tracking."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ def plc_project(
     Parameters
     ----------
     axis
-        Names the signals, lines and window; its rate and its controllers' are held against the task's.
+        Signals, lines and window; its rate and its controllers' rates are compared with that of the task.
     limit
-        What the excitation never exceeds.
+        Largest magnitude of the excitation.
     ring_length
-        Samples that the ring keeps.
+        Number of samples in the ring.
     rate_hz
-        Of the task, if neither the axis nor the design has it.
+        Rate of the task, if neither the axis nor the design has it.
     amplitude
-        Of a flat multisine at the axis's lines, with Schroeder's phases.
+        Amplitude of each line of a flat multisine with Schroeder's phases.
     designed
-        Instead (see `read_designed`): its period is played as it is, and brought in over its `ramp_s`.
+        Instead of `amplitude` (see `read_designed`): its period is used unchanged, and ramped up over its `ramp_s`.
 
     Raises
     ------
     UsageError, ConfigError, GridError
-        If not just one of `amplitude` and `designed` is given, rates or lines contradict each other, the axis names no
-        excitation, no exact lines and window, or no rate; or as `read_designed` and `Project.files` do.
+        If both or neither of `amplitude` and `designed` are given, rates or lines contradict each other, the axis has
+        no excitation, no exact lines and window, or no rate; also those of `read_designed` and `Project.files`.
     """
     if (amplitude is None) == (designed is None):
         raise UsageError(
@@ -99,7 +99,7 @@ def _rate_hz(specified: dict[str, float | None]) -> float:
     known = [(who, rate_hz) for who, rate_hz in specified.items() if rate_hz is not None]
     if not known:
         raise UsageError(
-            "missing", "the rate of the PLC's task is missing", "specify it, or set source.rate_hz", argument="rate_hz"
+            "missing", "the rate of the PLC task is missing", "give rate_hz, or set source.rate_hz", argument="rate_hz"
         )
     first, rate = known[0]
     check_rate(rate)
@@ -107,7 +107,7 @@ def _rate_hz(specified: dict[str, float | None]) -> float:
         if abs(rate - rate_hz) > SAME_RATE * rate_hz:
             raise ConfigError(
                 "rate-mismatch",
-                f"{first} is {rate:g} Hz, but {other} {rate_hz:g} Hz, and the PLC's task has one rate",
+                f"{first} is {rate:g} Hz, but {other} is {rate_hz:g} Hz; the PLC task has only one rate",
                 "correct one of them",
                 key="source.rate_hz" if other == "source.rate_hz" else "rate_hz",
                 rates_hz=[rate, rate_hz],
@@ -116,7 +116,7 @@ def _rate_hz(specified: dict[str, float | None]) -> float:
 
 
 def _lines(axis: Axis, rate_hz: float, whole: Lines | None) -> Lines:
-    """The axis's lines; a design must excite them all, and its own stand for "auto"."""
+    """The axis's lines; a design must excite all of them; "auto" means those of the design."""
     frequencies, window = axis.lines.frequencies, axis.lines.window
     if whole is not None:
         if window not in ("auto", whole.window):
@@ -143,7 +143,7 @@ def _lines(axis: Axis, rate_hz: float, whole: Lines | None) -> Lines:
         raise ConfigError(
             "value-mismatch",
             f"the design does not excite {min(silent) * lines.resolution_hz:g} Hz",
-            f"leave that out, or {_TAKE}",
+            f"remove that line, or {_TAKE}",
             key="lines.frequencies",
             frequency_hz=min(silent) * lines.resolution_hz,
         )
@@ -151,11 +151,11 @@ def _lines(axis: Axis, rate_hz: float, whole: Lines | None) -> Lines:
 
 
 def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
-    """A multisine with all lines alike: period, periods of its ramp, and what it is."""
+    """A multisine with equal lines: period, periods of its ramp, and description."""
     if amplitude is None or not SMALLEST <= amplitude < inf:
         raise UsageError(
             "out-of-range",
-            f"{amplitude=} is not a finite number from {SMALLEST} up",
+            f"{amplitude=} is not a finite number of at least {SMALLEST}",
             "specify the amplitude of each line",
             argument="amplitude",
             value=amplitude,
@@ -166,5 +166,5 @@ def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
 
 
 def _designed(waveform: Waveform) -> tuple[Floats, int, str]:
-    """The same of a design."""
+    """The same for a design."""
     return waveform.samples, waveform.ramp_periods, "\n".join(as_lines(waveform.about))

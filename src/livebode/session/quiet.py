@@ -1,4 +1,4 @@
-"""What a recording without excitation, or a pause of the excitation, shows of the mains."""
+"""Mains hum in a recording without excitation, or in a pause of the excitation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
 from livebode.session.plan import beginnings
 from livebode.sources import Log
 
-_SAMPLES_MAX = 1 << 22  # that are looked at
+_SAMPLES_MAX = 1 << 22  # that are searched
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +23,15 @@ class Quiet:
     Attributes
     ----------
     lines
-        What is to be measured later.
+        Lines to be measured later.
     first, samples
-        Of the stretch.
+        First sample and length of the stretch.
     found
         Tones, and the lines that each disturbs.
     units
-        Of the signals.
+        Units of the signals.
     constant
-        Whether the excitation never changes in all that was looked at.
+        Whether the excitation never changes in the searched samples.
     """
 
     lines: Lines
@@ -51,9 +51,9 @@ class Quiet:
 
 
 def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines: Lines) -> Quiet:
-    """Hum in the longest stretch in which the excitation does not change; without one, of the whole recording.
+    """Hum in the longest stretch in which the excitation does not change; without excitation, in the whole recording.
 
-    A line is disturbed by a tone that is nearer to it than half a bin of its window, where a design leaves lines out.
+    A tone disturbs a line if their distance is less than half a bin of its window; a design excludes such lines.
 
     Raises
     ------
@@ -72,9 +72,9 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
     if excitation and stop - first < SECONDS_MIN * lines.rate_hz:
         raise SignalError(
             "pause-too-short",
-            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most, and hum is looked for in "
+            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most, but the search for hum needs "
             f"{SECONDS_MIN:g} s or more without excitation",
-            "record such a pause, or leave out the lines",
+            "record such a pause, or omit the lines",
             channel=excitation,
             pause_s=float((stop - first) / lines.rate_hz),
             limit_s=float(SECONDS_MIN),

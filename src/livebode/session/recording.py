@@ -21,15 +21,15 @@ from livebode.sources import open_log
 
 
 def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
-    """Track a recording and leave a run directory; in segments where the axis has a [record].
+    """Track a recording and write a run directory; in segments if the axis has a [record].
 
     Raises
     ------
     LivebodeError
-        For anything in the recording or the configuration that cannot be; nothing is left in the directory then, or in
-        segments all that was recorded so far.
+        For any error in the recording or the configuration; then nothing is written, or in segments what was recorded
+        so far remains.
     StoppedError
-        Where `orders` end it; what is left is the same.
+        If `orders` end it; the directory is as for an error.
     """
     started = time.perf_counter()
     assert axis.source.log is not None

@@ -1,4 +1,4 @@
-"""What a recording's signals show of their roles at the lines: averages over the windows of its beginning."""
+"""Line spectra of a recording's signals to judge their roles: averages over the windows of its beginning."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from livebode.session.checks import POWERLESS_SHARE
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# A window counts where its reference has this share of the strongest window's power: the excitation may begin late.
+# A window is used if its reference has this share of the strongest window's power: the excitation may begin late.
 _RUNS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class RoleSpectra:
-    """Line spectra of whole windows that follow each other, and what does not depend on the lines.
+    """Line spectra of consecutive complete windows, and properties that do not depend on the lines.
 
     Attributes
     ----------
     settings
         Names, lines and loop.
     spectra
-        Of each role, with the loop's advance, shape (windows, lines).
+        Spectra of each role, with the loop's advance, shape (windows, lines).
     neighbours
-        Which windows are followed by the next one of the recording, shape (windows − 1,).
+        True for windows that are followed by the next one of the recording, shape (windows − 1,).
     repeating
-        Of the reference, the share of its variance (without a linear trend) that returns a window later.
+        Share of the reference's variance (without a linear trend) that repeats a window later.
     exact
-        Whether the reference returns to twelve digits: a command, not a measurement.
+        Whether the reference repeats to twelve digits: it is then a command, not a measurement.
     """
 
     settings: Settings
@@ -58,15 +58,15 @@ class RoleSpectra:
         return np.asarray(over / under)
 
     def coherence(self, role: Role) -> Floats:
-        """Of a signal with the reference over the windows, shape (lines,); about 1/windows where there is none."""
+        """Coherence of a signal with the reference over the windows, shape (lines,); about 1/windows if unrelated."""
         x, reference = self.spectra[role], self.spectra[self.settings.method.reference]
         powers = np.sum(np.abs(x) ** 2, axis=0) * np.sum(np.abs(reference) ** 2, axis=0)
         return np.asarray(np.abs(np.sum(x * reference.conj(), axis=0)) ** 2 / powers)
 
     def returns(self, role: Role) -> tuple[Floats, int]:
-        """|Σ X_m·conj(X_m+1)|²/(Σ|X_m|²·Σ|X_m+1|²) over neighbouring windows, shape (lines,), and how many there are.
+        """|Σ X_m·conj(X_m+1)|²/(Σ|X_m|²·Σ|X_m+1|²) over neighbouring windows, shape (lines,), and their number.
 
-        Neighbours and not the average of all: a slip of the phase costs one pair and not the whole.
+        Neighbours instead of the average of all: a phase slip affects only one pair.
         """
         x = self.spectra[role]
         first, second = x[:-1][self.neighbours], x[1:][self.neighbours]
@@ -75,9 +75,9 @@ class RoleSpectra:
 
 
 def role_spectra(signals: Mapping[Role, Floats], settings: Settings) -> RoleSpectra | None:
-    """Spectra of the beginning of a recording, NaN where samples are missing; None where less than two windows count.
+    """Spectra of the beginning of a recording, NaN for missing samples; None for less than two usable windows.
 
-    From each window the ramp to the next one is taken off: what moves slowly would leak into the lines.
+    From each window the ramp to the next one is subtracted: slow motion would leak into the lines.
     """
     n = settings.lines.window
     count = (min(x.size for x in signals.values()) - 1) // n

@@ -1,4 +1,4 @@
-"""Whether the channels can have the roles that they were given: excitation, input and output."""
+"""Whether the channels can have their specified roles: excitation, input and output."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROLES: tuple[Role, ...] = ("excitation", "input", "output")
-_OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name that input alone"
+_OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name only that input"
 _ACCEPT = "to keep these roles, set tracking.accept_roles"
-# What repeats of an excitation's variance: all of a command, next to nothing of an axis that moves.
+# Repeating share of a variance: all of a command, almost nothing of a moving axis.
 _REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
-_WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer say nothing of noise
-_RETURNING_MAX = 0.25  # of noise's power: an excitation below that leaks more than it tells
-# Gain over frequency, as an exponent. A machine's falls, but for a zone between an antiresonance and the resonance
-# above it, whose width is the root of the inertia ratio: six is more than thirty-five to one.
+_WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer cannot show noise
+_RETURNING_MAX = 0.25  # of noise's power: an excitation below that is dominated by leakage
+# Gain over frequency, as an exponent. A machine's gain falls, except between an antiresonance and the resonance
+# above it. The width of that zone is the square root of the inertia ratio: a factor of 6 needs a ratio above 35.
 _RISES, _RISES_CLEARLY, _ZONE, _ZONE_MAX = 0.15, 0.5, 3.0, 6.0
 _LAGGING_MAX = 0.25  # of the lines: below such a zone and above it a machine lags
 _RESPONSE_INPUT, _RESPONSE_OUTPUT, _RESPONSE_ITSELF = 1.0, 0.75, -0.75
@@ -35,7 +35,7 @@ _LOOP_DOUBTFUL, _LOOP_WRONG, _SIGMAS = 0.1, 0.5, 5.0
 
 @dataclass(frozen=True)
 class Suspicion:
-    """What was measured and suggests, what to do about it, whether that is certain, and of which channels it is."""
+    """Finding, remedy, whether it is certain, and the channels concerned."""
 
     message: str
     remedy: str
@@ -49,7 +49,7 @@ class Suspicion:
 
 
 def check_distinct(settings: Settings) -> None:
-    """SignalError where two roles that the estimator tells apart have the same channel."""
+    """SignalError if two roles that the estimator distinguishes have the same channel."""
     for one, other in combinations(ROLES, 2):
         name = settings.channel(one)
         if name is None or name != settings.channel(other):
@@ -68,12 +68,12 @@ def check_distinct(settings: Settings) -> None:
 
 
 def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspicion]:
-    """All that speaks against the roles in the beginning of a recording, by role, NaN where samples are missing.
+    """All doubts about the roles, from the beginning of a recording, by role, with NaN for missing samples.
 
-    Sought are: two roles with the same samples; an excitation that does not repeat, or that is an answer of the
-    machine; an input of noise; an output that answers to nothing; input and output exchanged; for the indirect
-    estimator a description of the loop that contradicts the measured input. A machine whose gain rises over the whole
-    of a band that ends at six times its lowest line looks like one with its signals exchanged.
+    It detects: two roles with the same samples; an excitation that does not repeat, or that is a response of the
+    machine; an input of noise; an output that is unrelated to the excitation; input and output exchanged; for the
+    indirect estimator a description of the loop that contradicts the measured input. A machine whose gain rises over
+    its whole band, up to six times the lowest line, cannot be distinguished from one with exchanged signals.
     """
     found = list(_copies(signals, settings))
     spectra = role_spectra(signals, settings)
@@ -82,7 +82,7 @@ def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspi
     rules: tuple[Callable[[RoleSpectra], Suspicion | None], ...] = (
         _not_repeating, _answering_excitation, _noise_as_input, _exchanged, _contradicting_loop, _without_answer,
     )  # fmt: skip
-    with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule finds suspicious
+    with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule rejects
         return found + [one for rule in rules if (one := rule(spectra)) is not None]
 
 
@@ -93,7 +93,7 @@ def _copies(signals: Mapping[Role, Floats], settings: Settings) -> Iterator[Susp
         ):
             names = f"{settings.channel(one)!r} ({one}) and {settings.channel(other)!r} ({other})"
             certain = other == "output"
-            remedy = "name the channel of the machine's output" if certain else "right only where nothing feeds back"
+            remedy = "name the channel of the machine's output" if certain else "correct only without feedback"
             both = settings.channel(one), settings.channel(other)
             yield Suspicion(f"{names} have the same samples", f"{remedy}; {_ACCEPT}", certain, both)
 
@@ -104,15 +104,15 @@ def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
         return None
     return Suspicion(
         f"{settings.excitation!r} does not repeat like an excitation: "
-        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance returns every {settings.lines.window} samples",
-        f"name the channel of the signal that is added, or look for it with `livebode inspect`; {_ACCEPT}",
+        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance repeats every {settings.lines.window} samples",
+        f"name the channel of the signal that is added, or find it with `livebode inspect`; {_ACCEPT}",
         spectra.repeating < _REPEATING_MIN,
         (settings.excitation,),
     )
 
 
 def _answering_excitation(spectra: RoleSpectra) -> Suspicion | None:
-    """A position as excitation: it falls with frequency, and what should answer to it rises."""
+    """A position as excitation: it falls with frequency, and the signal that should respond to it rises."""
     settings, f = spectra.settings, spectra.frequency_hz
     if settings.method.reference != "excitation" or spectra.exact or not wide(f, _ZONE):
         return None
@@ -123,7 +123,7 @@ def _answering_excitation(spectra: RoleSpectra) -> Suspicion | None:
         return None
     role: Role = "input" if "input" in slopes else "output"
     return Suspicion(
-        f"{settings.excitation!r} looks like an answer of the machine, not like an excitation: it falls with "
+        f"{settings.excitation!r} looks like a response of the machine, not like an excitation: it falls with "
         f"f^{own:.1f}, and {settings.channel(role)!r} over it rises with f^{slopes[role]:.1f}",
         f"name the channel of the signal that is added; {_ACCEPT}",
         outputs,
@@ -141,14 +141,14 @@ def _noise_as_input(spectra: RoleSpectra) -> Suspicion | None:
     return Suspicion(
         f"{settings.input!r} is noise at all {len(returning)} lines: at most {100 * returning.max():.2g} % of its "
         f"power repeats every {settings.lines.window} samples, so that a window leaks",
-        f"name the input that is excited, or estimate with livebode.welch in Python; {_ACCEPT}",
+        f"name the excited input, or estimate with livebode.welch in Python; {_ACCEPT}",
         True,
         (settings.input,),
     )
 
 
 def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
-    """Input and output exchanged: what is called the output follows the excitation, or leads the input."""
+    """Input and output exchanged: the specified output follows the excitation, or leads the input."""
     settings, f = spectra.settings, spectra.frequency_hz
     if "input" not in spectra.spectra or not wide(f, _ZONE):
         return None
@@ -178,13 +178,13 @@ def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
 
 
 def _upper(spectra: RoleSpectra, role: Role) -> Complex:
-    """From what the excitation adds at the plant input to a signal, at the upper half of the lines."""
+    """Response from the excitation at the plant input to a signal, at the upper half of the lines."""
     entry = spectra.settings.loop.entry_at(spectra.frequency_hz)
     return np.asarray(spectra.ratio(role, "excitation") / entry)[len(entry) // 2 :]
 
 
 def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
-    """Joint against indirect: their quotient is (E·W − F·Y)/U, 1 where the description of the loop is right."""
+    """Joint against indirect: their quotient is (E·W − F·Y)/U, 1 if the description of the loop is correct."""
     settings, f = spectra.settings, spectra.frequency_hz
     if "input" not in spectra.spectra or not settings.method.through_loop:
         return None
@@ -209,7 +209,7 @@ def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
 
 
 def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
-    """An output, or an input, that has nothing to do with the reference: possible with the right roles, but useless."""
+    """An output, or an input, that is unrelated to the reference: possible with correct roles, but useless."""
     if spectra.windows < _WINDOWS_MIN:
         return None
     chance = limit(len(spectra.frequency_hz), spectra.windows)
@@ -220,7 +220,7 @@ def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
         if np.all(coherence < chance):
             reference = spectra.settings.channel(spectra.settings.method.reference)
             return Suspicion(
-                f"{spectra.settings.channel(role)!r} ({role}) does not answer to {reference!r} at any line: their "
+                f"{spectra.settings.channel(role)!r} ({role}) does not respond to {reference!r} at any line: their "
                 f"coherence over {spectra.windows} windows is at most {coherence.max():.2g}",
                 "name another channel, or raise the amplitude",
                 False,
@@ -230,7 +230,7 @@ def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
 
 
 def check_roles(signals: Mapping[Role, Floats], settings: Settings, *, accepted: bool) -> list[str]:
-    """What is suspected, in sentences; SignalError where it is certain, unless the roles are `accepted`."""
+    """Doubts as sentences; SignalError if one is certain, except if the roles are `accepted`."""
     found = suspicions(signals, settings)
     certain = [one for one in found if one.certain]
     if certain and not accepted:

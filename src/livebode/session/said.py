@@ -1,4 +1,4 @@
-"""The configuration that a run was made with, read back from its run.json."""
+"""The configuration of a run, read from its run.json."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}
 
 
 def said(summary: dict[str, Any]) -> dict[str, Any]:
-    """The configuration without what was left open: JSON has no infinity and writes it, as it writes none, as null.
+    """The configuration without null values: in JSON, null is used for None and for infinity.
 
     >>> said({"configuration": {"tracking": {"hop": 5, "spikes": None}, "fit": None}})
     {'tracking': {'hop': 5}}
@@ -21,7 +21,7 @@ def said(summary: dict[str, Any]) -> dict[str, Any]:
     Raises
     ------
     RecordError
-        If a section that is used again is not what a run writes.
+        If a section that is used again is not in the form that a run writes.
     """
     found = dict(_kept(summary.get("configuration", {})))
     for name, section in _SECTIONS.items():
@@ -32,8 +32,8 @@ def said(summary: dict[str, Any]) -> dict[str, Any]:
             place = ".".join(map(str, (name, *wrong["loc"])))
             raise RecordError(
                 "unexpected-content",
-                f"the configuration in run.json is not what a run writes ({place}: {wrong['msg']})",
-                "check who changed the file",
+                f"the configuration in run.json is invalid ({place}: {wrong['msg']})",
+                "restore the file as the run wrote it",
                 key=place,
             ) from None
     return found

@@ -1,4 +1,4 @@
-"""The record of a run in segments, with what goes on where it ended: the tracker and the session's counts."""
+"""The record of a run in segments, and the states that continue at its end: the tracker and the session's counts."""
 
 from __future__ import annotations
 
@@ -28,42 +28,42 @@ from livebode.session.stateful import Stateful
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples"
 _INTERVAL_S = 0.5
-_PIECE_S = 0.25  # with the interval three quarters of a second: what a kill costs at most
-_SEEN_AGAIN_BYTES = 256 << 20  # what a picture of a run that goes on is drawn from, beside what comes
+_PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
+_SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
 
 
 class SegmentedRun:
-    """Responses, events and, on request, samples of one run; one that stands there unfinished is gone on with.
+    """Responses, events and, on request, samples of one run; an unfinished run in the directory is continued.
 
-    Used as `RunDirectory` is, but that the Blocks go through `feed`, and that leaving it by an exception keeps all that
-    was committed.
+    Used like `RunDirectory`, except that the Blocks pass through `feed`, and that all committed data remains after an
+    exception.
 
     Parameters
     ----------
     path
         Directory of the run.
     kept
-        How it is kept.
+        Settings of the record.
     summary
-        run.json at the beginning: configuration and what was found.
+        run.json at the beginning: configuration and findings.
     channels, rate_hz
-        Of the Blocks.
+        Channels and rate of the Blocks.
     parts
-        What goes on where the record ended, by name: restored on entering, stored with every commit.
+        States that continue at the end of the record, by name: restored on entering, stored with every commit.
     force
-        Replace a run there instead of going on with it.
+        Replace an existing run instead of continuing it.
     again
-        Whether the source begins with the same samples again each time; else it numbers them on.
+        Whether the source begins with the same samples again each time; else its numbers continue.
     ends
-        Whether the source has an end, at which the run is finished; one without was only stopped, and may go on.
+        Whether the source has an end, at which the run is finished; without an end a stopped run can continue.
     tell
-        Called with what the record itself has to say, at once.
+        Called immediately with events of the record itself.
     waiting
-        Events that are not handed to `write_event` yet, which are stored with every commit.
+        Events that are not passed to `write_event` yet; they are stored with every commit.
     position
-        Of a live source, which is stored with every commit.
+        Position of a live source, stored with every commit.
     before
-        The run that this one goes on from with the next sample.
+        The run that this one continues with the next sample.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class SegmentedRun:
                 self._continued = False
             else:
                 self._restore(self._store.last.states)
-                self._continued = self._new = True  # that it continues is an event
+                self._continued = self._new = True  # the continuation is reported as an event
                 self._followed = self._store.last.sample, self._store.last.time_s
             self._undo = undo.pop_all()
         self._hear()
@@ -121,14 +121,14 @@ class SegmentedRun:
             self._tell(self.stopped())
 
     def stopped(self) -> Event:
-        """What is to be said of a run that ends here, before it is finished."""
+        """Message for a run that stops here, before it is finished."""
         last = self._store.last
         assert last is not None
-        message = f"stopped at sample {last.sample}; the same command goes on with the run in {str(self.path)!r}"
+        message = f"stopped at sample {last.sample}; the same command continues the run in {str(self.path)!r}"
         return Event("record-stopped", last.sample, last.time_s, message)
 
     def keep(self, kept: RecordSection) -> None:
-        """Cut the record otherwise from here on; which samples are kept stays."""
+        """Use other record settings from now; the selection of recorded samples does not change."""
         self._store.limits = self._limits(kept)
 
     def _limits(self, kept: RecordSection) -> Limits:
@@ -140,35 +140,35 @@ class SegmentedRun:
         )
 
     def before(self) -> Iterator[Responses]:
-        """The newest responses of the run that is gone on with."""
+        """The newest responses of the continued run."""
         if self._continued or "continues" in self._more:
             run = Run.open(self.path, self._found_damaged)
             newest = run.batches(_SEEN_AGAIN_BYTES)
-            yield next(newest, None) or run.responses()  # none are told from no run by their lines
+            yield next(newest, None) or run.responses()  # an empty batch contains the lines, unlike no run
             yield from newest
 
     @property
     def continued(self) -> bool:
-        """Whether the run was there before."""
+        """Whether the run existed before."""
         return self._continued
 
     @property
     def clock(self) -> list[tuple[float, float]]:
-        """Which time of day the run's seconds are, as `RunClock` keeps it and run.json says."""
+        """Relation of the run's seconds to the time of day, as in `RunClock` and run.json."""
         return RunClock.of(self._more).pieces
 
     def renew(self, **found: Any) -> None:
-        """Write to run.json what was found on the way."""
+        """Write findings during the run to run.json."""
         self._more |= found
         self._store.renew(self._named(self._summary))
 
     def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
-        """The Blocks that are still to be tracked; when one is asked for, all that came of the one before is recorded.
+        """The Blocks that are not tracked yet; each request records all results of the previous Block.
 
         Raises
         ------
         RecordError
-            At the end, if the disk does not take the last ones.
+            At the end, if the last results cannot be written.
         """
         for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
             if self._samples:
@@ -183,9 +183,9 @@ class SegmentedRun:
             self._commit(*self._followed)
 
     def commit_while_silent(self) -> None:
-        """Record what came of the last Block, and the events since, while the next one is waited for.
+        """Record the results of the last Block, and later events, while waiting for the next one.
 
-        The last one may be of the time before the run was continued.
+        The last Block may be from before the run was continued.
         """
         if self._followed is None or not self._store.due(self._followed[0]):
             return
@@ -198,7 +198,7 @@ class SegmentedRun:
             self._store.write("responses", as_batch(responses))
 
     def write_parameters(self, *parts: Parameters) -> None:
-        """Append what was fitted and what follows."""
+        """Append fitted parameters and derived quantities."""
         for parameters in parts:
             if len(parameters):
                 self._store.write("parameters", parameter_rows(parameters))
@@ -209,8 +209,8 @@ class SegmentedRun:
         self._new = True
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
-        """Draw the pictures, close what is open and write run.json; `ends` says that another run goes on instead."""
-        check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would wait at a pipe of that name
+        """Draw the pictures, close open files and write run.json; `ends`: another run continues."""
+        check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would block at a pipe of that name
         try:
             shutil.rmtree(self.partial, ignore_errors=True)
             os.mkdir(self.partial)
@@ -228,7 +228,7 @@ class SegmentedRun:
             shutil.rmtree(self.partial, ignore_errors=True)
         last = self._store.last
         assert last is not None
-        # What was held back at the end was written since the last commit, and belongs to the states as they are now.
+        # Results that were delayed until the end were written after the last commit, and belong to the present states.
         self._store.commit(last.sample, last.time_s, self._states())
         self._store.finish(self._named(summary), finished=self._ends or ends)
         self._hear()
@@ -249,7 +249,7 @@ class SegmentedRun:
             self._tell(event)
 
     def _found_damaged(self, damage: Event) -> None:
-        if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # of journals the store tells
+        if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # the store reports damaged journals
             self._tell(damage)
 
     def _states(self) -> dict[str, bytes]:
@@ -275,17 +275,15 @@ class SegmentedRun:
 
 
 def _identity(summary: Mapping[str, Any]) -> list[Any]:
-    # How the record is cut may change on the way; what is recorded may not.
+    # The segmentation of the record may change during a run; what is recorded may not.
     configuration = dict(summary["configuration"])
     kept = configuration.pop("record", None) or {}
-    found = {
-        key: value for key, value in summary["found"].items() if key not in ("motion", "judged")
-    }  # what was learnt
+    found = {key: value for key, value in summary["found"].items() if key not in ("motion", "judged")}  # learned
     return [configuration, found, kept.get("samples")]
 
 
 def make_way(path: Path) -> None:
-    """Remove the run that is there; RecordError where something else is there."""
+    """Remove an existing run; RecordError if the directory contains something else."""
     if not os.path.lexists(path):
         return
     check_removable(path)

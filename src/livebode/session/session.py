@@ -1,4 +1,4 @@
-"""Session: the axes of a configuration, each in its thread, until all have ended; and what an edit of it changes."""
+"""Session: the axes of a configuration, each in its thread, until all ended; also applies edits of the file."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from livebode.session.status import Status
 
 TICK_S = 0.1
 LOOK_S = 1.0
-"""How often the file is looked at."""
+"""Interval of checks of the file."""
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _logger = logging.getLogger(__name__)
 
 
 class Session:
-    """Runs axes until all have ended; an axis that fails does not end the others.
+    """Runs axes until all ended; an axis that fails does not end the others.
 
-    SIGINT and SIGTERM end every axis whole; the second one `leave`s. SIGHUP, or an edit of the file, is checked whole
-    and then applied, or refused for all axes alike. Signals are heard in the main thread only.
+    SIGINT and SIGTERM end every axis with complete records; the second one calls `leave`. On SIGHUP or an edit, the
+    file is checked completely and then applied or rejected for all axes. Signals are handled in the main thread only.
 
     Parameters
     ----------
     axes
-        By name.
+        Axes by name.
     to
-        Where an axis goes, by name and configuration.
+        Destination of an axis, by name and configuration.
     tell
-        Called with an axis's name, and what it has to say.
+        Called with an axis's name and an event.
     file
-        Where `axes` come from, if they may change.
+        File of `axes`, if they may change.
     leave
-        Called by the second signal with its number and what is to be said of each unfinished run; it does not return.
+        Called at the second signal with its number and a message for each unfinished run; it does not return.
     """
 
     def __init__(
@@ -57,9 +57,9 @@ class Session:
     ) -> None:
         self._to, self._tell, self._leave, self._file = to, tell, leave, file
         self.threads: dict[str, AxisThread] = {}
-        """The axes of the configuration as it is now, by name."""
+        """The axes of the present configuration, by name."""
         self.taken_out: list[AxisThread] = []
-        """Those that an edit of it took out."""
+        """Axes that an edit removed."""
         self.ended_by = 0
         """The signal that ended it, or 0."""
         self._reload_asked = threading.Event()
@@ -68,7 +68,7 @@ class Session:
             self._add(name, axis)
 
     def run(self, look: Callable[[], None] = lambda: None) -> None:
-        """Until every axis has ended; `look` is called ten times a second, in this thread."""
+        """Wait until every axis ended; `look` is called ten times a second, in this thread."""
         with self._hearing():
             for thread in list(self.threads.values()):
                 thread.start()
@@ -83,16 +83,16 @@ class Session:
 
     @property
     def all(self) -> list[AxisThread]:
-        """Every axis that was begun."""
+        """Every axis that was started."""
         return [*self.taken_out, *self.threads.values()]
 
     def end(self) -> None:
-        """End every axis whole."""
+        """End every axis with a complete record."""
         for thread in self.all:
             thread.end()
 
     def _add(self, name: str, axis: Axis, *, anew: bool = True) -> AxisThread:
-        """An axis that may replace what was recorded before this session, and nothing of what was recorded in it."""
+        """Start an axis that may replace records from before this session, but none of this session."""
         to = self._to(name, axis)
         status = Status(to.audience)
         to = replace(to, force=to.force and anew, audience=status, tell=lambda event: self._tell(name, event))
@@ -112,7 +112,7 @@ class Session:
             changes = self._checked(axes)
         except (LivebodeError, MemoryError) as error:
             why = str(error) or "there is not enough memory for it"
-            self._say("configuration-refused", f"the configuration is refused, and the one before it stays: {why}")
+            self._say("configuration-refused", f"configuration rejected: {why}; the previous one stays active")
             return
         if axes == {name: thread.axis for name, thread in self.threads.items()}:
             if asked:
@@ -121,25 +121,25 @@ class Session:
         self._apply(axes, changes)
 
     def _finishing(self, axes: Axes) -> str:
-        """An axis of these that was taken out, and whose run is not finished yet."""
+        """One of these axes that was removed and whose run is not finished yet."""
         return next((thread.name for thread in self.taken_out if thread.alive and thread.name in axes), "")
 
     def _postpone(self, name: str) -> None:
-        """Look at the file again soon: the axis begins when its run before is finished."""
+        """Check the file again soon: the axis begins when its previous run is finished."""
         self._reload_asked.set()
         if self._postponed != name:
             self._postponed = name
-            message = f"axis {name} was taken out and is still being finished; the configuration is applied after that"
+            message = f"axis {name} was removed, its run is being finished; the configuration is applied after that"
             self._say("configuration-postponed", message, record=False)
 
     def _checked(self, axes: Axes) -> dict[str, Change | None]:
-        """What each axis that runs is told; LivebodeError where one of them cannot continue so."""
+        """The change for each running axis; LivebodeError if one of them cannot continue with it."""
         changes: dict[str, Change | None] = {}
         if ("" in axes) != ("" in self.threads):
             raise ConfigError(
                 "change-needs-restart",
                 "one axis cannot become several while it runs",
-                "end livebode and start it again",
+                "stop livebode and start it again",
                 keys=["axes"],
             )
         for name, thread in self.threads.items():
@@ -159,7 +159,7 @@ class Session:
                 thread.axis = axes[name]
                 self._report(name, change.event)
         for name in [name for name in self.threads if name not in axes]:
-            self._report(name, Event("configuration-applied", 0, 0.0, "the axis was taken out, and ends"))
+            self._report(name, Event("configuration-applied", 0, 0.0, "the axis was removed and ends"))
             self.taken_out.append(self.threads.pop(name))
             self.taken_out[-1].end()
         for name, axis in axes.items():
@@ -175,7 +175,7 @@ class Session:
                 thread.orders.say(kind, message)
 
     def _report(self, name: str, event: Event) -> None:
-        """Log what became of an edit, and tell it."""
+        """Log and publish the result of an edit."""
         level = logging.WARNING if event.kind == "configuration-refused" else logging.INFO
         _logger.log(level, "%s%s", f"axis {name}: " if name else "", event.message)
         self._tell(name, event)

@@ -1,4 +1,4 @@
-"""LoadShedding: what a live run leaves out when it is behind, so that no sample is lost."""
+"""LoadShedding: work that a live run omits when it is behind, so that no sample is lost."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from livebode.session.fit_budget import FitBudget
 from livebode.sources.live import LiveSource
 
 MONITORING_STOPS_S, MONITORING_RESUMES_S = 15.0, 1.0
-"""So far behind, monitoring is left out, until the run has caught up to the second."""
+"""Backlog at which monitoring is omitted, and backlog at which it resumes."""
 ALARM_S, CLEARED_S = 10.0, 1.0
-"""So far behind, an event reports it, and so far another one reports that it is over."""
+"""Backlog that is reported, and backlog at which its end is reported."""
 ENDING_S = 0.5
-"""A run that was told to end makes no fits while more than this waits."""
+"""Backlog above which a stopping run makes no fits."""
 REPORT_S = 10.0
-"""What was left out is reported at most so often, in seconds of the machine."""
+"""Shortest interval between reports of omitted work, in seconds of machine time."""
 
 
 class LoadShedding:
-    """Decides what a run has time for: samples and responses always, then monitoring, then fits.
+    """Decides which work a run has time for: always samples and responses, then monitoring, then fits.
 
-    Of a source whose sender waits nothing is left out, for nothing is lost there, until the run is ended: then
-    what still waits is tracked as fast as it can be.
+    If the sender waits, no samples can be lost and nothing is omitted, except after a request to end: then the backlog
+    is tracked as fast as possible.
 
     Parameters
     ----------
     source
-        Where the samples come from.
+        Source of the samples.
     ended
-        Whether the run was told to end.
+        Whether the end was requested.
     budget
-        Of the fits.
+        Budget of the fits.
     """
 
     def __init__(self, source: LiveSource, ended: Callable[[], bool], budget: FitBudget | None = None) -> None:
@@ -48,7 +48,7 @@ class LoadShedding:
 
     @property
     def behind_s(self) -> float:
-        """Seconds of the machine that wait, where waiting can lose samples or hold up the end."""
+        """Backlog in seconds of machine time, if it can cause lost samples or delay the end."""
         return self._source.waiting_s if not self._source.waits or self._ended() else 0.0
 
     @property
@@ -62,14 +62,14 @@ class LoadShedding:
         return self._monitors
 
     def to_monitor(self, responses: Responses) -> bool:
-        """The same, and what is left out is counted."""
+        """The same; omitted work is counted."""
         if not self._monitors:
             self._leave_out("monitoring", len(responses), responses)
         return self._monitors
 
     @contextmanager
     def fitting(self, responses: Responses) -> Iterator[Responses]:
-        """Those that there is time to fit, evenly spread, the newest among them; they are fitted inside."""
+        """Responses that there is time to fit, evenly spread, including the newest; they are fitted in this context."""
         fitted = responses
         if self._limited and len(responses):
             behind_s = np.inf if self._ended() and self.behind_s > ENDING_S else self.behind_s
@@ -81,11 +81,11 @@ class LoadShedding:
             yield fitted
 
     def drain_events(self, sample: int, time_s: float) -> list[Event]:
-        """Events at this sample: the backlog, and what was left out."""
+        """Events at this sample: the backlog, and omitted work."""
         return [*self._backlog(sample, time_s), *self._thinned(sample, time_s, REPORT_S)]
 
     def finish(self, sample: int, time_s: float) -> list[Event]:
-        """Events of what is not reported yet."""
+        """Events that are not reported yet."""
         return self._thinned(sample, time_s, 0.0)
 
     def _leave_out(self, what: str, rows: int, responses: Responses) -> None:
@@ -100,15 +100,15 @@ class LoadShedding:
                 return []
             self._alarm_since_s, self._longest_s = time_s, behind_s
             message = (
-                f"tracking is {behind_s:.1f} s behind the machine; fits and monitoring are left out, and samples are "
-                "lost when the queue is full; take a longer tracking.hop, fewer lines or fewer axes on this computer"
+                f"tracking is {behind_s:.1f} s behind the machine; fits and monitoring are omitted, and samples are "
+                "lost when the queue is full; use a longer tracking.hop, fewer lines or fewer axes on this computer"
             )
             return [Event("backlog", sample, time_s, message, {"backlog_s": behind_s})]
         self._longest_s = max(self._longest_s, behind_s)
         if behind_s > CLEARED_S:
             return []
         since_s, self._alarm_since_s = self._alarm_since_s, None
-        message = f"tracking has caught up; it was {self._longest_s:.1f} s behind at most"
+        message = f"tracking has caught up; the largest backlog was {self._longest_s:.1f} s"
         details = {"backlog_s": behind_s, "longest_s": self._longest_s, "duration_s": time_s - since_s}
         return [Event("backlog-cleared", sample, time_s, message, details)]
 

@@ -1,4 +1,4 @@
-"""A configuration against the spectra that its drive sends: what is asked otherwise, or needs samples, is refused."""
+"""Compare a configuration with the spectra of its drive: settings that differ, or need samples, are rejected."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from livebode.session.axis import Axis
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
-    """The lines of the spectra; ConfigError where the configuration has others, or asks for what needs samples."""
+    """The lines of the spectra; ConfigError if the configuration has other lines, or settings that need samples."""
     frequencies, window, hop = axis.lines.frequencies, axis.lines.window, axis.tracking.hop
     if axis.motion is not None:
         raise ConfigError(
             "needs-samples",
-            "[motion] drives its model with samples, and the drive sends spectra",
-            "leave it out, or send samples",
+            "[motion] needs samples for its model, but the drive sends spectra",
+            "remove it, or send samples",
             key="motion",
         )
     if axis.record is not None and axis.record.samples:
         raise ConfigError(
             "needs-samples",
-            "record.samples records samples, and the drive sends spectra",
-            "leave it out, or send samples",
+            "record.samples records samples, but the drive sends spectra",
+            "remove it, or send samples",
             key="record.samples",
         )
     if window not in ("auto", layout.window):
@@ -37,4 +37,4 @@ def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:
 
 def _differs(key: str, value: int | str | None, sent: int | str) -> ConfigError:
     message = f"{key} = {value!r}, but the drive sends {sent}"
-    return ConfigError("value-mismatch", message, "use that, or leave it out", key=key, value=value, allowed=sent)
+    return ConfigError("value-mismatch", message, "use that, or remove the key", key=key, value=value, allowed=sent)

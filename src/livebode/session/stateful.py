@@ -1,4 +1,4 @@
-"""Stateful: what can go on where it was."""
+"""Stateful: interface of stages that can be continued."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Protocol
 
 
 class Stateful(Protocol):
-    """Gives all that its next result depends on as bytes, and goes on from them."""
+    """Stores all state that the next result depends on as bytes, and continues from them."""
 
     def snapshot(self) -> bytes: ...
 

@@ -1,4 +1,4 @@
-"""Status: how an axis is doing, for who looks at it from another thread."""
+"""Status of an axis, for other threads."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ _LATENCY_OVER_S = 2.0
 
 
 class Status(Relay):
-    """Keeps what a line about the axis needs, and passes everything on to the audience proper.
+    """Keeps the data for a status line of the axis, and forwards everything to the audience.
 
     Attributes
     ----------
     state
-        "waiting", "tracking", "finishing", "done", "refused", or "ended" before it had anything to leave.
+        "waiting", "tracking", "finishing", "done", "refused", or "ended" before there was anything to record.
     directory
-        Where its newest run is recorded.
+        Directory of its newest run.
     samples, responses
-        How many were followed and published.
+        Number of tracked samples and published responses.
     rate_hz
-        Samples per second, as the Blocks say; None before the first.
+        Samples per second of the Blocks; None before the first.
     event
-        The newest one.
+        The newest event.
     health
-        How its live source is doing; None of a recording.
+        State of its live source; None for a recording.
     """
 
     def __init__(self, audience: Audience) -> None:
@@ -46,7 +46,7 @@ class Status(Relay):
 
     @property
     def latency_s(self) -> float | None:
-        """From a Block's arrival until all that came of it was published, the longest of the last seconds."""
+        """Longest time, in the last seconds, from a Block's arrival until all its results were published."""
         longest = max(self._latest)
         return longest if longest > 0 else None
 

@@ -1,4 +1,4 @@
-"""Under which names a run goes on when its configuration changes: NAME, NAME-2, NAME-3, …"""
+"""Names of the runs that continue a run after changes of its configuration: NAME, NAME-2, NAME-3, …"""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from livebode.records.summary_file import read_summary
 
 
 def newest(directory: Path) -> Path:
-    """The run in which the one in this directory went on last; the directory itself where it did not."""
+    """The newest run that continues the one in this directory; the directory itself if there is none."""
     return [directory, *_after(directory)][-1]
 
 
 def all_of(directory: Path) -> list[Path]:
-    """This run and those in which it went on, by age."""
+    """This run and those that continue it, by age."""
     return [directory, *_after(directory)]
 
 
 def free(directory: Path) -> Path:
-    """Where a run that began in this directory can go on: the first name behind its newest that is not taken."""
+    """Directory for the next run that continues this one: the first free name after the newest."""
     number = _number(newest(directory), directory) + 1
     while (path := _named(directory, number)).exists():
         number += 1

@@ -1,4 +1,4 @@
-"""What run.json says of a run."""
+"""Contents of run.json."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from livebode.sources.live import LiveSource
 
 
 def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
-    """From the beginning: configuration, what was found, versions."""
+    """Entries at the beginning: configuration, findings, versions."""
     found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
     versions = {
         "livebode": version("livebode"),
@@ -34,7 +34,7 @@ def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, A
 
 
 def done(tracker: Follower, tally: Tally) -> dict[str, Any]:
-    """At the end: what was counted, and how fast it went."""
+    """Entries at the end: counts and speed."""
     counts, run_s = tally.counts(tracker.counts), tally.run_s
     recorded_s = counts["samples"] / tracker.settings.lines.rate_hz
     speed = {
@@ -49,14 +49,14 @@ def done(tracker: Follower, tally: Tally) -> dict[str, Any]:
 
 
 def of_source(source: object) -> dict[str, Any]:
-    """How a live source did; nothing of a recording."""
+    """Entries on a live source; none for a recording."""
     if not isinstance(source, LiveSource):
         return {}
     return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
 
 
 def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
-    """What the fits came to, and the margins of a known loop around them."""
+    """Results of the fits, and the margins of a known loop with them."""
     if fits is None:
         return {}
     summary = {"fit": fits.summary(newest)}

@@ -1,4 +1,4 @@
-"""What a run counts beside the tracker: responses, what each signal held, and the time that it took."""
+"""Counts of a run in addition to the tracker's: responses, statistics of each signal, and processing time."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from livebode.session.event_groups import EventGroups
 
 
 class Tally:
-    """Counts over a whole run, also over one that was gone on with.
+    """Counts over a whole run, also over a continued one.
 
     Parameters
     ----------
     check
-        What looks at the signals.
+        Checks the signals.
     started
         `time.perf_counter()` at the beginning.
     before
-        The run that this one goes on from.
+        The run that this one continues.
 
     Attributes
     ----------
     stop
-        Number of the sample behind the last one that was followed.
+        Number of the sample after the last tracked one.
     groups
         The events of each cause.
     left_out_samples
-        Where the transient that a live run began with ends; None without one.
+        End of the transient at the beginning of a live run; None without one.
     handed_out
-        The `stop` at which what was held back had been handed out.
+        The `stop` at which delayed results were published.
     judged
         Whether the signals of a live run were judged at its beginning.
     """
@@ -55,37 +55,37 @@ class Tally:
         return time.perf_counter() - self._started
 
     def take(self, responses: Responses, tracked_s: float) -> None:
-        """What came of a step, and the seconds that it took the tracker."""
+        """Count the results of a step, and the tracker's processing time in seconds."""
         self.responses += len(responses)
         self.invalid += int(np.count_nonzero(~responses.valid.all(axis=1)))
         self.valid_lines += int(np.count_nonzero(responses.valid))
         self.tracked_s += tracked_s
 
     def judge(self) -> None:
-        """From here on the signals are judged."""
+        """From now the signals are judged."""
         self.judged = True
 
     def counts(self, tracker: Mapping[str, int]) -> dict[str, int]:
-        """What the tracker has counted in this run."""
+        """The tracker's counts in this run."""
         return {name: count - self._before.get(name, 0) for name, count in tracker.items()}
 
     _STATE = ("responses", "invalid", "valid_lines", "stop", "handed_out", "tracked_s")
 
     def snapshot(self) -> bytes:
-        """All of it as bytes; see `restore`."""
+        """State as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
         parts = {"before": self._before, "judged": self.judged, "left_out_samples": self.left_out_samples}
         parts |= {"check": self.check.state(), "groups": self.groups.state()}
         return json.dumps(numbers | {"run_s": self.run_s} | parts).encode()
 
     def restore(self, snapshot: bytes) -> None:
-        """Go on from a snapshot."""
+        """Continue from a snapshot."""
         state = json.loads(snapshot)
         for name in self._STATE:
             setattr(self, name, state[name])
         self._started -= state["run_s"]
-        self.judged = state.get("judged", True)  # a record from before this was stored is not judged again
+        self.judged = state.get("judged", True)  # an older record without this entry is not judged again
         self._before = state["before"]
         self.check.load(state["check"])
-        self.groups.load(state.get("groups", {}))  # a record from before there were groups has none
+        self.groups.load(state.get("groups", {}))  # an older record has no groups
         self.left_out_samples = state.get("left_out_samples")

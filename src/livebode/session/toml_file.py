@@ -14,12 +14,12 @@ _TEXT_MAX, _LINES_MAX, _DEPTH_MAX, _INTEGER_MAX = 500, 20_000, 12, 1 << 63
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """What is in a TOML file; ConfigError where it cannot be read, is not TOML, or is longer than 1 MiB."""
+    """Content of a TOML file; ConfigError if it cannot be read, is not TOML, or is longer than 1 MiB."""
     return parse_table(read_bytes(path), str(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file as it is, at most a byte more than may be; ConfigError where it cannot be read."""
+    """Bytes of the file, at most one more than allowed; ConfigError if it cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(FILE_BYTES_MAX + 1)
@@ -35,7 +35,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse_table(data: bytes, origin: str) -> dict[str, Any]:
-    """What is in the text of a TOML file; `origin` names it in messages."""
+    """Content of the text of a TOML file; `origin` names it in messages."""
     if len(data) > FILE_BYTES_MAX:
         raise ConfigError(
             "file-too-long",
@@ -56,23 +56,23 @@ def parse_table(data: bytes, origin: str) -> dict[str, Any]:
         raise _too_deep(origin) from None
     except LivebodeError:
         raise
-    except ValueError as error:  # also a number of more digits than Python reads
+    except ValueError as error:  # also a number with more digits than Python can parse
         raise ConfigError(
             "not-toml", f"{origin!r} is not TOML: {one_line(str(error))}", "correct it there", path=origin
         ) from None
 
 
 def shortened(value: Any) -> str:
-    """A value in a message, however long it is."""
+    """A value shortened for a message."""
     try:
         text = repr(value)
-    except (RecursionError, ValueError):  # nested too deeply, or more digits than Python writes
+    except (RecursionError, ValueError):  # nested too deeply, or more digits than Python can print
         return "that"
     return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
 
 
 def one_line(text: str) -> str:
-    """Text of a user in a message: printable, and not endless.
+    """Text of a user in a message: printable and of limited length.
 
     >>> one_line("lines.\\n")
     'lines. '
@@ -102,7 +102,7 @@ def _check_texts(value: Any, place: str, origin: str, depth: int) -> None:
             _check_texts(inner, place, origin, depth + 1)
     elif isinstance(value, str):
         _check_text(value, place, origin)
-    elif isinstance(value, int) and abs(value) >= _INTEGER_MAX:  # TOML's own limit; Python cannot even print some
+    elif isinstance(value, int) and abs(value) >= _INTEGER_MAX:  # TOML's limit; Python cannot print some larger ones
         raise ConfigError(
             "value-invalid",
             f"{place} is a whole number of {value.bit_length()} bits, more than 63",
@@ -125,7 +125,7 @@ def _check_text(text: str, place: str, origin: str) -> None:
         raise ConfigError(
             "value-invalid",
             f"{place} = {shortened(text)} has a letter that cannot be printed",
-            "leave it out",
+            "remove it",
             key=place,
             value=shortened(text),
         ).at(origin)

@@ -32,7 +32,7 @@ def record(
     tell: Tell = lambda _: None,
     **delivery: Any,
 ) -> Outcome:
-    """Track a source and leave a run directory: what a `Tracking` of these does from its beginning to its end."""
+    """Track a source and write a run directory, with a `Tracking` of these parameters."""
     to = Destination(directory, draw, force, progress, tell, audience or Audience())
     pipeline = Pipeline(tracker, fits, watching)
     return whole(Tracking(source, pipeline, to, about=about, kept=kept, again=again, **delivery))

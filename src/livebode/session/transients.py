@@ -1,4 +1,4 @@
-"""How many periods at the beginning of a recording are not like those behind them."""
+"""Number of periods at the beginning of a recording that differ from the later ones."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from livebode.session.roles import ROLES
 
 Floats = NDArray[np.float64]
 
-_PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are looked at, at most
+_PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are searched, at most
 _PERIODS_MIN = 8
-_SHARE_MAX = 1 / 4  # of what is looked at; more is no transient, but another condition of the machine
+_SHARE_MAX = 1 / 4  # of the examined periods; more is not a transient, but another state of the machine
 
 
 def leading_transient(log: AlignedLog, settings: Settings) -> int:
     """Periods at the beginning that differ from the steady state in a signal of the estimate, as `inspect` finds them.
 
-    0 for a machine that moves, by its schedule, whose periods differ anyway; for fewer than eight periods; and where
-    more than a quarter would be left out.
+    0 for a machine that moves, by its schedule, whose periods differ anyway; for fewer than eight periods; and if
+    more than a quarter would be excluded.
     """
     window = settings.lines.window
     names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
@@ -57,14 +57,14 @@ def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
     if np.count_nonzero(np.isfinite(x)) < window:
         return 0
     blocks = cut(filled(x), window)
-    # A period that was interpolated differs from the others, and says nothing of the machine.
+    # An interpolated period differs from the others, but not because of the machine.
     whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
     count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
     return int(whole[count - 1]) + 1 if count else 0
 
 
 def _moves(schedule: np.ndarray, window: int) -> bool:
-    """Whether the machine moves behind what a transient may take, over which it may settle."""
+    """Whether the machine moves after the longest possible transient, in which it may settle."""
     settled = schedule[int(_SHARE_MAX * schedule.size) // window * window :]
     step = max(1, window // PLACES)
     periods = settled[: settled.size // window * window].reshape(-1, window)[:, : window // step * step : step]
@@ -72,12 +72,12 @@ def _moves(schedule: np.ndarray, window: int) -> bool:
 
 
 def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
-    """What is left out, in an Event at sample `first`, with which the excitation begins: all up to the steady state."""
+    """Event for the excluded samples up to the steady state, at sample `first`, where the excitation begins."""
     samples = first + periods * settings.lines.window
     which = "period differs" if periods == 1 else f"{periods} periods differ"
-    before = "with what came before, " if first else ""
+    before = "with the samples before them, " if first else ""
     message = (
         f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
-        f"({samples / settings.lines.rate_hz:.4g} s) are left out; --all-periods keeps them"
+        f"({samples / settings.lines.rate_hz:.4g} s) are excluded; --all-periods includes them"
     )
     return Event("transient", first, time_s, message, {"periods": periods, "samples": samples})

@@ -24,12 +24,12 @@ def validate_run(
     samples: int | None = None,
     channels: dict[str, str | None] | None = None,
 ) -> tuple[list[Validation], list[str]]:
-    """One verdict for each section's model, all on the same samples of `log`; and what else is to be said.
+    """One verdict for each section's model, all on the same samples of `log`; and a list of remarks.
 
-    Rate and loop are those of the run's configuration, and so are the channels but where `channels` names others for
-    output, input or excitation. Without the run's excitation in `log` the judgement goes on. Of a recording with gaps
-    or samples that are not finite the longest clean stretch is taken; of that the last `samples`, where the start has
-    rung out. The second list says so, and which models were not fitted, and whether the recording is the run's own.
+    Rate, loop and channels are those of the run's configuration; `channels` can replace output, input or excitation.
+    The excitation may be missing in `log`. Of a recording with gaps or samples that are not finite, the longest clean
+    stretch is used; of that the last `samples`, where the transient has decayed. The remarks report this, models that
+    were not fitted, and whether the recording is that of the run.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def validate_run(
     if signals.input is None:
         raise RecordError(
             "not-tracked",
-            "the run names no plant input u, which a model is driven by",
+            "the run has no plant input u, which a simulation of the model needs",
             "run again with signals.input",
             path=str(directory),
             role="input",
@@ -93,11 +93,11 @@ def validate_run(
 def _freshness(own: str | None, log: Path) -> list[str]:
     if own is None or Path(own).resolve() != log.resolve():
         return []
-    return [f"{log.name} is the recording that the run was made of: this is no test on fresh data"]
+    return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
 
 
 def clean_stretch(opened: Log, names: list[str]) -> tuple[Block, int]:
-    """The longest stretch of a recording without a gap and with finite samples only, and how many samples there are."""
+    """The longest stretch of a recording without gaps and with finite samples only, and the number of all samples."""
     best: list[Block] = []
     now: list[Block] = []
     recorded = 0

@@ -1,4 +1,4 @@
-"""A run's follower that tells changes against a baseline, or says that it cannot."""
+"""Detects changes of a run by comparison with a baseline, or reports that it cannot."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from livebode.session.axis import Axis, MonitoringSection
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
-_CANNOT_TELL = "Without a baseline no change can be told; `livebode learn` makes one from healthy runs."
+_CANNOT_TELL = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
 _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
-_NO_SAMPLES = " The baseline's model of the machine is left out: it needs samples, and the drive sends spectra."
+_NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples, but the drive sends spectra."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _KEPT = 100  # sentences in run.json; events.jsonl has all
 
@@ -24,32 +24,32 @@ Write = Callable[[Event], None]
 
 
 class Watching:
-    """Hands a run's samples and responses to a Monitor, if there is one, and keeps what it says."""
+    """Passes a run's samples and responses to a Monitor, if there is one, and records its messages."""
 
     def __init__(
         self, monitor: Monitor | None, baseline: str | None, remark: str = "", covariates: tuple[str, ...] = ()
     ) -> None:
         self._monitor, self._baseline, self._remark = monitor, baseline, remark
         self.covariates = covariates
-        """Channels that it needs beside those of the follower."""
+        """Channels that it needs in addition to those of the follower."""
         self._alarms: list[str] = []
 
     def over(
         self, blocks: Iterator[Block], write: Write, has_time: Callable[[], bool] = lambda: True
     ) -> Iterator[Block]:
-        """The same blocks, each looked at beforehand; those that there is no time for are a gap to the Monitor."""
+        """The same blocks, each monitored first; those that there is no time for are a gap for the Monitor."""
         for block in blocks:
             if self._monitor is not None and has_time():
                 self._publish(self._monitor.process_samples(block), write)
             yield block
 
     def follow(self, responses: Responses, parameters: Parameters | None, write: Write) -> None:
-        """What became of the samples."""
+        """Monitor the results of the samples."""
         if self._monitor is not None:
             self._publish(self._monitor.process_responses(responses, parameters), write)
 
     def finish(self, write: Write) -> dict[str, Any]:
-        """What run.json says of it all."""
+        """Entries of run.json."""
         if self._monitor is None:
             return {"baseline": None, "message": _CANNOT_TELL + self._remark}
         self._publish(self._monitor.finish(), write)
@@ -58,12 +58,12 @@ class Watching:
         return {"baseline": self._baseline} | found | message | {"alarms": self._alarms}
 
     def snapshot(self) -> bytes:
-        """What it said, and what the next event depends on; see `restore`."""
+        """Its messages, and the state that the next event depends on; see `restore`."""
         said = json.dumps(self._alarms).encode()
         return len(said).to_bytes(4, "little") + said + (self._monitor.snapshot() if self._monitor is not None else b"")
 
     def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot under the same baseline; RecordError where it is another's."""
+        """Continue from a snapshot with the same baseline; RecordError if it belongs to another one."""
         rest = 4 + int.from_bytes(snapshot[:4], "little")
         if (self._monitor is None) != (len(snapshot) == rest):
             raise RecordError(
@@ -82,9 +82,9 @@ class Watching:
 
 
 def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Watching:
-    """For these settings; BaselineError where the baseline cannot be read or does not fit.
+    """For these settings; BaselineError if the baseline cannot be read or does not fit.
 
-    Without `samples` its tables judge alone, for the model of the machine needs them.
+    Without `samples` only its tables are used, because the model of the machine needs samples.
     """
     section = axis.monitoring
     covariates = tuple(section.covariates) if samples else ()

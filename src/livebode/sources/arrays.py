@@ -11,7 +11,7 @@ from livebode.sources.recording import Column, Skipped
 from livebode.sources.units import split_unit
 
 WIDTH_MAX = 64
-"""A matrix with more rows and more columns than this is no set of channels."""
+"""A matrix with more rows and more columns than this is not a set of channels."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Slot:
 def array_columns(
     array: str, shape: tuple[int, ...], dtype: np.dtype[np.generic], unit: str = "", tie_axis: int = 0
 ) -> tuple[list[Column], Skipped | None]:
-    """The columns that the array called `array` gives, or why it gives none.
+    """The columns in the array called `array`, or the reason why there are none.
 
     Axes of length one do not count. A matrix has its time along the longer axis (`tie_axis` where both are equal) and
     its columns are called name(1), name(2), … A unit in the array's name is taken where `unit` is empty.

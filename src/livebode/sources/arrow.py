@@ -16,7 +16,7 @@ FILE_MAGIC = b"ARROW1"
 
 
 class ArrowRecording(Recording):
-    """An Arrow IPC file or stream; the number of samples is known from reading only, as batches state their own."""
+    """An Arrow IPC file or stream; the number of samples is known only after reading."""
 
     format: ClassVar[str] = "arrow"
 
@@ -42,7 +42,7 @@ class ArrowRecording(Recording):
         self, fields: list[int] | None
     ) -> Iterator[pa.ipc.RecordBatchFileReader | pa.ipc.RecordBatchStreamReader]:
         options = pa.ipc.IpcReadOptions(included_fields=fields)
-        with pa.OSFile(str(self.path)) as file:  # not mapped: a mapped file that shrinks kills the process
+        with pa.OSFile(str(self.path)) as file:  # not mapped: if a mapped file shrinks, the process is killed
             if self._is_file:
                 with pa.ipc.open_file(file, options=options) as reader:
                     yield reader

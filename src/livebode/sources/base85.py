@@ -9,14 +9,14 @@ from livebode.sources.damage import damaged, truncated
 
 ALPHABET = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ!#$`()*+-/:;=?@[]^_{|}~"
 ZEROS = b"."
-"""Stands for four zero bytes."""
+"""Code for four zero bytes."""
 VALUES = np.full(256, 255, np.uint8)
 VALUES[np.frombuffer(ALPHABET, np.uint8)] = np.arange(85)
 WEIGHTS = 85 ** np.arange(4, -1, -1, dtype=np.int64)
 
 
 def decode(text: str) -> NDArray[np.float64]:
-    """Big-endian doubles from text, five characters for four bytes; white space does not count.
+    """Big-endian doubles from text, five characters for four bytes; white space is ignored.
 
     >>> decode(" ........ ")
     array([0., 0., 0., 0.])

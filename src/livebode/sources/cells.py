@@ -1,4 +1,4 @@
-"""What a cell of a table in text may hold: a number, a moment, nothing, or text."""
+"""What a cell of a text table may contain: a number, a date and time, nothing, or text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOMENT = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d(?::?\d\d(?::?\d\d(?:\.\d{1,9})?)?)
 
 
 class Kind(Enum):
-    """What a column holds."""
+    """Content of a column."""
 
     NUMBER = "numbers"
     MOMENT = "moments"
@@ -52,7 +52,7 @@ def zoned(cell: str) -> bool:
 
 
 def kind_of(cells: list[str], decimal: str) -> Kind:
-    """What a column holds: text only where no cell is a value, so that text among numbers is found as an error."""
+    """Content of a column: text only if no cell is a value, so that text among numbers is detected as an error."""
     filled = [cell for cell in cells if cell not in EMPTY]
     if any(is_number(cell, decimal) for cell in filled) or not filled:
         return Kind.NUMBER

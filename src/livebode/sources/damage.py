@@ -1,4 +1,4 @@
-"""The errors that readers of every format raise: a file is damaged, ends early, or is larger than a recording is."""
+"""The errors of all readers: a file is damaged, ends early, or is larger than a recording can be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CSV, TSV and their kin: found out by `dialect`, parsed in a stream by Arrow, errors located by `locate`."""
+"""CSV, TSV and similar: detected by `dialect`, parsed as a stream by Arrow, errors located by `locate`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ARROW_BLOCK_BYTES = 1 << 20
 
 
 class DelimitedRecording(Recording):
-    """A table in text. Its length is known from reading only."""
+    """A table in a text file. Its length is known only after reading."""
 
     format: ClassVar[str] = "csv"
 
@@ -43,7 +43,7 @@ class DelimitedRecording(Recording):
                 is_moment = kind is Kind.MOMENT
                 columns.append(Column(name, "ns" if is_moment else unit, None, aliases, temporal=is_moment, key=at))
             elif headings[at]:
-                skipped.append(Skipped(name, "it holds text"))
+                skipped.append(Skipped(name, "it contains text"))
         self.columns, self.skipped = tuple(columns), tuple(skipped)
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
@@ -102,15 +102,15 @@ class DelimitedRecording(Recording):
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:
-        """The file from its first row of numbers on, as bytes that Arrow understands."""
+        """The file from its first row of numbers, as bytes that Arrow can parse."""
         dialect = self._dialect
         if dialect.spaced or dialect.commented or dialect.encoding.startswith("utf-16"):
             with self.path.open("rb") as raw:
                 raw.seek(dialect.offset)
                 yield io.BufferedReader(Tidied(raw, dialect.encoding, dialect.spaced), 1 << 20)
         else:
-            # Arrow reads ahead in threads of its own. It would go on reading from the number of a descriptor that
-            # pa.OSFile has closed, which by then may be another file's; a file of Python's refuses it.
+            # Arrow reads ahead in its own threads. With pa.OSFile it would continue to read from a closed descriptor,
+            # whose number may already belong to another file. A Python file raises an error instead.
             with self.path.open("rb") as file:
                 file.seek(dialect.offset)
                 yield file

@@ -1,4 +1,4 @@
-"""How a table in text is written, told by its first lines: encoding, delimiter, decimal mark, header, units, kinds."""
+"""Layout of a text table, detected from its first lines: encoding, delimiter, decimal mark, header, units, kinds."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from livebode.sources.recording import COLUMNS_MAX
 SAMPLE_BYTES = 1 << 18
 SAMPLE_LINES = 400
 DELIMITERS = "\t", ";", ",", "|", " ", ""
-"""In the order that settles a tie; a blank stands for runs of blanks, the empty one for a single column."""
+"""In order of preference at equal score; a blank means runs of blanks, the empty string a single column."""
 SEPARATOR = re.compile(r"sep=.\s*$", re.IGNORECASE)
-"""What Excel writes above a table; the table itself tells more surely."""
+"""Line that Excel writes above a table; it is skipped, because the table itself is more reliable."""
 COMMENT = re.compile(r"^[ \t]*[#%]", re.MULTILINE)
 UTF16 = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a table is written.
+    """Layout of a table.
 
     Parameters
     ----------
     delimiter, spaced, decimal
-        What parts the cells (a tab where runs of blanks do, once tidied), and the decimal mark.
+        Separator of the cells (after tidying, a tab for runs of blanks), and the decimal mark.
     encoding, offset, first_line
         Encoding, and where the rows of values begin: byte of the file, and line from 1.
     headings, units, kinds
-        One for each column: its name with the unit in it, the unit from a row of units, and what it holds.
+        One for each column: its name including the unit, the unit from a row of units, and the kind of its values.
     zone
-        Time zone of moments that state one.
+        Time zone of dates that contain one.
     commented
-        True where comments stand between the rows.
+        True if there are comments between the rows.
     """
 
     delimiter: str
@@ -79,7 +79,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Layout:
-    """What one delimiter makes of the sample: the score to compare by, the dialect, and the first line of values."""
+    """Result for one delimiter: its score, the dialect, and the first line of values."""
 
     score: tuple[float, bool, int]
     dialect: Dialect
@@ -130,14 +130,14 @@ def find_encoding(sample: bytes) -> tuple[str, int]:
         return UTF16[sample[:2]], 2
     mark = 3 if sample.startswith(codecs.BOM_UTF8) else 0
     try:
-        codecs.getincrementaldecoder("utf-8")().decode(sample[mark:])  # a character cut at the end is no error
+        codecs.getincrementaldecoder("utf-8")().decode(sample[mark:])  # a character cut at the end is not an error
     except UnicodeDecodeError:
         return "latin-1", 0
     return "utf-8", mark
 
 
 def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:
-    """The lines of the sample that are neither blank nor comment; the last one only if the sample is the whole file."""
+    """Lines of the sample that are neither blank nor comment; the last one only if the sample is the complete file."""
     lines, at = [], 0
     for number, line in enumerate(text.splitlines(keepends=True) if "\r" not in text else split_ends(text), start=1):
         complete = whole or line.endswith(("\n", "\r"))
@@ -163,7 +163,7 @@ def split_ends(text: str) -> list[str]:
 
 
 def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
-    """What `delimiter` and `decimal` make of the lines; None where they leave no row of numbers."""
+    """Result for `delimiter` and `decimal`; None if there is no row of numbers."""
     if delimiter == decimal:
         return None
     dialect = Dialect("\t" if delimiter == " " else delimiter, delimiter == " ", decimal)
@@ -192,13 +192,13 @@ def lay_out(lines: list[Line], delimiter: str, decimal: str) -> Layout | None:
 
 
 def values_share(columns: list[list[str]], decimal: str) -> float:
-    """How many of the cells are values or empty: the wrong delimiter leaves text."""
+    """Share of cells that are values or empty; a wrong delimiter gives text cells."""
     cells = [cell for column in columns for cell in column]
     return sum(is_value(cell, decimal) or cell in EMPTY for cell in cells) / max(len(cells), 1)
 
 
 def fitting_share(rows: list[list[str]], kinds: tuple[Kind, ...], decimal: str) -> float:
-    """How many of the lines fit the table: the wrong delimiter suits only some."""
+    """Share of lines that fit the table; a wrong delimiter fits only some of them."""
     return sum(fits(cells, kinds, decimal) for cells in rows) / max(len(rows), 1)
 
 

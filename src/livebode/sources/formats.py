@@ -1,4 +1,4 @@
-"""Which format a file has, told by its content. A new format is one line in FORMATS."""
+"""Format of a file, detected from its content. A new format is one line in FORMATS."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Format:
-    """A format: the endings it goes by, how its first bytes look, and the class that reads it.
+    """A format: its file name endings, a test of its first bytes, and the class that reads it.
 
     The class is named by module so that h5py and the like are imported only for the files that need them.
     """
@@ -34,7 +34,7 @@ class Format:
 
 
 def is_text(head: bytes) -> bool:
-    """True where bytes may be a table in text: a byte order mark, or no control bytes.
+    """True if the bytes may be a text table: a byte order mark, or no control bytes.
 
     >>> is_text(b"t,u\\n0,1\\n"), is_text(b"\\x00\\x01\\x02")
     (True, False)

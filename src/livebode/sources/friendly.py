@@ -1,4 +1,4 @@
-"""Names that a nested recording gives its signals, beside the paths at which MATLAB finds them."""
+"""Signal names that a nested recording contains, in addition to the MATLAB paths."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from livebode.sources.recording import Column
 
 
 def with_friendly_names(columns: Sequence[Column], texts: Mapping[str, str]) -> tuple[Column, ...]:
-    """Columns `….Data` with the text of `….Name` beside them as alias and that of `….Unit` as unit.
+    """Columns `….Data` with the text of `….Name` as alias and that of `….Unit` as unit.
 
-    dSPACE ControlDesk lays its recordings out like this; a Name that is a model path is also taken by its last part.
+    dSPACE ControlDesk uses this layout; if a Name is a model path, its last part is also an alias.
 
     >>> texts = {"rec.Y(2).Name": "Model Root/Speed/omega", "rec.Y(2).Unit": "rad/s"}
     >>> column, = with_friendly_names([Column("rec.Y(2).Data", "", 100)], texts)

@@ -19,7 +19,7 @@ from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Sk
 UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"
 CHUNK_BYTES_MAX = 1 << 28
 PACKED_MAX = 100_000
-"""No compression makes a recording smaller by more than this; a dataset that claims so is rubbish."""
+"""Highest plausible compression ratio of a recording; a dataset that declares more is damaged."""
 
 
 class Hdf5Recording(Recording):
@@ -59,7 +59,7 @@ def import_h5py(path: Path) -> ModuleType:
 
 
 def datasets(file: Any) -> list[tuple[str, Any]]:
-    """Path and dataset of all that the file itself holds, each once."""
+    """Path and dataset of everything in the file itself, each once."""
     h5py = import_h5py(Path(file.filename))
     found: list[tuple[str, Any]] = []
 
@@ -76,7 +76,7 @@ def datasets(file: Any) -> list[tuple[str, Any]]:
 def add_dataset(
     name: str, dataset: Any, columns: list[Column], skipped: list[Skipped], scalars: dict[str, float], tie_axis: int = 0
 ) -> None:
-    """Add what `dataset` gives under `name`, which need not be its path in the file."""
+    """Add the columns of `dataset` under `name`, which may differ from its path in the file."""
     if why := unreadable(dataset):
         skipped.append(Skipped(name, why))
         return
@@ -96,7 +96,7 @@ def dataset_chunks(sets: Sequence[Any], columns: Sequence[Column], rows: int) ->
 
 
 def unreadable(dataset: Any) -> str:
-    """Why a dataset is not to be read; empty where it may be."""
+    """Why a dataset cannot be read; empty if it can."""
     if dataset.shape is None:
         return "it is empty"
     if dataset.is_virtual or dataset.external:

@@ -1,4 +1,4 @@
-"""Where a table in text begins: its header, a row of units, the first row of values."""
+"""Beginning of a text table: its header, a row of units, the first row of values."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ def find_header(
 ) -> tuple[int, list[str], list[str]]:
     """Index of the first row of values, the header above it and the units between them (each empty without).
 
-    `trailing` says that each row ends in a delimiter, which the header may lack.
+    `trailing` is true if each row ends with a delimiter; the header may lack it.
 
-    The header is the first line of words as wide as the table above a row that fits the table; a line of preamble may
-    be as wide, but what follows it does not fit.
+    The header is the first line of words that is as wide as the table and is followed by a row that fits the table.
+    A line of preamble may be as wide, but the line after it does not fit.
     """
     width = len(kinds)
     lengths = (width, width - 1) if trailing and width > 1 else (width,)
@@ -33,7 +33,7 @@ def find_header(
 
 
 def is_words(cells: list[str], decimal: str, trailing: bool) -> bool:
-    """True for a line that may be a header: no value and no gap in it, but for a delimiter at its end."""
+    """True for a line that may be a header: no value and no empty cell, except after a delimiter at its end."""
     body = cells[:-1] if trailing and len(cells) > 1 and not cells[-1] else cells
     return all(body) and no_values(body, decimal)
 

@@ -1,4 +1,4 @@
-"""Find the line that a fast parser only says is wrong somewhere."""
+"""Find the line of an error that a fast parser reports without its position."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.sources.dialect import Dialect
 
 
 def locate(path: Path, dialect: Dialect, columns: Sequence[int], line_bytes_max: int) -> RecordingError | None:
-    """The error in the first line that is ragged, too long, or has text in one of `columns`; None if no line is.
+    """The error in the first line that is too long, has a wrong number of cells, or text in `columns`; else None.
 
     Lines count from 1 as in an editor.
     """

@@ -18,7 +18,7 @@ BLOCK_SAMPLES_MAX = 1 << 24
 
 
 class Log:
-    """A recording: its channels, rate and timing, and its samples as Blocks. Made by `open_log`.
+    """A recording: its channels, rate and timing, and its samples as Blocks. Created by `open_log`.
 
     Nothing but the time column is read before `blocks` is iterated; every call of `blocks` reads from the start.
     """
@@ -60,7 +60,7 @@ class Log:
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
-        """What else is in the file, and why it is no channel."""
+        """What else is in the file, and why it is not a channel."""
         listed = {column.name for column in self._columns}
         other = [
             Skipped(column.name, f"it has {column.samples} samples, not {self.samples}")
@@ -80,17 +80,17 @@ class Log:
 
     @property
     def rate_origin(self) -> str:
-        """Where the rate is from: "given", "time column 't' in s", "'fs' in the file", "metadata"; and what agrees."""
+        """Origin of the rate: "given", "time column 't' in s", "'fs' in the file", "metadata"; and what agrees."""
         return self._clock.rate_origin
 
     @property
     def timing(self) -> Timing | None:
-        """Jitter and gaps as the time column tells them; None without one."""
+        """Jitter and gaps of the time column; None without one."""
         return self._clock.timing
 
     @property
     def samples(self) -> int | None:
-        """Samples in the file (missing ones not counted); None where only reading tells it."""
+        """Samples in the file (without missing ones); None if only reading gives the number."""
         known = [column.samples for column in self._columns if column.samples is not None]
         return known[0] if known else self._clock.samples
 
@@ -100,22 +100,22 @@ class Log:
         Parameters
         ----------
         channels
-            Names, paths or aliases; the Blocks name their channels as asked. Left out: those given to `open_log`, or
-            all but the time column.
+            Names, paths or aliases; the Blocks use the given names. Default: those given to `open_log`, or all
+            except the time column.
         block_samples
             Largest length of a Block; they are shorter at gaps and where the file's own pieces end.
 
         Yields
         ------
         Block
-            float64, shape (channels, ≤ block_samples). Empty cells are NaN; NaN and infinities stay what they are.
+            float64, shape (channels, ≤ block_samples). Empty cells are NaN; NaN and infinities are unchanged.
 
         Raises
         ------
         RecordingError
-            At once for a channel that is not in the file; while iterating for damage further down in it.
+            At once for a channel that is not in the file; while iterating for damage later in it.
         UsageError
-            For no channel, a channel asked for twice, or a length that is out of range.
+            For no channel, a duplicated channel, or a length that is out of range.
         """
         limit = checked_block_samples(self._block_samples if block_samples is None else block_samples)
         names = list(self._chosen if channels is None else channels)
@@ -126,7 +126,7 @@ class Log:
         if repeated := [name for name, count in Counter(names).items() if count > 1]:
             raise UsageError(
                 "duplicate",
-                f"channel {repeated[0]!r} is asked for more than once",
+                f"channel {repeated[0]!r} is duplicated in channels",
                 "name it once",
                 argument="channels",
                 value=repeated[0],
@@ -162,7 +162,7 @@ class Log:
 
 
 def pieces(first: int, last: int, cuts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:
-    """Rows `first` … `last` − 1 as ranges that no cut divides and none longer than `limit`.
+    """Rows `first` … `last` − 1 as ranges that are split at the cuts and at most `limit` long.
 
     >>> list(pieces(0, 10, np.array([4]), 5))
     [(0, 4), (4, 9), (9, 10)]

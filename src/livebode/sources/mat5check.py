@@ -1,4 +1,4 @@
-"""List and check a MATLAB v5 file before SciPy reads it: whole elements, and no sizes that its bytes cannot hold.
+"""List and check a MATLAB v5 file before SciPy reads it: complete elements, and no sizes larger than its bytes.
 
 SciPy trusts the sizes that a file declares; a damaged one can make it ask for terabytes or read past the end. Each
 element is a tag (type, bytes) and its bytes; matrices nest. Compressed elements are unpacked piece by piece.
@@ -35,7 +35,7 @@ UNPACKED_MAX = 1 << 34
 
 @dataclass(frozen=True)
 class Variable:
-    """Head of a variable: MATLAB's name for its class, its dimensions, and whether it has an imaginary part."""
+    """Header of a variable: MATLAB's name of its class, its dimensions, and whether it has an imaginary part."""
 
     name: str
     kind: str
@@ -44,12 +44,12 @@ class Variable:
 
 
 def list_variables(path: Path) -> list[Variable]:
-    """All variables of the file, in its order, after a walk through all that they hold.
+    """All variables of the file, in its order, after a check of everything in them.
 
     Raises
     ------
     RecordingError
-        Where an element ends after its container, or declares more values than it has bytes.
+        If an element ends after its container, or declares more values than it has bytes.
     """
     size = path.stat().st_size
     found: list[Variable] = []
@@ -62,7 +62,7 @@ def list_variables(path: Path) -> list[Variable]:
         while at < size:
             variable, at = check_top(path, file, at, size, order)
             found.append(variable)
-    return [variable for variable in found if variable.name]  # MATLAB keeps its own workspace without a name
+    return [variable for variable in found if variable.name]  # MATLAB stores its own workspace without a name
 
 
 def check_top(path: Path, file: BinaryIO, at: int, size: int, order: str) -> tuple[Variable, int]:
@@ -106,7 +106,7 @@ class Plain:
         self._file.seek(count, 1)
 
     def rest(self) -> None:
-        """Nothing follows that a checksum guards."""
+        """Nothing to do: no checksum follows."""
 
 
 class Unpacked:
@@ -133,7 +133,7 @@ class Unpacked:
             count -= got
 
     def rest(self) -> None:
-        """Unpack to the end, where zlib holds the checksum against the bytes."""
+        """Unpack to the end, where zlib compares the checksum with the bytes."""
         while self._more():
             self._ready = b""
         if not self._zlib.eof:
@@ -178,8 +178,8 @@ class Walk:
     def element(self, room: int, keep: int, types: frozenset[int]) -> tuple[bytes, int, int]:
         """Read one element: its first `keep` bytes, its length, and the room that is left after it.
 
-        Its type must be among `types`: SciPy looks types up in a table without asking whether they are in it. Up to
-        four bytes may stand inside the tag itself; a type above 65535 tells it.
+        Its type must be among `types`: SciPy looks types up in a table without checking that they are in it. Up to
+        four bytes may be inside the tag itself; a type above 65535 marks this.
         """
         raw = self.source.read(8)
         if len(raw) < 8 or room < 8:
@@ -232,7 +232,7 @@ class Walk:
         return Variable(name.decode("latin-1"), CLASSES[kind], shape, bool(flags & COMPLEX))
 
     def _opaque(self, room: int, depth: int) -> str:
-        """An object that only MATLAB understands: its name, two more texts and a matrix."""
+        """An object that only MATLAB can read: its name, two more texts and a matrix."""
         texts = []
         for _ in range(3):
             text, _, room = self.element(room, 64, TEXT)
@@ -249,7 +249,7 @@ class Walk:
         return room - 8 - length
 
     def _values(self, count: int, room: int) -> None:
-        """Real and imaginary part of a matrix of `count` values, a byte each at least."""
+        """Real and imaginary part of a matrix of `count` values, at least one byte each."""
         if count > room:
             raise truncated(f"a variable declares {count} values where {room} bytes are left", declared=count)
         while room >= 8:

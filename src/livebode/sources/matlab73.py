@@ -1,4 +1,4 @@
-"""MATLAB 7.3: HDF5 with MATLAB's habits. Axes are reversed, structs are groups, struct arrays are references."""
+"""MATLAB 7.3: HDF5 with MATLAB's conventions. Axes are reversed, structs are groups, struct arrays are references."""
 
 from __future__ import annotations
 

@@ -18,9 +18,9 @@ from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Sk
 
 
 class MdfRecording(Recording):
-    """An MDF file. A channel goes by its name, or by group/name (groups from 0) where the name stands in several.
+    """An MDF file. A channel goes by its name, or by group/name (groups from 0) if several groups have the name.
 
-    Groups have their own time each: those of one length count together, as series in other formats do. Values are
+    Each group has its own time: groups of equal length belong together, like series in other formats. Values are
     physical; a sample that the file marks as invalid is NaN.
     """
 
@@ -52,17 +52,17 @@ class MdfRecording(Recording):
         self.skipped = tuple(skipped)
 
     def _check_size(self, file: Any, at: int, samples: int) -> None:
-        """RecordingError where a group declares more than the file can hold, even compressed by 1000."""
+        """RecordingError if a group declares more than the file can contain, even compressed by 1000."""
         width = int(file.groups[at].channel_group.samples_byte_nr)
         if samples * max(width, 1) > 1000 * self.path.stat().st_size:
             raise truncated(
-                f"{self.path} declares {samples} samples of {width} bytes, more than it can hold",
+                f"{self.path} declares {samples} samples of {width} bytes, more than its size allows",
                 path=str(self.path),
                 samples=samples,
             )
 
     def _check_place(self, channel: Any, record_bytes: int) -> None:
-        """RecordingError where a channel is outside its record: asammdf would read what is behind it in memory."""
+        """RecordingError if a channel is outside its record: asammdf would read the memory behind it."""
         if hasattr(channel, "byte_offset"):
             end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
         else:
@@ -114,8 +114,8 @@ def opened(path: Path) -> Iterator[Any]:
             extra="mdf",
             path=str(path),
         ) from None
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says is in the error that follows
-    with path.open("rb") as raw:  # by its name it would be mapped, and a mapped file that shrinks kills the process
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its messages are in the error that follows
+    with path.open("rb") as raw:  # a path would be mapped; if a mapped file shrinks, the process is killed
         try:
             file = MDF(raw)
         except Exception as error:
@@ -128,7 +128,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def abandon(error: Exception) -> None:
-    """Close what asammdf left half made, which would complain on standard error when it is collected."""
+    """Close the incomplete object of asammdf, which would print on standard error when it is collected."""
     trace = error.__traceback__
     while trace is not None:
         half: Any = trace.tb_frame.f_locals.get("self")

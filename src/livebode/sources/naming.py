@@ -9,7 +9,7 @@ from livebode.sources.recording import Column
 
 
 def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) -> Column:
-    """The column that `name` means: exactly, else by alias, else as a path that leaves out a lone (1)."""
+    """The column with this name: exactly, else by alias, else as a path without a single (1)."""
     found = [column for column in columns if column.name == name and not column.temporal]
     found = found or [column for column in columns if name in column.aliases and not column.temporal]
     plain = name.replace("(1).", ".")
@@ -21,7 +21,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
         raise RecordingError(
             "channel-ambiguous",
             f"channel {name!r} means more than one: {', '.join(paths)}",
-            "name the one by its path",
+            "use the path of one of them",
             channel=name,
             channels=paths,
         )
@@ -30,7 +30,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
             raise RecordingError(
                 "lengths-differ",
                 f"channel {name!r} has {column.samples} samples, the others {columns[0].samples}",
-                "open it on its own",
+                "open it separately",
                 channel=name,
                 samples=[column.samples, columns[0].samples],
             )
@@ -41,7 +41,7 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The remedy for a channel that is not there: the nearest name, and all names.
+    """The remedy for an unknown channel: the nearest name, and all names.
 
     >>> nearest("iq_adX", ["iq_adx", "theta_mx"])
     "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"

@@ -1,4 +1,4 @@
-"""NPZ: members streamed out of the zip archive, compressed or not; pickled objects are never loaded."""
+"""NPZ: members streamed from the zip archive, compressed or not; pickled objects are never loaded."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Member:
 
 
 class NpzRecording(Recording):
-    """A NumPy archive; the headers of all members are read at once, values only when asked for."""
+    """A NumPy archive; the headers of all members are read at once, values only on request."""
 
     format: ClassVar[str] = "npz"
 
@@ -119,7 +119,7 @@ def read_header(file: IO[bytes], info: zipfile.ZipInfo) -> Member:
     needed = member.offset + math.prod(shape) * dtype.itemsize
     if any(length < 0 for length in shape) or (not dtype.hasobject and needed > info.file_size):
         raise truncated(
-            f"{info.filename!r} declares shape {shape}, more than its {info.file_size} bytes hold",
+            f"{info.filename!r} declares shape {shape}, more than its {info.file_size} bytes",
             part=info.filename,
             shape=list(shape),
         )

@@ -33,14 +33,14 @@ def open_log(
     Parameters
     ----------
     path
-        The file; its content, not its ending, decides about the format.
+        The file; its content, not its ending, determines the format.
     rate_hz
-        Samples per second, taken as exact. Left out, it comes from a time column or from the file's metadata.
+        Samples per second, treated as exact. Default: from a time column or from the file's metadata.
     time
-        Name of the time column, with its unit where the file does not say it: "clock [us]". Left out, it is found by
-        name; "none" ignores it.
+        Name of the time column, with its unit if the file does not contain it: "clock [us]". Default: found by
+        name; "none" ignores the time column.
     channels
-        What to read; fixes which series belong together where the file has series of several lengths.
+        Channels to read; selects the series that belong together if the file has series of several lengths.
     block_samples
         Largest length of a Block.
 
@@ -79,7 +79,7 @@ def log_of(
     if not chosen:
         raise RecordingError(
             "channel-missing",
-            f"{recording.path} has no channel but the time{reasons(recording)}",
+            f"{recording.path} has no channel except the time{reasons(recording)}",
             "check that the recording is complete",
             path=str(recording.path),
         )
@@ -99,7 +99,7 @@ def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: 
             raise RecordingError(
                 "rate-conflict",
                 f"{recording.path} states {recording.rate_hz:.8g} Hz, but rate_hz is {rate_hz:.8g} Hz",
-                "correct rate_hz, or leave it out",
+                "correct rate_hz, or omit it",
                 path=str(recording.path),
                 argument="rate_hz",
                 rate_hz=recording.rate_hz,
@@ -118,7 +118,7 @@ def find_clock(recording: Recording, column: Column | None, unit: str, rate_hz: 
 
 
 def together(recording: Recording, channels: Sequence[str] | None) -> list[Column]:
-    """The columns of the length that counts: that of `channels`, or the one that holds most of the file's values."""
+    """The columns of one length: that of `channels`, or the one with most of the file's values."""
     everything = recording.columns
     if channels:
         asked = [resolve(name, everything, everything) for name in channels]
@@ -149,6 +149,6 @@ def together(recording: Recording, channels: Sequence[str] | None) -> list[Colum
 
 
 def reasons(recording: Recording) -> str:
-    """What was skipped, for the error that nothing is left."""
+    """What was skipped, for the error that no channel remains."""
     listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
     return f" ({'; '.join(listed)})" if listed else ""

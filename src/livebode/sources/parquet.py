@@ -1,4 +1,4 @@
-"""Parquet: streamed by batches, only the columns asked for."""
+"""Parquet: streamed in batches, only the requested columns."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ParquetRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         names = [self._names[column.key] for column in columns]
-        # A column is read once however often it stands in `names`, and batches keep the file's order.
+        # A column is read once, however often it is in `names`; batches have the file's order.
         with pq.ParquetFile(self.path, page_checksum_verification=True) as file:
             for batch in file.iter_batches(max(rows, BATCH_ROWS_MIN), columns=names, use_threads=True):
                 yield [to_numpy(batch.column(name)) for name in names]

@@ -1,4 +1,4 @@
-"""Recording: what every format gives. Column: one series of values in it. And the net that catches odd failures."""
+"""Recording: the common form of all formats. Column: one series of values. Errors of libraries are converted here."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from livebode.core import LivebodeError, RecordingError
 
 Chunk = list[NDArray[Any]]
-"""One array for each column asked for, all of one length, numbers of any type; int64 nanoseconds for temporal ones."""
+"""One array for each requested column, of equal length, any numeric type; int64 nanoseconds for temporal ones."""
 
 COLUMNS_MAX = 20_000
-"""More columns than this are taken for rubbish."""
+"""A file with more columns is treated as damaged."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,15 @@ class Column:
     Parameters
     ----------
     name
-        What the user writes to have it, a path where the format nests.
+        Name by which the user requests it; a path if the format nests.
     unit
-        Empty where the file does not say it.
+        Empty if the file does not contain it.
     samples
-        Number of values; None where only reading tells it.
+        Number of values; None if only reading gives it.
     aliases
-        Other names that mean this column.
+        Other names of this column.
     temporal
-        True for dates and durations: good as time only, read as int64 nanoseconds.
+        True for dates and durations: usable as time only, read as int64 nanoseconds.
     key
         Where the values are, for the format's own use.
     """
@@ -52,7 +52,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Skipped:
-    """Something in the file that is no channel, and why."""
+    """Something in the file that is not a channel, and why."""
 
     name: str
     reason: str
@@ -61,7 +61,7 @@ class Skipped:
 class Recording(ABC):
     """A file opened by its format: the columns in it and a way to stream them.
 
-    A subclass sets `columns` in `__init__` from the head of the file, and opens the file anew in each `chunks`.
+    A subclass sets `columns` in `__init__` from the head of the file, and opens the file again in each `chunks`.
     """
 
     format: ClassVar[str]
@@ -84,7 +84,7 @@ class Recording(ABC):
 
 @contextmanager
 def contained(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever a library raises on a damaged file into a RecordingError of one sentence; errors name the file.
+    """Convert any error of a library on a damaged file into a RecordingError of one sentence that names the file.
 
     >>> with contained(Path("a.mat"), "MATLAB"):
     ...     raise KeyError("mdtype 77")
@@ -94,7 +94,7 @@ def contained(path: Path, kind: str) -> Iterator[None]:
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the libraries warn before they fail; the failure is what counts
+            warnings.simplefilter("ignore")  # the libraries warn before they fail; only the failure matters
             yield
     except LivebodeError as error:
         raise named(error, path) from error.__cause__
@@ -123,7 +123,7 @@ def contained(path: Path, kind: str) -> Iterator[None]:
 
 @contextmanager
 def located(path: Path) -> Iterator[None]:
-    """Errors inside it name the file, as a fact and in front of their sentence."""
+    """Errors inside it name the file, as a fact and at the beginning of their message."""
     try:
         yield
     except LivebodeError as error:
@@ -131,7 +131,7 @@ def located(path: Path) -> Iterator[None]:
 
 
 def named(error: LivebodeError, path: Path) -> LivebodeError:
-    """The error with the file that it belongs to; the same one where it names a file."""
+    """The error with the name of its file; unchanged if it already names a file."""
     if "path" in error.facts:
         return error
     error.facts["path"] = str(path)
@@ -139,7 +139,7 @@ def named(error: LivebodeError, path: Path) -> LivebodeError:
 
 
 def guarded(chunks: Iterator[Chunk], path: Path, kind: str) -> Iterator[Chunk]:
-    """`chunks`, with whatever reading raises turned into RecordingError."""
+    """`chunks`, with any error of reading converted to RecordingError."""
     while True:
         chunk: Chunk | None = None
         with contained(path, kind):

@@ -1,16 +1,16 @@
-"""The rate that a mean period stands for: the shortest decimal that the uncertainty allows."""
+"""The rate of a mean period: the shortest decimal within the uncertainty."""
 
 from __future__ import annotations
 
 EPSILON = 2.0**-50
-"""Uncertainty that double precision alone leaves, relative."""
+"""Relative uncertainty of double precision alone."""
 
 
 def exact_rate_hz(period_s: float, uncertainty: float) -> float:
     """Rate in Hz for a mean period in seconds that is known to ± `uncertainty` (relative).
 
-    Of all rates, and of all periods, within the uncertainty the one with the fewest decimal digits: recordings are
-    made at 4000 Hz or every 0.3 ms, not at 3999.99996 Hz. Within the uncertainty the data cannot tell the difference.
+    Of all rates and periods within the uncertainty, the one with the fewest decimal digits: recorders sample at 4000 Hz
+    or every 0.3 ms, not at 3999.99996 Hz. The data cannot distinguish rates within the uncertainty.
 
     >>> exact_rate_hz(1 / 3999.99996, 1e-6)
     4000.0

@@ -1,4 +1,4 @@
-"""XML without the parts of XML that make reading a file dangerous."""
+"""XML without the features that make reading a file dangerous."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BYTES_MAX = 1 << 28
 DEPTH_MAX = 64
 ELEMENTS_MAX = 1 << 20
 TOKEN_BYTES_MAX = 1 << 20
-"""Longest tag, comment or instruction: the parser reads an unfinished one again with every piece of it."""
+"""Longest tag, comment or instruction: the parser reads an incomplete one again with each new piece."""
 _PIECE_BYTES = 1 << 16
 
 

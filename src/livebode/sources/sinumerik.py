@@ -27,7 +27,7 @@ class SinumerikSpectra:
     Parameters
     ----------
     frequency_hz
-        The control's own axis, shape (bins,); it is off by the bins that it believes a record to have.
+        The control's own axis, shape (bins,); it is wrong by the control's assumption on the bins of a record.
     input_auto, output_auto
         Shape (bins,), real in content.
     cross
@@ -43,7 +43,7 @@ class SinumerikSpectra:
 class SinumerikRecording(Recording):
     """The time records of a measurement, one after the other: channels "input" and "output", a break before each.
 
-    A record is taken in one direction of motion; nothing says how long the control waited between two.
+    A record is taken in one direction of motion; the pause between two records is not stored.
     """
 
     format: ClassVar[str] = "sinumerik"
@@ -76,7 +76,7 @@ class SinumerikRecording(Recording):
 
 
 def sinumerik_spectra(path: str | PathLike[str]) -> SinumerikSpectra:
-    """The auto- and cross-spectra that the control computed and stored beside the time records.
+    """The auto- and cross-spectra that the control computed and stored with the time records.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def sinumerik_spectra(path: str | PathLike[str]) -> SinumerikSpectra:
             raise RecordingError(
                 "incomplete",
                 f"{path} has no cross-spectrum of output and input",
-                "let the control store spectra",
+                "configure the control to store spectra",
                 path=str(path),
                 part="SigNodeCrossSpectrumInfo",
             )
@@ -115,7 +115,7 @@ def measured_nodes(root: Element) -> dict[str, Element]:
         raise RecordingError(
             "incomplete",
             f"the XML ({root.tag}) has time records of {len(nodes)} signals, not of an input and an output",
-            "let the control store the time series",
+            "configure the control to store the time series",
             part="TimeSeries",
             signals=len(nodes),
         )
@@ -151,7 +151,7 @@ def numeric_array(element: Element, parts: int) -> NDArray[np.float64]:
     values = decode(child(element, "m_pNumberArray").text or "")
     declared = number(element, "m_length")
     if len(values) != parts * declared:
-        raise truncated(f"an array declares {declared:.0f} values and holds {len(values) / parts:g}", declared=declared)
+        raise truncated(f"an array declares {declared:.0f} values and has {len(values) / parts:g}", declared=declared)
     return values
 
 

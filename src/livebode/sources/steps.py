@@ -1,4 +1,4 @@
-"""Steps of a time column, gathered chunk by chunk: mean, spread, gaps; refused where time does not go forward."""
+"""Steps of a time column, collected by chunks: mean, spread, gaps; an error if time does not increase."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from livebode.core import RecordingError
 GAP_TOLERANCE = 0.25
 """How far from a whole number of periods a gap may be, in periods."""
 PAUSE = 10
-"""From so many periods on a step is a pause of the recorder, which need not be a whole number of periods."""
+"""A step of at least this many periods is a pause of the recorder, not necessarily a whole number of periods."""
 GAPS_MAX = 1_000_000
 LONGEST_GAP = 2**40
 LOOK = 4096
-"""Steps that the first estimate of the period is made from."""
+"""Number of steps for the first estimate of the period."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Gap:
     Parameters
     ----------
     sample
-        Number of the first sample after the gap; numbers go on over gaps.
+        Number of the first sample after the gap; numbers continue over gaps.
     missing
         Samples that are missing before it.
     """
@@ -49,7 +49,7 @@ class Steps:
         self._count, self._sum, self._squares = 0, 0.0, 0.0  # of regular steps, as deviations from the nominal period
         self.low, self.high = np.inf, 0.0
         self.largest = 0.0
-        """Largest magnitude of time itself, which sets how finely a float can tell it; 0 for whole numbers."""
+        """Largest magnitude of time, which sets the resolution of a float; 0 for integers."""
         self.gap_rows: list[int] = []
         self.gap_missing: list[int] = []
 
@@ -62,7 +62,7 @@ class Steps:
             joined = time
         else:
             joined = np.concatenate(([self._last], time))
-        with np.errstate(all="ignore"):  # rubbish overflows; the checks below say so
+        with np.errstate(all="ignore"):  # invalid values overflow; the checks below report it
             self._add_steps(joined, np.diff(joined).astype(np.float64, copy=False), len(time))
 
     def _add_steps(self, joined: NDArray[Any], steps: NDArray[np.float64], rows: int) -> None:
@@ -84,7 +84,7 @@ class Steps:
 
     @property
     def regular(self) -> int:
-        """Steps that are no gaps."""
+        """Steps that are not gaps."""
         return self._count
 
     @property
@@ -99,12 +99,12 @@ class Steps:
 
     @property
     def spread(self) -> float:
-        """Longest less shortest regular step."""
+        """Longest minus shortest regular step."""
         return self.high - self.low
 
     @property
     def printed(self) -> bool:
-        """True where the steps take neighbouring multiples of one quantum: a regular time, printed with few digits."""
+        """True if the steps are neighbouring multiples of one quantum: a regular time, printed with few digits."""
         whole = self.low / self.spread if self.spread else 0.0
         return bool(self.spread and abs(whole - round(whole)) < 0.02 and round(whole) >= 1)
 
@@ -151,7 +151,7 @@ class Steps:
         )
 
     def _cut_gaps(self, joined: NDArray[Any], steps: NDArray[np.float64], before: int) -> NDArray[np.float64]:
-        """Note the gaps in `steps`; what is left are the regular ones."""
+        """Record the gaps in `steps`; returns the regular ones."""
         regular = steps <= 1.5 * self.nominal
         for at in np.flatnonzero(~regular).tolist():
             periods = float(steps[at]) / (self.mean if self._count else self.nominal)
@@ -181,7 +181,7 @@ class Steps:
 
 
 def typical(steps: NDArray[np.float64]) -> float:
-    """Mean of the steps that are near the median: neither gaps nor the quantum of a coarse print mislead it.
+    """Mean of the steps near the median: robust against gaps and coarse rounding.
 
     >>> typical(np.array([2.0, 3.0, 2.0, 3.0, 50.0]))
     2.5

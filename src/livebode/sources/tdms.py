@@ -27,7 +27,7 @@ _UNFINISHED = (1 << 64) - 1
 class TdmsRecording(Recording):
     """A TDMS file. Channels go by their name where the file has one group, else by group/name.
 
-    The rate is from the waveform property `wf_increment` where all channels agree on it.
+    The rate is from the waveform property `wf_increment` if it is equal in all channels.
     """
 
     format: ClassVar[str] = "tdms"
@@ -76,7 +76,7 @@ def values(data: Any) -> Any:
 
 
 def refuse_truncated(path: Path) -> None:
-    """RecordingError where the file ends before its last segment does; npTDMS would read the rest without an error."""
+    """RecordingError if the file ends before its last segment; npTDMS would read the rest without an error."""
     size = path.stat().st_size
     at = segments = 0
     with path.open("rb") as file:
@@ -87,7 +87,7 @@ def refuse_truncated(path: Path) -> None:
             if tag != b"TDSm" or segments > SEGMENTS_MAX:
                 raise damaged(f"{path} has no TDMS segment at byte {at}", path=str(path), byte=at)
             if following == _UNFINISHED:
-                return  # its writer was stopped, and says so
+                return  # its writer was stopped, and marked it
             at += LEAD_IN.size + following
     if at != size:
         raise truncated(
@@ -110,8 +110,8 @@ def opened(path: Path) -> Iterator[Any]:
             extra="tdms",
             path=str(path),
         ) from None
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # what it says is in the error that follows
-    # Given a name it would look into the index file beside, which may be of another recording.
+    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # its messages are in the error that follows
+    # With a path it would read the index file next to it, which may belong to another recording.
     with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
         yield file
 

@@ -1,4 +1,4 @@
-"""A byte stream made plain for Arrow: UTF-8 without comments, runs of blanks one tab where blanks part columns."""
+"""A byte stream simplified for Arrow: UTF-8 without comments; where blanks separate columns, a tab for each run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BLANKS = re.compile(r"[ \t]+")
 
 
 class Tidied(io.RawIOBase):
-    r"""The text of `raw` from where it stands, tidied line by line; `spaced` where blanks part the columns.
+    r"""The text of `raw` from its current position, simplified line by line; `spaced`: blanks separate the columns.
 
     >>> io.BufferedReader(Tidied(io.BytesIO(b"  1   2 \n# note\n 3 4"), "utf-8", True)).read()
     b'1\t2\n3\t4'
@@ -43,7 +43,7 @@ class Tidied(io.RawIOBase):
         self._done = not raw
         text = self._kept + self._decoder.decode(raw, final=self._done)
         end = len(text) if self._done else text.rfind("\n") + 1
-        if end == 0 and len(text) > 4 * PIECE:  # no line is as long; let Arrow say so
+        if end == 0 and len(text) > 4 * PIECE:  # no valid line is this long; Arrow reports it
             end = len(text)
         text, self._kept = text[:end], text[end:]
         text = COMMENT.sub("", text)

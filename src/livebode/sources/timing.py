@@ -17,10 +17,10 @@ from livebode.sources.steps import Gap, Steps
 from livebode.sources.units import SECONDS, split_unit, time_unit
 
 RATE_TOLERANCE = 1e-3
-"""Relative difference from which a time column contradicts a given rate."""
+"""Relative difference above which a time column contradicts a given rate."""
 JITTER_MAX = 0.1
 """Largest standard deviation of the step in periods: 0.07 periods of a sample cost 0.1 % at a tenth of the rate,
-2.4 % at the Nyquist frequency, and leave noise 27 dB below a line at a tenth of the rate."""
+2.4 % at the Nyquist frequency, and cause noise 27 dB below a line at a tenth of the rate."""
 GAPS_SHARE_MAX = 0.05
 GAPS_LISTED = 1000
 RATE_NAMES = "fs", "f_s", "fs_hz", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz"
@@ -31,14 +31,14 @@ DSPACE_TIME = re.compile(r"(?:^|[./])X(?:\(\d+\))?[./]Data$")
 
 @dataclass(frozen=True)
 class Timing:
-    """What the time column says.
+    """Properties of the time column.
 
     Parameters
     ----------
     column, unit
         Its name and the unit that it was read in.
     period_s_mean, period_s_std, period_s_min, period_s_max
-        The regular steps, that is without gaps, in seconds.
+        The regular steps (without gaps), in seconds.
     gaps, missing
         Number of gaps, and of samples missing in all of them.
     first_gaps
@@ -72,7 +72,7 @@ class Clock:
 def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | None, str]:
     """The time column among `columns` and the unit that the user gave for it.
 
-    `time` None looks for one by name, "none" wants none, anything else names one, "name [unit]" with its unit.
+    `time` None finds one by name, "none" uses none, anything else is the name of one, "name [unit]" with its unit.
 
     >>> find_time([Column("u"), Column("Zeit", "ms")], None)[0].name
     'Zeit'
@@ -101,7 +101,7 @@ def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | Non
 
 
 def time_rank(column: Column) -> int | None:
-    """How much the name of a column sounds like time, 0 best; None where it does not."""
+    """How well the name of a column matches a time, 0 best; None if it does not."""
     if column.temporal:
         return len(TIME_NAMES) + 1
     if DSPACE_TIME.search(column.name):
@@ -116,7 +116,7 @@ def time_rank(column: Column) -> int | None:
 
 
 def rate_in_file(scalars: Mapping[str, float]) -> tuple[float, str] | None:
-    """Rate in Hz that a single number of the file states, and the sentence where from.
+    """Rate in Hz from a single number in the file, and the text of its origin.
 
     >>> rate_in_file({"kp": 3.0, "Fs": 2500.0})
     (2500.0, "'Fs' in the file")
@@ -135,7 +135,7 @@ def rate_in_file(scalars: Mapping[str, float]) -> tuple[float, str] | None:
 def clock_from_time(
     column: Column, unit: str, chunks: Iterator[Chunk], rate_hz: float | None, stated: tuple[float, str] | None
 ) -> Clock:
-    """The clock that a time column gives, in one pass over it.
+    """The clock from a time column, in one pass over it.
 
     Parameters
     ----------
@@ -144,9 +144,9 @@ def clock_from_time(
     chunks
         The column's values.
     rate_hz
-        Rate that the user gave; it is taken as exact, and refused where the column contradicts it.
+        Rate from the user; treated as exact, and rejected if the column contradicts it.
     stated
-        Rate that the file states elsewhere; it helps only where the unit of time is not stated.
+        Rate stated elsewhere in the file; used only if the unit of time is missing.
     """
     unit = stated_unit(column, unit)
     steps = Steps(column.name)
@@ -181,7 +181,7 @@ def clock_from_time(
 
 
 def check_rate(name: str, measured_hz: float, rate_hz: float | None) -> None:
-    """RecordingError where no recording has the measured rate, or where it contradicts the given one."""
+    """RecordingError if the measured rate is implausible or contradicts the given one."""
     if not 1e-9 < measured_hz < 1e12:
         raise RecordingError(
             "rate-implausible",
@@ -203,7 +203,7 @@ def check_rate(name: str, measured_hz: float, rate_hz: float | None) -> None:
 
 
 def stated_unit(column: Column, given: str) -> str:
-    """Unit of a time column as the user, the file or its name says it; empty where none does."""
+    """Unit of a time column from the user, the file or its name; empty if none gives it."""
     unit = given or time_unit(column.name, column.unit)
     if unit and unit.casefold() not in SECONDS:
         raise RecordingError(
@@ -217,10 +217,10 @@ def stated_unit(column: Column, given: str) -> str:
 
 
 def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> tuple[str, float, str]:
-    """Unit of a time column that states none, its length in seconds, and what told it (empty for seconds).
+    """Unit of a time column that states none, its length in seconds, and its origin (empty for seconds).
 
-    It is in seconds, unless a rate that is told from elsewhere differs from that by a power of 1000. Seconds that give
-    1 Hz or less are not believed without such a rate.
+    The unit is seconds, except if a rate from elsewhere differs by a power of 1000. Seconds that give 1 Hz or less
+    are not accepted without such a rate.
     """
     if told is None:
         if mean < 1.0:
@@ -235,7 +235,7 @@ def guess_unit(column: Column, mean: float, told: tuple[float, str] | None) -> t
     rate_hz, where = told
     for unit in ("s", "ms", "us", "ns"):
         if abs(mean * SECONDS[unit] * rate_hz - 1.0) <= RATE_TOLERANCE:
-            return unit, SECONDS[unit], "" if unit == "s" else f" (unit told by {where})"
+            return unit, SECONDS[unit], "" if unit == "s" else f" (unit from {where})"
     raise RecordingError(
         "rate-conflict",
         f"time column {column.name!r} has no unit and steps of {mean:.8g}, in seconds {1 / mean:.8g} Hz, "

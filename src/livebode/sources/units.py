@@ -1,4 +1,4 @@
-"""Units written behind names, and units of time."""
+"""Units written after names, and units of time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SECONDS = {
 
 
 def split_unit(text: str) -> tuple[str, str]:
-    """Name and unit of a heading; the unit is empty where none stands there.
+    """Name and unit of a heading; the unit is empty if there is none.
 
     Square brackets may touch the name, round ones need a space before them; a number in brackets is an index.
 
@@ -35,7 +35,7 @@ def split_unit(text: str) -> tuple[str, str]:
 
 
 def split_units(headings: Sequence[str]) -> list[tuple[str, str]]:
-    """`split_unit` for each heading; headings that differ by their unit only keep it in the name.
+    """`split_unit` for each heading; if headings differ only by their unit, it remains in the name.
 
     >>> split_units(["t [s]", "x [m]", "x [inch]"])
     [('t', 's'), ('x [m]', 'm'), ('x [inch]', 'inch')]
@@ -46,7 +46,7 @@ def split_units(headings: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def time_unit(name: str, unit: str) -> str:
-    """Unit of a time column from its unit or from the end of its name (`time_us`); empty where neither tells it.
+    """Unit of a time column from its unit or from the end of its name (`time_us`); empty if neither gives it.
 
     >>> time_unit("time", "ms"), time_unit("timestamp_ns", ""), time_unit("t", ""), time_unit("t", "rad")
     ('ms', 'ns', '', 'rad')

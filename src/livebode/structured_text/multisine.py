@@ -1,4 +1,4 @@
-"""FB_Multisine: one exact period of an excitation, again and again, ramped in and out at the period's borders."""
+"""FB_Multisine: one exact period of an excitation, repeated, ramped up and down at the period's borders."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from livebode.structured_text.text import array, check_rate, comment, real, sect
 PERIOD_MAX = 16384
 """Longest period, samples: each is a line of text that the PLC's compiler reads."""
 SMALLEST = float(np.finfo(np.float64).tiny)
-"""Size below which an LREAL loses digits, or is none to some controllers."""
+"""Magnitude below which an LREAL loses digits, or is zero on some controllers."""
 RAMP_PERIODS_MAX = (2**32 - 1) // PERIOD_MAX
 """Longest ramp: its samples are counted in a UDINT."""
-_LOADED_AT_ONCE = 32  # samples a cycle while the table fills, so that the first cycle is as short as the others
+_LOADED_AT_ONCE = 32  # samples per cycle while the table is filled, so that the first cycle is as short as the others
 
-_BELOW = 1 - 1e-12  # so that the scaled samples' own rounding does not lead beyond the limit again
+_BELOW = 1 - 1e-12  # so that rounding of the scaled samples does not exceed the limit
 
 _BODY = """\
 IF loaded < {chunks} THEN
@@ -87,12 +87,13 @@ def multisine(
     ramp_periods: int = 1,
     note: str = "",
 ) -> str:
-    """Text of a function block that plays one period for ever, one sample each time it is called.
+    """Text of a function block that outputs one period repeatedly, one sample per call.
 
-    The period may be any (`livebode.excitation.multisine` makes one from lines, amplitudes and phases). The sample at
-    place n of every period has the same bits, and n counts calls since the program's start, also while the block is
-    silent: sample numbers that are multiples of the period are its borders. Between enable and the first border the
-    block waits; then it ramps linearly over `ramp_periods` periods, and out again from the border after enable ends.
+    Any period is possible (`livebode.excitation.multisine` creates one from lines, amplitudes and phases). The sample
+    at index n of every period has the same bits. n counts calls since the program's start, also while the output is
+    zero: sample numbers that are multiples of the period are its borders. After enable, the block waits for the next
+    border; then it ramps up linearly over `ramp_periods` periods. After the end of enable, it ramps down from the next
+    border.
 
     Parameters
     ----------
@@ -101,20 +102,20 @@ def multisine(
     rate_hz
         Calls per second.
     limit
-        What |w| never exceeds, unit of `period`: the block's input w_max where the program does not give another. A
-        scale that would break it is refused at the start; a w_max lowered later clamps, and `limited` says so.
+        Limit of |w|, unit of `period`: default of the block's input w_max. A scale that would exceed it is rejected at
+        the start; if w_max is lowered later, w is clamped, and `limited` reports it.
     name
-        Of the function block.
+        Name of the function block.
     ramp_periods
         Periods of a ramp.
     note
-        Lines for the top of the file: the seed, who made it.
+        Lines for the top of the file: the seed, the author.
 
     Raises
     ------
     UsageError
-        If the period is not one of 2 to 16384 finite samples, is silence or exceeds the limit, or Structured Text does
-        not take the name.
+        If the period does not have 2 to 16384 finite samples, is zero or exceeds the limit, or the name is not valid in
+        Structured Text.
 
     Examples
     --------
@@ -216,9 +217,9 @@ def _declarations(window: int, limit: float) -> str:
             "VAR_INPUT",
             [
                 ("enable", "BOOL", "begin at the next border of a period; end at the next border after it falls"),
-                ("stop", "BOOL", "silent at once, without a ramp"),
-                ("scale", "LREAL := 1.0", "taken over where a ramp in begins"),
-                ("w_max", f"LREAL := {real(limit)}", "what the size of w never exceeds"),
+                ("stop", "BOOL", "w = 0 at once, without a ramp"),
+                ("scale", "LREAL := 1.0", "applied when a ramp up begins"),
+                ("w_max", f"LREAL := {real(limit)}", "limit of the magnitude of w"),
             ],
         )
         + section(
@@ -227,20 +228,20 @@ def _declarations(window: int, limit: float) -> str:
                 ("w", "LREAL", "the excitation"),
                 ("sample", "ULINT", "number of this sample: calls before this one"),
                 ("steady", "BOOL", "w is exactly periodic: no ramp"),
-                ("refused", "BOOL", "this scale would break the limit; not begun"),
+                ("refused", "BOOL", "not started: this scale would exceed the limit"),
                 ("allowed", "LREAL", "the largest scale within the limit, less 1E-12 of it"),
-                ("limited", "BOOL", "w was clamped since the ramp in began"),
+                ("limited", "BOOL", "w was clamped since the ramp up began"),
             ],
         )
         + section(
             "VAR",
             [
                 ("table", array(window), "one period"),
-                ("loaded", "UDINT", "parts of the table that are there"),
-                ("index", "UDINT", "place in the period"),
-                ("level", "UDINT", "of the ramp, in samples"),
-                ("rising", "BOOL", "ramping in, or there"),
-                ("applied", "LREAL", "scale since the ramp in began"),
+                ("loaded", "UDINT", "loaded parts of the table"),
+                ("index", "UDINT", "index in the period"),
+                ("level", "UDINT", "level of the ramp, in samples"),
+                ("rising", "BOOL", "ramping up, or at full level"),
+                ("applied", "LREAL", "scale since the ramp up began"),
                 ("counted", "ULINT", "calls"),
             ],
         )

@@ -1,4 +1,4 @@
-"""Names that Structured Text takes."""
+"""Valid names in Structured Text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from livebode.core import UsageError
 
 NAME_LENGTH_MAX = 32
-"""Characters that every controller tells apart."""
+"""Length of names that every controller distinguishes."""
 
 _KEYWORDS = """
 abs abstract acos action adr and and_then any any_bit any_date any_derived any_elementary any_int any_magnitude any_num
@@ -36,7 +36,7 @@ _CONVERSION = re.compile(r"(?:[a-z]+_)?to_[a-z]+")
 
 
 def as_name(text: str, taken: Iterable[str] = ()) -> str:
-    """The nearest name to `text` that Structured Text takes, and that is none of `taken`.
+    """The nearest valid name to `text` in Structured Text that is not in `taken`.
 
     >>> as_name("2nd motor [rad/s]"), as_name("limit"), as_name("u", taken=["U"])
     ('x2nd_motor_rad_s', 'limit_1', 'u_1')
@@ -52,7 +52,7 @@ def as_name(text: str, taken: Iterable[str] = ()) -> str:
 
 
 def check_name(name: str, what: str) -> None:
-    """That Structured Text takes `name`; `what` says in the message whose name it is.
+    """Check that `name` is valid in Structured Text; `what` describes in the message whose name it is.
 
     Raises
     ------
@@ -73,14 +73,14 @@ def check_name(name: str, what: str) -> None:
 
 
 def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> None:
-    """The same for names that stand beside each other and beside `taken`, where case makes no difference."""
+    """The same for names in one scope, together with `taken`; case is ignored."""
     own = {name.lower() for name in taken}
     before: dict[str, str] = {}
     for name in names:
         check_name(name, what)
         low = name.lower()
         if low in own or low in before:
-            other = f"the same as {before[low]!r}" if low in before else "a name that the generated text needs itself"
+            other = f"the same as {before[low]!r}" if low in before else "used by the generated text"
             nearest = as_name(name, [*own, *names])
             raise UsageError(
                 "duplicate",
@@ -105,7 +105,7 @@ def _problem(name: str) -> str | None:
     if name[0].isdigit():
         return "begins with a digit, which is not allowed"
     if _NAME.fullmatch(name) is None:
-        return "has two underscores in a row, one at its end, or a digit behind one in front, which is not allowed"
+        return "has two underscores in a row, one at its end, or a digit after a leading one, which is not allowed"
     if len(name) > NAME_LENGTH_MAX:
         return f"has {len(name)} characters, more than {NAME_LENGTH_MAX},"
     return None

@@ -1,4 +1,4 @@
-"""All files of a PLC project: excitation, sliding DFT, ring, and the program that wires them."""
+"""All files of a PLC project: excitation, sliding DFT, ring, and the program that connects them."""
 
 from __future__ import annotations
 
@@ -16,42 +16,43 @@ from livebode.structured_text.text import Declared, comment, section
 
 COUNTER = "sample"
 _DECLARED: list[Declared] = [
-    ("livebode", "ST_LivebodeRing", "what livebode reads"),
+    ("livebode", "ST_LivebodeRing", "read by livebode"),
     ("fbMultisine", "FB_Multisine", ""),
     ("fbSlidingDft", "FB_SlidingDft", ""),
     ("fbRing", "FB_LivebodeRing", ""),
     ("enable", "BOOL", "excite"),
-    ("stop", "BOOL", "silence at once: wire the drive's fault to it"),
+    ("stop", "BOOL", "w = 0 at once: connect the drive's fault to it"),
     ("scale", "LREAL := 1.0", "of the excitation"),
 ]
-# What MAIN says would mean something else beside a variable of one of these names.
+# A variable with one of these names would change the meaning of MAIN.
 _OWN = ("MAIN", "F_GetSystemTime", *(word for name, of, _ in _DECLARED for word in (name, of.split()[0])))
 
 
 @dataclass(frozen=True)
 class Project:
-    """What a PLC that excites an axis, follows it and hands its samples to livebode is made of.
+    """Parts of a PLC program that excites an axis, tracks it and sends its samples to livebode.
 
     Parameters
     ----------
     period
         One period of the excitation, shape (samples,).
     limit
-        What the size of the excitation never exceeds.
+        Limit of the magnitude of the excitation.
     lines
         Bins and window of the sliding DFT, and the rate of the task.
     channels
-        Names of what is recorded, in the ring's order.
+        Names of the recorded channels, in the ring's order.
     excitation
-        Which of them the block makes; the program takes the others from the drive.
+        The channel that the block generates; the program reads the others from the drive.
     tracked
-        Those that the sliding DFT follows.
+        Channels of the sliding DFT.
     ring_length
-        Samples that the ring keeps.
+        Number of samples in the ring.
     ramp_periods
-        Periods over which the excitation is brought in and out.
+        Periods of the ramps of the excitation.
     counter
-        Name of one more channel: the excitation's sample counter, whose multiples of the window are borders of periods.
+        Name of an additional channel: the excitation's sample counter; multiples of the window are borders of
+        periods.
     note
         Lines for the top of the excitation's file.
     """
@@ -69,7 +70,7 @@ class Project:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The ring's columns: the channels, and the counter behind them unless it is one of them."""
+        """The ring's columns: the channels, and after them the counter if it is not one of them."""
         return (*self.channels, *([] if self.counter in self.channels else [self.counter]))
 
     def files(self) -> dict[str, str]:
@@ -78,8 +79,8 @@ class Project:
         Raises
         ------
         UsageError
-            As `multisine`, `sliding_dft`, `ring_type` and `ring_block` do; or where the excitation or a tracked signal
-            is no channel, or has a name that the program needs itself.
+            As `multisine`, `sliding_dft`, `ring_type` and `ring_block`; also if the excitation or a tracked signal is
+            not a channel, or has a name that the program uses.
         """
         check_signals((self.excitation, *self.tracked), self.counter)
         for name in (self.excitation, *self.tracked):
@@ -128,7 +129,7 @@ class Project:
 
 
 def check_signals(names: Iterable[str], counter: str = COUNTER) -> None:
-    """UsageError for a signal by whose name MAIN calls something of its own: the counter would go out as torque."""
+    """UsageError for a signal with a name that MAIN uses: the counter would be sent as torque."""
     check_names(list(dict.fromkeys(names)), "signal", (*_OWN, counter))
 
 

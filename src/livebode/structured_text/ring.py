@@ -23,30 +23,30 @@ END_IF
 slot := ULINT_TO_UDINT(ring.count MOD {length});
 {stores}
 ring.stamp := stamp;
-ring.count := ring.count + 1;   // only now the sample counts
+ring.count := ring.count + 1;   // last: the sample is complete
 """
 
 
 def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str = "ST_LivebodeRing") -> str:
     """Text of the structure that livebode finds by its symbol and reads in batches.
 
-    Every member lies at a multiple of its size and no gap is left, so that all ways of packing give the same bytes.
+    Every member is at a multiple of its size, without gaps, so that the layout does not depend on the packing.
 
     Parameters
     ----------
     channels
-        How many, 1 to 64.
+        Number of channels, 1 to 64.
     rate_hz
         Calls of the block per second.
     length
-        Samples that the ring keeps: livebode must come by once in that time.
+        Number of samples in the ring: livebode must read it at least once in that time.
     name
-        Of the type.
+        Name of the type.
 
     Raises
     ------
     UsageError
-        If a number is out of its range, the ring needs more than 8 MiB, or Structured Text does not take the name.
+        If a number is out of range, the ring needs more than 8 MiB, or the name is not valid in Structured Text.
     """
     check_name(name, "type")
     _check_size(channels, length)
@@ -56,15 +56,15 @@ def ring_type(channels: int, rate_hz: float, *, length: int = LENGTH, name: str 
         ("version", "UINT := 1", "4"),
         ("channels", f"UINT := {channels}", "6"),
         ("length", f"UDINT := {length}", "8, samples in the ring"),
-        ("epoch", "UDINT", "12, another one at each start; 0 for none"),
+        ("epoch", "UDINT", "12, different at each start; 0 for none"),
         ("rate_hz", f"LREAL := {real(rate_hz)}", "16"),
         ("stamp", "ULINT", "24, of the last sample: 100 ns since 1601 UTC; 0 without"),
-        ("count", "ULINT", "32, samples written; last of all"),
+        ("count", "ULINT", "32, samples written; updated last"),
         ("data", array(length, channels), "40"),
     ]
     declared = section("STRUCT", members).replace("END_VAR", "END_STRUCT")
     return (
-        comment(f"What livebode reads: {length} samples of {counted(channels, 'channel')}, {length / rate_hz:.4g} s")
+        comment(f"Read by livebode: {length} samples of {counted(channels, 'channel')}, {length / rate_hz:.4g} s")
         + f"TYPE {name} :\n{declared}END_TYPE\n"
     )
 
@@ -76,31 +76,31 @@ def ring_block(
     name: str = "FB_LivebodeRing",
     type_name: str = "ST_LivebodeRing",
 ) -> str:
-    """Text of the function block that writes a sample of each channel into the ring each time it is called.
+    """Text of the function block that writes a sample of each channel to the ring at each call.
 
-    Its epoch, by which livebode tells a restart, comes from the clock at the first call; without a clock (stamp 0) a
-    restart is told by sample numbers that go back.
+    Its epoch, from which livebode detects a restart, is derived from the clock at the first call; without a clock
+    (stamp 0) a restart is detected from sample numbers that go back.
 
     Parameters
     ----------
     channels
-        Names of the inputs in the order of the ring's columns: at most 64 that Structured Text takes.
+        Names of the inputs in the order of the ring's columns: at most 64, valid in Structured Text.
     length
-        As of the type.
+        As in the type.
     name, type_name
-        Of the function block, and of the ring's type.
+        Name of the function block, and of the ring's type.
 
     Raises
     ------
     UsageError
-        If Structured Text does not take a name, or the ring is too large.
+        If a name is not valid in Structured Text, or the ring is too large.
     """
     check_name(name, "function block")
     check_name(type_name, "type")
     _check_size(len(channels), length)
     check_names(channels, "channel", (*_OWN, name, type_name))
     return (
-        comment(f"A sample of each channel into the ring, once a cycle: {', '.join(channels)}")
+        comment(f"Writes a sample of each channel to the ring, once per cycle: {', '.join(channels)}")
         + f"FUNCTION_BLOCK {name}\n"
         + section(
             "VAR_INPUT",
@@ -122,7 +122,7 @@ def _check_size(channels: int, length: int) -> None:
         raise UsageError(
             "out-of-range",
             f"a ring of {counted(channels, 'channel')} is not one of 1 to {CHANNELS_MAX}",
-            "take several rings",
+            "use several rings",
             argument="channels",
             value=channels,
         )
@@ -130,7 +130,7 @@ def _check_size(channels: int, length: int) -> None:
         raise UsageError(
             "out-of-range",
             f"a ring of {length=} samples is too short",
-            f"take at least 2, better {LENGTH}",
+            f"use at least 2, recommended {LENGTH}",
             argument="length",
             value=length,
         )

@@ -60,7 +60,7 @@ FOR channel := 0 TO {last_channel} DO
         {re}[channel, bin] := {re}[channel, bin] + cosine[place[bin]] * difference;
         {im}[channel, bin] := {im}[channel, bin] - sine[place[bin]] * difference;
     END_FOR
-    // The sum of this period alone: a sample of its second half and its mirror image share cos and sin.
+    // The sum of this period alone: a sample of its second half and its mirror image have the same cos and sin.
     IF index >= {half} THEN
         IF index = {half} THEN
             FOR bin := 0 TO {last_bin} DO
@@ -120,29 +120,29 @@ def sliding_dft(
     name: str = "FB_SlidingDft",
     phase: Literal["fixed", "window"] = "fixed",
 ) -> str:
-    """Text of a function block that keeps the DFT of the last N samples at the lines, for channels with one index.
+    """Text of a function block that computes the DFT of the last N samples at the lines, for channels with one index.
 
-    Operation by operation what `livebode.kernel.SlidingDFT` computes in float64 (docs/kernel.md), so with the same bits
-    where the PLC rounds every product and sum to 64 bits. Called once a cycle with a sample of each channel; the
-    outputs `re` and `im` are [channel, bin]. It first fills its table, an entry a cycle, and takes samples after N
-    cycles; `count` says how many, and `valid` from the Nth on.
+    The operations are those of `livebode.kernel.SlidingDFT` in float64 (docs/kernel.md), so the results have the same
+    bits if the PLC rounds every product and sum to 64 bits. It is called once per cycle with a sample of each channel;
+    the outputs `re` and `im` are [channel, bin]. It first fills its table, one entry per cycle, and processes samples
+    after N cycles; `count` is their number, and `valid` is true from the Nth.
 
     Parameters
     ----------
     lines
         The bins, and the window N.
     channels
-        Names of the inputs: at most 16 that Structured Text takes.
+        Names of the inputs: at most 16, valid in Structured Text.
     name
-        Of the function block.
+        Name of the function block.
     phase
-        "fixed": referred to sample counts that are multiples of N; ratios between channels are the same, and it costs
-        nothing. "window": that of numpy.fft of the window, six operations more a bin, channel and sample.
+        "fixed": referred to sample counts that are multiples of N; ratios between channels are the same, without
+        extra cost. "window": that of numpy.fft of the window, with six more operations per bin, channel and sample.
 
     Raises
     ------
     UsageError
-        If Structured Text does not take a name, there is no channel or more than 16, or the window needs more than
+        If a name is not valid in Structured Text, there is no channel or more than 16, or the window needs more than
         8 MiB.
 
     Examples
@@ -155,8 +155,8 @@ def sliding_dft(
     if phase not in ("fixed", "window"):
         raise UsageError(
             "not-one-of",
-            f"{phase=} is not known",
-            "take 'fixed' or 'window'",
+            f"{phase=} is not supported",
+            "use 'fixed' or 'window'",
             argument="phase",
             value=phase,
             allowed=["fixed", "window"],
@@ -165,7 +165,7 @@ def sliding_dft(
         raise UsageError(
             "out-of-range",
             f"channels {list(channels)} are not 1 to {CHANNELS_MAX} names",
-            "take several blocks",
+            "use several blocks",
             argument="channels",
             value=list(channels),
         )
@@ -201,7 +201,7 @@ def sliding_dft(
 
 
 def _taylor(start: str, orders: range) -> str:
-    """Horner's rule from `start` on, with the reciprocal factorials of `orders` in turn subtracted and added."""
+    """Horner's rule from `start`; the reciprocal factorials of `orders` are alternately subtracted and added."""
     lines = [start]
     for i, order in enumerate(orders):
         lines.append(f"poly := poly * square {'+' if i % 2 else '-'} {real(1 / factorial(order))};")
@@ -222,7 +222,7 @@ def _outputs(channels: int, bins: int) -> list[Declared]:
         ("re", sums, "the spectra"),
         ("im", sums, ""),
         ("count", "ULINT", "samples taken"),
-        ("valid", "BOOL", "a whole window was taken"),
+        ("valid", "BOOL", "a complete window was processed"),
     ]
 
 
@@ -239,7 +239,7 @@ def _own(channels: int, bins: int, window: int, phase: str) -> list[Declared]:
         ("f_im", sums, ""),
         ("fresh", array(channels), ""),
         ("place", array(bins, of="UDINT"), "bin * index mod N"),
-        ("index", "UDINT", "place in the period"),
+        ("index", "UDINT", "index in the period"),
         ("filled", "UDINT", "entries of the table"),
         ("channel, bin, folded, octant, rest", "UDINT", ""),
         ("angle, square, poly, small_cos, small_sin", "LREAL", ""),

@@ -8,7 +8,7 @@ from math import isfinite
 from livebode.core import UsageError, counted
 
 BYTES_MAX = 8 << 20
-"""Most memory of one block or ring: what livebode reads from a PLC, and more than most PLCs leave free."""
+"""Most memory of one block or ring: limit of what livebode reads from a PLC, and more than most PLCs have free."""
 
 
 Declared = tuple[str, str, str]
@@ -16,7 +16,7 @@ Declared = tuple[str, str, str]
 
 
 def real(value: float) -> str:
-    """The number as an LREAL literal, whose digits lead back to the same bits.
+    """The number as an LREAL literal, whose digits give the same bits.
 
     >>> real(0.1), real(1e-17), real(-3)
     ('0.1', '1.0E-17', '-3.0')
@@ -26,7 +26,7 @@ def real(value: float) -> str:
 
 
 def comment(text: str) -> str:
-    """Lines of `//` in ASCII, for not every programming system knows other letters; nothing for no text."""
+    """Comment lines (`//`) in ASCII, because not every programming system accepts other letters; empty for no text."""
     lines = text.encode("ascii", "replace").decode().splitlines()
     return "".join(f"// {''.join(c if c.isprintable() else ' ' for c in line)}".rstrip() + "\n" for line in lines)
 
@@ -50,7 +50,7 @@ def array(*lengths: int, of: str = "LREAL") -> str:
 
 
 def check_rate(rate_hz: float) -> None:
-    """UsageError for what is not the rate of a task."""
+    """UsageError for an invalid rate of a task."""
     if not (isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
             "out-of-range",
@@ -62,14 +62,14 @@ def check_rate(rate_hz: float) -> None:
 
 
 def check_bytes(fixed: int, each: int, count: int, what: str) -> None:
-    """UsageError where `fixed` + `each`·`count` bytes are more than a PLC has; `what` names that which is counted."""
+    """UsageError if `fixed` + `each`·`count` bytes are more than a PLC has; `what` describes the counted object."""
     needed = fixed + each * count
     if needed > BYTES_MAX:
         most = (BYTES_MAX - fixed) // each
         raise UsageError(
             "too-large",
             f"{what} of {counted(count, 'sample')} takes {needed} bytes of the PLC, more than {BYTES_MAX}",
-            f"take at most {counted(most, 'sample')}",
+            f"use at most {counted(most, 'sample')}",
             samples=count,
             samples_max=most,
             size_bytes=needed,

@@ -1,4 +1,4 @@
-"""The files that TwinCAT 3 adds to a project as they are: .TcPOU and .TcDUT."""
+"""Files that TwinCAT 3 can add to a project directly: .TcPOU and .TcDUT."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _TYPE = re.compile(r"^TYPE (?P<name>\w+) :", re.MULTILINE)
 
 
 def twincat(text: str) -> tuple[str, str]:
-    """Name and content of the file that TwinCAT keeps a generated text in.
+    """Name and content of the TwinCAT file for a generated text.
 
     Parameters
     ----------
     text
-        One function block, program or structure, as this package writes it.
+        One function block, program or structure, in the form of this package.
 
     Examples
     --------
@@ -49,5 +49,5 @@ def _literal(text: str) -> str:
 
 
 def _identity(name: str) -> str:
-    """The same for the same name: a file that is generated anew is the same object to TwinCAT."""
+    """Equal for equal names: a file that is generated again is the same object for TwinCAT."""
     return f"{{{uuid5(NAMESPACE_URL, f'livebode/{name}')}}}"

@@ -1,4 +1,4 @@
-"""The record of a run that may be killed at any moment: a journal that is appended to, and Parquet once it is closed.
+"""The record of a run that may be killed at any time: an append-only journal, and Parquet after it is closed.
 
-Only what reads it is imported by the rest of `livebode.records`; `Store` writes, and needs a POSIX system.
+The rest of `livebode.records` imports only the reading part; `Store` writes, and needs a POSIX system.
 """

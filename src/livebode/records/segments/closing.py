@@ -1,4 +1,4 @@
-"""Closing: journals become segments in a thread of their own, so that tracking does not wait for it."""
+"""Closing: journals become segments in a separate thread, so that tracking does not wait for it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from livebode.core import LivebodeError
 from livebode.records.segments.manifest import Segment
 from livebode.records.segments.shelf import Shelf
 
-# Over all records of the process: sixteen axes that close a segment in the same second would else take every core.
+# One for all records of the process: sixteen axes that close a segment in the same second would use every core.
 _ONE_AT_A_TIME = threading.Lock()
 
 
 class Closing:
-    """Lets a Shelf keep its budget and close its journals beside what is recorded.
+    """Applies the budget of a Shelf and closes its journals while recording continues.
 
     Nothing else may use the shelf between `begin` and the `result` or `wait` that follows.
     """
@@ -28,19 +28,19 @@ class Closing:
 
     @property
     def done(self) -> bool:
-        """Whether a thread was begun, has ended, and its result was not taken."""
+        """Whether a thread has ended and its result was not read."""
         return self._thread is not None and not self._thread.is_alive()
 
     def begin(self, bytes_max: int | None) -> None:
-        """Remove the oldest segments above `bytes_max`, then turn all sealed journals; see `result`."""
+        """Remove the oldest segments above `bytes_max`, then convert all sealed journals; see `result`."""
         assert self._thread is None
         self._thread = threading.Thread(target=self._work, args=(bytes_max,), name="livebode closing")
         self._thread.start()
 
     def result(self) -> tuple[list[Segment], OSError | LivebodeError | None]:
-        """Wait for the end: the segments that were removed, and why a journal could not be turned.
+        """Wait for the end: the removed segments, and why a journal could not be converted.
 
-        It and those behind it are tried again with the next `begin`.
+        That journal and later ones are tried again at the next `begin`.
         """
         self.wait()
         gone, error = self._gone, self._error
@@ -50,7 +50,7 @@ class Closing:
         return gone, error
 
     def wait(self) -> None:
-        """Wait for the end, whatever came of it."""
+        """Wait for the end, and ignore the result."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -63,5 +63,5 @@ class Closing:
                 self._shelf.close_journals()
         except MemoryError:
             self._error = OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
-        except BaseException as error:  # it must not vanish with the thread
+        except BaseException as error:  # it must not be lost with the thread
             self._error = error

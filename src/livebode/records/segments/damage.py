@@ -1,4 +1,4 @@
-"""What damage in the files of a record costs, in numbers."""
+"""Extent of damage in the files of a record, in numbers."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Moment = tuple[int, float]
 
 @dataclass(frozen=True)
 class Damage:
-    """A damaged place in a journal, between two whole commits.
+    """A damaged place in a journal, between two intact commits.
 
     Attributes
     ----------
     size_bytes
-        Length of what is damaged.
+        Length of the damaged part.
     begin, end
-        The first sample of the span between the two commits, and the first one behind it. None where the damage is at
+        The first sample of the span between the two commits, and the first one after it. None if the damage is at
         the journal's beginning or end, so that one of the two commits is missing.
     rows
-        How many rows of each table are lost. Empty where nothing is, or where it cannot be counted.
+        Number of lost rows of each table. Empty if there are none, or if they cannot be counted.
     at_least
         Whether more may be lost than is counted.
     """
@@ -41,7 +41,7 @@ class Damage:
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Damage:
-        """From `to_json`; ValueError, TypeError or KeyError where it is not that."""
+        """From `to_json`; ValueError, TypeError or KeyError for other data."""
         begin, end = (None if (at := values[name]) is None else (int(at[0]), float(at[1])) for name in ("begin", "end"))
         rows = {str(table): int(number) for table, number in values["rows"].items()}
         return cls(int(values["size_bytes"]), begin, end, rows, values.get("at_least") is True)
@@ -53,16 +53,16 @@ class Damage:
 
     @property
     def sentence(self) -> str:
-        """What is lost.
+        """Description of the loss.
 
         >>> Damage(120, (400, 0.4), (500, 0.5), {"responses": 20}).sentence
         '20 rows of responses are lost, of samples 400 to 499 (0.1 s)'
         """
         rows = " and ".join(f"{number} rows of {table}" for table, number in self.rows.items())
         if self.begin is None:
-            return f"what {self.size_bytes} bytes at its beginning held is lost"
+            return f"its first {self.size_bytes} bytes are lost"
         if self.end is None:
-            return f"what its last {self.size_bytes} bytes held, from sample {self.begin[0]} on, is lost"
+            return f"its last {self.size_bytes} bytes are lost, from sample {self.begin[0]}"
         if not rows:
             return "nothing is lost"
         rows = "at least " * self.at_least + rows
@@ -71,7 +71,7 @@ class Damage:
 
 
 def event_of(name: str, damages: Iterable[Damage], kept_as: str | None) -> Event:
-    """One event for all damaged places of a journal; `kept_as` is where the file is retained."""
+    """One event for all damaged places of a journal; `kept_as` is the path of the retained file."""
     places = list(damages)
     lost = "; ".join(place.sentence for place in places[:_SHOWN]) + f"; and {len(places) - _SHOWN} more" * (
         len(places) > _SHOWN

@@ -1,4 +1,4 @@
-"""What is asked of the file system: bytes that are appended whole, and files that are there whole or not at all."""
+"""File system operations: append bytes completely, and write files completely or not at all."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _WORDS = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
-    errno.EIO: "the disk has a fault",
-    errno.EFBIG: "the file may grow no further",
-    errno.EROFS: "the disk can only be read",
+    errno.EIO: "the disk has an input/output error",
+    errno.EFBIG: "the file has its largest size",
+    errno.EROFS: "the disk is read-only",
 }
 
 
 def why(error: OSError | LivebodeError) -> str:
-    """What the system says of a failure, in words.
+    """Description of a system error.
 
     >>> why(OSError(errno.ENOSPC, "No space left on device"))
     'the disk is full'
@@ -32,10 +32,10 @@ def why(error: OSError | LivebodeError) -> str:
 
 
 def put_whole(path: Path, data: bytes | memoryview) -> None:
-    """A file that holds all of `data` or is as it was before, also after a power cut; OSError where it is not put."""
+    """Write a file: it has all of `data` or is unchanged, also after a power cut; OSError if it is not written."""
     partial = path.with_name(f".{path.name}.partial")
     with contextlib.suppress(FileNotFoundError):
-        os.unlink(partial)  # what a kill left; were it a link, another file would be written
+        os.unlink(partial)  # a remainder of a kill; if it were a link, another file would be written
     try:
         file = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
         try:
@@ -52,7 +52,7 @@ def put_whole(path: Path, data: bytes | memoryview) -> None:
 
 
 def sync_directory(path: Path) -> None:
-    """See that the names in a directory outlast a power cut."""
+    """Sync a directory, so that its names survive a power cut."""
     directory = os.open(path, os.O_RDONLY)
     try:
         os.fsync(directory)
@@ -61,19 +61,19 @@ def sync_directory(path: Path) -> None:
 
 
 class AppendFile:
-    """A file that grows at its end by whole pieces: what was written in part is cut off before the next piece.
+    """A file that grows by complete pieces: a partly written piece is cut off before the next one.
 
     Parameters
     ----------
     run, name
-        Its place in the directory of a run. Made where it is not there.
+        Its place in the directory of a run. Created if it is missing.
     length
-        Bytes that it is cut to, when it is longer; None keeps them all.
+        Length to which it is cut if it is longer; None: not cut.
 
     Raises
     ------
     RecordError
-        If it is a link or no regular file.
+        If it is a link or not a regular file.
     """
 
     def __init__(self, run: Path, name: str, length: int | None = None) -> None:
@@ -84,7 +84,7 @@ class AppendFile:
         self._torn = size > self.length
 
     def append(self, data: bytes) -> None:
-        """Write all of it, or raise OSError; what was written of it counts as not written."""
+        """Write all of it, or raise OSError; a partly written piece counts as not written."""
         if self._torn:
             os.ftruncate(self._file, self.length)
         self._torn = True
@@ -93,16 +93,16 @@ class AppendFile:
         self.length += len(data)
 
     def back_to(self, length: int) -> None:
-        """Give up what is beyond this length."""
+        """Cut the file to this length."""
         self._torn = True
         self.length = length
 
     def sync(self) -> None:
-        """See that what was written outlasts a power cut; OSError where that is not known."""
-        getattr(os, "fdatasync", os.fsync)(self._file)  # macOS has none
+        """Sync the file, so that its content survives a power cut; OSError if this is not certain."""
+        getattr(os, "fdatasync", os.fsync)(self._file)  # not on macOS
 
     def append_synced(self, data: bytes) -> None:
-        """Both; after an OSError neither counts as done."""
+        """Append and sync; after an OSError neither counts as done."""
         before = self.length
         try:
             self.append(data)

@@ -1,4 +1,4 @@
-"""events.jsonl: what a person should know, appended and never removed."""
+"""events.jsonl: events for people, appended and never removed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _logger = logging.getLogger(__name__)
 
 
 class EventLog:
-    """Events that wait for the disk, and those that the record itself has to say; these are logged, too.
+    """Events that wait for the disk, and events of the record itself, which are also logged.
 
     Parameters
     ----------
@@ -32,18 +32,18 @@ class EventLog:
         self._given_up = 0
 
     def add(self, event: Event) -> None:
-        """Append it with the next `write`; beyond 100,000 that wait, events are only counted."""
+        """Append it with the next `write`; above 100,000 waiting events, more are only counted."""
         if len(self._waiting) < _HELD_MAX:
             self._waiting.append(to_line(asdict(event)))
         else:
             self._given_up += 1
 
     def say(self, kind: str, sample: int, time_s: float, message: str, **details: Any) -> Event:
-        """Append an event of the record itself, and keep it for `drain`."""
+        """Append an event of the record itself, and store it for `drain`."""
         return self.say_event(Event(kind, sample, time_s, message, details))
 
     def say_event(self, event: Event) -> Event:
-        """The same with an event that is there already."""
+        """The same with an existing event."""
         level = logging.INFO if event.kind in _EXPECTED else logging.WARNING
         _logger.log(level, "%s: %s", self._run, event.message)
         self._said.append(event)
@@ -51,7 +51,7 @@ class EventLog:
         return event
 
     def drain(self) -> list[Event]:
-        """What the record itself has said since the last call."""
+        """Events of the record itself since the last call."""
         said, self._said = self._said, []
         return said
 
@@ -60,7 +60,7 @@ class EventLog:
         return given_up
 
     def write(self, file: AppendFile) -> None:
-        """Append what waits, or raise OSError and let it wait."""
+        """Append waiting events, or raise OSError; they then still wait."""
         if self._waiting:
             file.append_synced(b"".join(self._waiting))
             self._waiting.clear()

@@ -1,4 +1,4 @@
-"""Frames: how the journal keeps pieces apart, and finds the next whole piece behind a damaged one."""
+"""Frames: they separate the pieces of the journal, and allow to find the next intact piece after a damaged one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 ROWS, COMMIT, TABLE = 2, 3, 4
-"""An Arrow record batch of a table; a moment up to which the record is complete; a table's name and Arrow schema."""
+"""Kinds: an Arrow record batch of a table; a commit; a table's name and Arrow schema."""
 
 _HEADER = struct.Struct("<2sBBII")
 _CHECK = struct.Struct("<I")
@@ -18,7 +18,7 @@ _SIZE = _HEADER.size + _CHECK.size
 
 @dataclass(frozen=True)
 class Frame:
-    """A piece of the journal from byte `start` to `end`; `payload` is None where these bytes are damaged."""
+    """A piece of the journal from byte `start` to `end`; `payload` is None if these bytes are damaged."""
 
     kind: int
     table: int
@@ -41,9 +41,9 @@ def to_frame(kind: int, *payload: bytes | memoryview, table: int = 0) -> bytes:
 
 
 def frames(data: bytes) -> Iterator[Frame]:
-    """Each frame, and in its place a Frame without payload for each damaged piece, up to the end or a torn frame.
+    """Each frame, and a Frame without payload for each damaged piece, up to the end or a torn frame.
 
-    A frame whose writing was interrupted is torn: the beginning of one, at the very end. Anything else is damaged.
+    A frame whose writing was interrupted is torn: only its beginning exists, at the very end. Anything else is damaged.
     """
     view, at = memoryview(data), 0
     while at < len(view):
@@ -63,7 +63,7 @@ def frames(data: bytes) -> Iterator[Frame]:
 
 
 def _header(view: memoryview, at: int) -> tuple[int, int, int, int] | None:
-    """Kind, table, length and checksum of the frame that begins here; None where no whole header does."""
+    """Kind, table, length and checksum of the frame that begins here; None without an intact header."""
     if at + _SIZE > len(view):
         return None
     header = view[at : at + _HEADER.size]

@@ -1,4 +1,4 @@
-"""The journal: what was recorded since the last segment was closed, with the state to go on from."""
+"""The journal: everything recorded since the last segment was closed, with the state to continue from."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from livebode.records.table import Table
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
-_SPARSE_BYTES_MAX, _SPARSE_RATIO = 512 << 20, 16  # beyond them a file has holes, which no run writes
+_SPARSE_BYTES_MAX, _SPARSE_RATIO = 512 << 20, 16  # above them a file has holes, which a run never writes
 _PLACE = "sample", "time_s", "unix_s", "events_bytes"
 
 
 @dataclass(frozen=True)
 class Commit:
-    """A moment up to which the record is complete.
+    """A point up to which the record is complete.
 
     Attributes
     ----------
     sample, time_s
         Number of the next sample, which is not in the record yet, and its time in the source's clock.
     unix_s
-        When this was written, seconds since 1970.
+        Time of writing, seconds since 1970.
     events_bytes
-        Length of events.jsonl then.
+        Length of events.jsonl at that time.
     states
-        What goes on from there, as named bytes.
+        States that continue from there, as named bytes.
     rows
-        How many rows of each table were recorded since the run began.
+        Number of rows of each table recorded since the run began.
     waiting
-        Events as plain data that are not in events.jsonl yet, since they will share a line.
+        Events as plain data that are not in events.jsonl yet, because they will share a line.
     """
 
     sample: int
@@ -58,7 +58,7 @@ class Commit:
 
     @property
     def position(self) -> tuple[int, int]:
-        """What grows from one commit to the next."""
+        """Quantities that grow from one commit to the next."""
         return self.sample, self.events_bytes
 
     def to_frame(self) -> bytes:
@@ -68,15 +68,15 @@ class Commit:
 
     @classmethod
     def of(cls, payload: memoryview) -> Commit:
-        """The commit in this frame; ValueError, TypeError or KeyError where a run does not write such a one."""
+        """The commit in this frame; ValueError, TypeError or KeyError if a run cannot have written it."""
         at = _LENGTH.size + _LENGTH.unpack_from(payload)[0]
         head = json.loads(bytes(payload[_LENGTH.size : at]))
         whole = [head["sample"], head["events_bytes"], *head.get("rows", {}).values()]
         if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
-            raise ValueError("a commit that a run does not write")
+            raise ValueError("the commit is invalid")
         waiting = head.pop("waiting", [])
         if not isinstance(waiting, list):
-            raise ValueError("events that a run does not write")
+            raise ValueError("the events are invalid")
         states = {}
         for name, length in head.pop("states").items():
             states[name] = bytes(payload[at : at + length])
@@ -86,7 +86,7 @@ class Commit:
 
 @dataclass
 class Journal:
-    """What a journal holds up to its last commit; nothing and no commit where there is none.
+    """Content of a journal up to its last commit; empty and without commit if there is none.
 
     Attributes
     ----------
@@ -95,9 +95,9 @@ class Journal:
     first, commit
         The first and the last one; the journal counts up to the end of the last.
     length
-        Bytes up to there; what is behind them was being written when it ended.
+        Bytes up to there; later bytes were being written when the run ended.
     damages
-        Places in which it is damaged.
+        Damaged places.
     """
 
     rows: dict[str, list[pa.RecordBatch]] = field(default_factory=dict)
@@ -118,15 +118,15 @@ class Journal:
         run
             Directory of the run.
         number
-            Of the journal.
+            Number of the journal.
         after
-            Called where the end is damaged: the commit with which the next journal begins, if there is one. It tells
-            what the damaged end held.
+            Called if the end is damaged: returns the commit with which the next journal begins, if there is one. It
+            shows what the damaged end contained.
 
         Raises
         ------
         RecordError
-            If its frames are whole, and what they hold is not what a run writes.
+            If its frames are intact, but their content is not from a run.
         OSError
             If it cannot be read.
         """
@@ -136,7 +136,7 @@ class Journal:
         except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
             raise RecordError(
                 "unexpected-content",
-                f"{str(run / name_of(number))!r} does not hold what a run writes",
+                f"{str(run / name_of(number))!r} has invalid content",
                 "move it away",
                 path=str(run / name_of(number)),
             ) from None
@@ -145,7 +145,7 @@ class Journal:
         tables: dict[int, tuple[str, pa.Schema]] = {}
         for frame in found:
             if frame.payload is None or (frame.kind == ROWS and frame.table not in tables):
-                # Behind a damaged commit are only rows of one that was still being written.
+                # After a damaged commit there are only rows of one that was still being written.
                 first = not self._broken_bytes
                 self._broken_bytes += frame.end - frame.start
                 if first and frame.kind == COMMIT:
@@ -193,9 +193,9 @@ class Journal:
         self._broken_bytes = 0
 
     def _end_damaged(self, since: Commit) -> Damage:
-        """What is lost behind the last whole commit: the rows that are whole there, and what the damaged bytes held.
+        """What is lost after the last intact commit: intact rows, and the content of the damaged bytes.
 
-        Where only the commit is damaged, these are all.
+        If only the commit is damaged, the intact rows are all.
         """
         known = self._behind if self._counted is None else self._counted
         begin = since.sample, since.time_s
@@ -211,9 +211,9 @@ class Journal:
 
 
 def _whole(run: Path, name: str) -> bytes:
-    """All of a journal, which grows without a bound while no segment can be closed; RecordError for one with holes.
+    """Content of a journal, whose size has no limit while no segment can be closed; RecordError for one with holes.
 
-    What is read is at most in proportion to what the disk holds: a journal may come from anybody.
+    Memory is at most proportional to the bytes on the disk, because a journal is untrusted data.
     """
     with open_read(run, name) as file:
         about = os.fstat(file.fileno())
@@ -221,8 +221,8 @@ def _whole(run: Path, name: str) -> bytes:
         if about.st_size > max(_SPARSE_BYTES_MAX, _SPARSE_RATIO * held_bytes):
             raise RecordError(
                 "too-large",
-                f"{str(run / name)!r} is {about.st_size} bytes long, of which the disk holds {held_bytes}; a run does "
-                "not write that",
+                f"{str(run / name)!r} is {about.st_size} bytes long, but only {held_bytes} are on the disk; a run "
+                "does not write that",
                 "move it away",
                 path=str(run / name),
                 size_bytes=about.st_size,
@@ -236,9 +236,9 @@ def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:
 
 
 def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
-    """How a journal begins: the names and schemas of its tables, and the commit from which it goes on.
+    """Beginning of a journal: the names and schemas of its tables, and the commit from which it continues.
 
-    Twice, since nothing behind a damaged schema could be read.
+    It is written twice, because nothing after a damaged schema could be read.
     """
     schemas = [
         to_frame(TABLE, name.encode() + b"\0", table.schema.serialize().to_pybytes(), table=number)
@@ -248,7 +248,7 @@ def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
 
 
 def read_sealed(run: Path, number: int) -> Journal:
-    """A complete journal; where its end is damaged, the next one tells what it held."""
+    """A complete journal; if its end is damaged, the next one shows what it contained."""
 
     def after() -> Commit | None:
         return Journal.read(run, number + 1).first if number + 1 in numbers(run) else None
@@ -257,7 +257,7 @@ def read_sealed(run: Path, number: int) -> Journal:
 
 
 def set_aside(run: Path, number: int) -> None:
-    """Retain a damaged journal outside of the folder in which journals are looked for."""
+    """Move a damaged journal out of the folder of journals."""
     check_folder(run, set_aside_name(number))
     with contextlib.suppress(FileExistsError):
         os.mkdir(run / ASIDE)
@@ -266,7 +266,7 @@ def set_aside(run: Path, number: int) -> None:
 
 
 def name_of(number: int) -> str:
-    """Of a journal, in the run's directory."""
+    """Path of a journal in the run's directory."""
     return f"{FOLDER}/{number:06d}.journal"
 
 
@@ -275,7 +275,7 @@ def set_aside_name(number: int) -> str:
 
 
 def numbers(run: Path) -> list[int]:
-    """Of the journals that are there, ascending."""
+    """Numbers of the existing journals, ascending."""
     check_folder(run, name_of(1))
     names = {path.name for path in (run / FOLDER).glob("*.journal") if path.stem.isdecimal() and path.stem.isascii()}
     found = sorted(int(name.removesuffix(".journal")) for name in names if len(name) < 20)

@@ -1,4 +1,4 @@
-"""Lines of JSON that each carry their own checksum: any tool reads them, and we know a damaged one."""
+"""Lines of JSON, each with its own checksum: any tool can read them, and damaged ones are detected."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _END = re.compile(rb', "crc32": "[0-9a-f]{8}"\}')
 
 
 def to_line(value: dict[str, Any]) -> bytes:
-    """The object on one line, with the CRC-32 of its text without that key as its last one.
+    """The object on one line; its last key is the CRC-32 of the text without that key.
 
     >>> to_line({"kind": "gap"})
     b'{"kind": "gap", "crc32": "edb2896b"}\\n'
@@ -25,7 +25,7 @@ def to_line(value: dict[str, Any]) -> bytes:
 
 
 def from_line(line: bytes) -> dict[str, Any]:
-    """The object again, without its checksum; ValueError where it is damaged. A line without a checksum is taken.
+    """The object without its checksum; ValueError if it is damaged. A line without a checksum is accepted.
 
     >>> from_line(b'{"kind": "gap", "crc32": "edb2896b"}')
     {'kind': 'gap'}
@@ -50,9 +50,9 @@ def from_line(line: bytes) -> dict[str, Any]:
 
 
 def in_line(line: bytes) -> Iterator[dict[str, Any] | bytes]:
-    """What a line holds: one object; of a damaged one the objects that are whole, and the damaged bytes between them.
+    """Content of a line: one object; for a damaged line the intact objects, and the damaged bytes between them.
 
-    Two objects share a line where the line end between them is damaged.
+    Two objects share a line if the line end between them is damaged.
 
     >>> list(in_line(b'{"kind": "gap", "crc32": "edb2896b"}*{"kind": "gap", "crc32": "edb2896b"}'))
     [{'kind': 'gap'}, b'*', {'kind': 'gap'}]
@@ -68,7 +68,7 @@ def in_line(line: bytes) -> Iterator[dict[str, Any] | bytes]:
 
 
 def _pieces(piece: bytes) -> Iterator[dict[str, Any] | bytes]:
-    for skipped in (0, 1):  # 1: behind what was the end of a line
+    for skipped in (0, 1):  # 1: after a damaged line end
         try:
             found = from_line(piece[skipped:])
         except ValueError:

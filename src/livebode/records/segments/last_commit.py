@@ -9,6 +9,6 @@ from livebode.records.segments.journal import Commit, Journal
 
 
 def last_commit(run: Path) -> Commit | None:
-    """What an unfinished run in this directory is continued from, as `recover` chooses it; None where there is none."""
+    """Commit from which an unfinished run in this directory is continued, as in `recover`; None if there is none."""
     newest = [Journal.read(run, number).commit for number in journal.numbers(run)[-2:]]
     return max((commit for commit in newest if commit is not None), key=lambda commit: commit.position, default=None)

@@ -1,27 +1,27 @@
-"""How a record in segments is cut, and what it may use."""
+"""Sizes and disk budget of a record in segments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 JOURNALS = 3
-"""What stands beside closed segments, each of a journal's size: one that is turned, what becomes of it, the next."""
+"""Files next to closed segments, each of a journal's size: the converted journal, its segments, the next journal."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How a record is cut.
+    """Sizes of a record in segments.
 
     Attributes
     ----------
     interval_samples, interval_s
-        A commit is due when either has gone by since the last one; every `interval_s` one is synced to the disk.
+        A commit is due when either has passed since the last one; every `interval_s` one is synced to the disk.
     segment_samples
         A segment is closed after so many samples, or when the journal has `journal_bytes`.
     budget_bytes
-        What the record may use, but for events, which are never removed; None for no bound.
+        Disk budget of the record without events, which are never removed; None for no limit.
     held_bytes
-        Rows that are kept in memory while the disk takes none; above it they are given up and counted.
+        Rows that wait in memory while the disk accepts none; above this they are dropped and counted.
     """
 
     interval_samples: int
@@ -33,5 +33,5 @@ class Limits:
 
     @property
     def journal_bytes_max(self) -> int:
-        """An eighth of the budget at most, so that journals and what becomes of them stand side by side within it."""
+        """At most an eighth of the budget, so that journals and their segments fit in it at the same time."""
         return self.journal_bytes if self.budget_bytes is None else min(self.journal_bytes, self.budget_bytes // 8)

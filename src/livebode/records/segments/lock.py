@@ -1,4 +1,4 @@
-"""One process at a time records in a directory."""
+"""Lock: only one process at a time records in a directory."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from livebode.core import RecordError
 
 
 class Lock:
-    """Holds a directory until it is released or the process ends, however it ends.
+    """Locks a directory until it is released or the process ends in any way.
 
     Raises
     ------
     RecordError
-        If another process holds it.
+        If another process has locked it.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -27,7 +27,7 @@ class Lock:
             raise RecordError(
                 "locked",
                 f"another process records in {str(directory)!r}",
-                "end it first, or choose another path",
+                "stop it first, or choose another path",
                 path=str(directory),
             ) from None
 

@@ -1,4 +1,4 @@
-"""manifest.jsonl: which closed segments there are, which journals they came from, and which were removed."""
+"""manifest.jsonl: the closed segments, the journals that they are from, and the removed segments."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Segment:
 
     @classmethod
     def of(cls, number: int, values: Mapping[str, Any]) -> Segment:
-        """The segment that a line names; ValueError where a run does not write such a one."""
+        """The segment in a line; ValueError if a run cannot have written it."""
         found = cls(**values)
         numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
         sound = (
@@ -53,7 +53,7 @@ class Segment:
             and _SHA256.fullmatch(found.sha256)
         )
         if not sound or found.rows < 1 or found.size_bytes < 1:
-            raise ValueError("a segment that a run does not write")
+            raise ValueError("the segment is invalid")
         return found
 
 
@@ -71,24 +71,24 @@ class Retained:
 
     @classmethod
     def of_journal(cls, run: Path, number: int, read: Journal) -> Retained | None:
-        """None where it is whole."""
+        """None if it is intact."""
         if not read.damages:
             return None
         return cls(number, (run / journal.name_of(number)).stat().st_size, tuple(read.damages))
 
     @property
     def event(self) -> Event:
-        """What is to be said of it."""
+        """The event that reports it."""
         return event_of(journal.name_of(self.number), self.damages, journal.set_aside_name(self.number))
 
 
 @dataclass
 class Manifest:
-    """What manifest.jsonl says.
+    """Content of manifest.jsonl.
 
-    `segments` are those that are recorded, by age, `gone` those that made room, `closed` the numbers of the journals
-    that they came from, `retained` the damaged ones among them. `length` is that of its complete lines, `torn` what is
-    behind them, and `broken` the damaged lines, by the number of the line.
+    `segments` are the recorded ones, by age, `gone` those removed for the budget, `closed` the numbers of the journals
+    that they are from, `retained` the damaged journals. `length` is that of its complete lines, `torn` the bytes after
+    them, and `broken` the numbers of the damaged lines.
     """
 
     segments: list[Segment] = field(default_factory=list)
@@ -102,12 +102,12 @@ class Manifest:
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
-        """All lines that are whole; OSError where there is no file."""
+        """All intact lines; OSError if there is no file."""
         data = read_bytes(run, NAME)
         length = data.rfind(b"\n") + 1
         found, before = cls(length=length, torn=data[length:]), b""
         for number, line in enumerate(data.splitlines(keepends=True), 1):
-            if line != before:  # each is there twice
+            if line != before:  # each is written twice
                 found._take(line, number)
             before = line
         found.gone = [segment for segment in found.segments if segment.name in found._removed]
@@ -140,14 +140,14 @@ class Manifest:
 
     @property
     def missing(self) -> list[tuple[int, int]]:
-        """First and last numbers of closed journals whose line is damaged, so that what it names is not known."""
+        """First and last numbers of closed journals whose line is damaged, so that their segments are not known."""
         known = [0, *sorted(self.closed)] if self.broken else []
         return [(a + 1, b - 1) for a, b in pairwise(known) if b > a + 1]
 
     def check(self, run: Path, journals: Sequence[int]) -> None:
-        """RecordError where lines are missing that were written once: what they name would be forgotten.
+        """RecordError if lines are missing that were written: their segments would be lost.
 
-        `journals` are the numbers of those that are there.
+        `journals` are the numbers of the existing ones.
         """
         if not self.broken and min(journals, default=0) > max(self.closed, default=0) + 1:
             raise RecordError(
@@ -160,12 +160,12 @@ class Manifest:
 
 
 def name_of(table: str, number: int) -> str:
-    """The file of a table's rows from a journal, in the run's directory."""
+    """Path of the file of a table's rows from a journal, in the run's directory."""
     return f"{table}/{number:06d}.parquet"
 
 
 def closing_line(number: int, segments: Iterable[Segment], retained: Retained | None) -> bytes:
-    """A journal's rows are in these segments from now on; twice, since nothing else names them."""
+    """Line: a journal's rows are now in these segments; written twice, because it is the only reference to them."""
     line: dict[str, Any] = {"closed": number, "segments": [asdict(segment) for segment in segments]}
     if retained is not None:
         places = [place.to_json() for place in retained.damages]
@@ -174,6 +174,6 @@ def closing_line(number: int, segments: Iterable[Segment], retained: Retained | 
 
 
 def removal_line(segments: Iterable[Segment]) -> bytes:
-    """These segments were removed to keep the disk budget; twice as well."""
+    """Line: these segments were removed to meet the disk budget; also written twice."""
     gone = list(segments)
     return to_line({"removed": [s.name for s in gone], "size_bytes": sum(s.size_bytes for s in gone)}) * 2

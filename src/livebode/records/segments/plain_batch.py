@@ -1,4 +1,4 @@
-"""Record batches of a journal, refused where they hold more than their bytes: a journal may come from anybody."""
+"""Record batches of a journal; rejected if they expand to more than their bytes: a journal is untrusted data."""
 
 from __future__ import annotations
 
@@ -10,20 +10,19 @@ _HEADER, _COMPRESSION = 2, 3  # fields of Message and RecordBatch in Arrow's Mes
 
 
 def check_schema(schema: pa.Schema) -> None:
-    """ValueError where a column is of a type that a run does not write, such as one that stores a value once for all
-    rows."""
+    """ValueError if a column has a type that a run does not write, such as one with a single value for all rows."""
     for field in schema:
         if field.type not in (pa.int64(), pa.float64(), pa.bool_(), pa.string()):
             raise ValueError(f"column {field.name!r} is of type {field.type}")
 
 
 def plain_batch(payload: memoryview, schema: pa.Schema) -> pa.RecordBatch:
-    """The rows in these bytes; they stay where they are.
+    """The rows in these bytes, without a copy.
 
     Raises
     ------
     ValueError
-        Where they are compressed, or several columns name the same bytes: they could expand to any size.
+        If they are compressed, or several columns refer to the same bytes: they could expand to any size.
     """
     message = pa.ipc.read_message(pa.py_buffer(payload))
     about = bytes(message.metadata)
@@ -32,12 +31,12 @@ def plain_batch(payload: memoryview, schema: pa.Schema) -> pa.RecordBatch:
         raise ValueError("compressed rows")
     batch = pa.ipc.read_record_batch(message, schema)
     if batch.nbytes > len(payload):
-        raise ValueError(f"{len(payload)} bytes that hold {batch.nbytes}")
+        raise ValueError(f"{len(payload)} bytes expand to {batch.nbytes}")
     return batch
 
 
 def _field(data: bytes, table: int, number: int) -> int | None:
-    """Where a field of a FlatBuffers table is; None where it is absent."""
+    """Position of a field of a FlatBuffers table; None if it is absent."""
     layout = table - struct.unpack_from("<i", data, table)[0]
     entry = 4 + 2 * number
     if entry >= struct.unpack_from("<H", data, layout)[0]:

@@ -1,4 +1,4 @@
-"""Reading a record in segments, also while it is being written. What is damaged is reported, and the rest is read."""
+"""Read a record in segments, also while it is being written. Damage is reported, and everything else is read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Tell = Callable[[Event], None]
 
 
 def in_segments(run: Path) -> bool:
-    """Whether this run is kept in segments."""
+    """Whether this run is recorded in segments."""
     return is_folder(run / journal.FOLDER)
 
 
@@ -31,9 +31,9 @@ Rows = dict[str, list[pa.RecordBatch]]
 
 
 def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
-    """Closed segments of all tables, by age, and the rows of each behind them that are still in a journal."""
-    # The newest first: what is before a journal that is there is complete. And before the manifest: a journal that is
-    # closed in between is then in both, and not in neither.
+    """Closed segments of all tables, by age, and later rows of each that are still in a journal."""
+    # The newest first: everything before an existing journal is complete. And before the manifest: a journal that is
+    # closed in between is then in both instead of in neither.
     journals: dict[int, Journal] = {}
     for number in reversed(journal.numbers(run)):
         following = journals.get(number + 1)
@@ -53,7 +53,7 @@ def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows
 
 
 def waiting_events(run: Path) -> list[Any]:
-    """Events of an unfinished run, as plain data, that its newest commit holds since they are in no line yet."""
+    """Events of an unfinished run, as plain data, that are in its newest commit because they are in no line yet."""
     try:
         commit = last_commit(run)
     except (RecordError, OSError):  # `parts` reports it
@@ -71,12 +71,12 @@ def tables(
     finished: bool,
 ) -> Iterator[pa.Table]:
     """The rows in order, part by part; with `size_bytes_max` only the newest that fit in it, with `span_s` without the
-    segments outside of that time. A damaged segment is reported and left out.
+    segments outside of that time. A damaged segment is reported and skipped.
 
     Raises
     ------
     RecordError
-        If the record holds what a run does not write.
+        If the content of the record is not from a run.
     OSError
         If something cannot be read.
     """
@@ -90,12 +90,12 @@ def tables(
 
 
 def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table]:
-    """The rows of segments, small ones together: what is done with each part costs more than its rows."""
+    """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
     held: list[pa.Table] = []
     for segment in segments:
         if (file := whole(run, segment, tell)) is None:
             continue
-        # Without Arrow's threads, which a short process may not outlive in peace.
+        # Without Arrow's threads, which can fail at the end of a short process.
         held.append(file.read(use_threads=False))
         if sum(table.num_rows for table in held) >= _ROWS:
             yield pa.concat_tables(held)
@@ -105,13 +105,13 @@ def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table
 
 
 def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
-    """The file of a segment; None where it is damaged, which is reported, or was removed to keep the budget."""
+    """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
     try:
         return open_segment(run, segment)
     except FileNotFoundError:
         if segment not in Manifest.read(run).segments:
-            return None  # it was removed since we looked
-        why = "it is gone"
+            return None  # it was removed in the meantime
+        why = "the file is missing"
     except RecordError as error:
         why = error.message
     except OSError as error:
@@ -136,7 +136,7 @@ def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:
 def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Journal:
     try:
         return Journal.read(run, number, lambda: None if following is None else following.first)
-    except FileNotFoundError:  # it was closed since we looked
+    except FileNotFoundError:  # it was closed in the meantime
         return Journal()
     except RecordError as error:
         tell(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
@@ -148,5 +148,5 @@ def _tell_of(found: Manifest, finished: bool, tell: Tell) -> None:
         return
     lines = ", ".join(map(str, found.broken)) or "the last"
     lost = ", ".join(f"{first} to {last}" for first, last in found.missing)
-    what = f"the segments of journals {lost} are not read" if lost else "each is there twice, so that nothing is lost"
+    what = f"the segments of journals {lost} are not read" if lost else "each line is written twice, so nothing is lost"
     tell(Event(KIND, 0, 0.0, f"{NAME} is damaged in line {lines}; {what}", {"file": NAME, "lines": found.broken}))

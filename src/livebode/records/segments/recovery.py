@@ -1,4 +1,4 @@
-"""Where an unfinished run is gone on with: the last commit that is whole, and everything before it."""
+"""Where an unfinished run continues: the last intact commit, and everything before it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ EVENTS = "events.jsonl"
 
 @dataclass(frozen=True)
 class Found:
-    """What a run left.
+    """State of an unfinished run.
 
-    `commit` is the last one that is whole. The run goes on in journal `number`, up to `length`; where that is None, in
-    a new one. `sealed` are the numbers of those to be closed, complete or damaged; `torn_bytes` were being written,
-    behind the commit, when the run ended.
+    `commit` is the last intact one. The run continues in journal `number` after `length`; if that is None, in a new
+    journal. `sealed` are the numbers of the journals to be closed, complete or damaged; `torn_bytes`, after the commit,
+    were being written when the run ended.
     """
 
     manifest: Manifest
@@ -35,12 +35,12 @@ class Found:
 
 
 def recover(run: Path) -> Found | None:
-    """What to go on from; None where no run was begun in this directory.
+    """State to continue from; None if no run was begun in this directory.
 
     Raises
     ------
     RecordError
-        If it holds something else, or a run that is finished, or one that has no whole commit.
+        If it contains something else, or a finished run, or one without an intact commit.
     OSError
         If it cannot be read.
     """
@@ -67,7 +67,7 @@ def recover(run: Path) -> Found | None:
         if read.commit is None or (before is not None and before.position > read.commit.position):
             if read.damages:
                 damaged.insert(0, number)
-            else:  # It was begun, but what came after went to the one before it.
+            else:  # It was begun, but later data went to the previous journal.
                 os.unlink(run / journal.name_of(number))
             continue
         torn = (run / journal.name_of(number)).stat().st_size - read.length
@@ -78,19 +78,19 @@ def recover(run: Path) -> Found | None:
         return Found(found, number, read.length, read.commit, left, torn)
     raise RecordError(
         "not-continuable",
-        f"the run in {str(run)!r} has no whole journal left to continue from",
+        f"the run in {str(run)!r} has no intact journal to continue from",
         "choose another path",
         path=str(run),
     )
 
 
 def _clear(run: Path) -> None:
-    """Take away what a run left that was killed while it was begun; RecordError where anything else is there."""
+    """Remove the files of a run that was killed at its beginning; RecordError if there are any others."""
     ours = {manifest.NAME, EVENTS, journal.FOLDER, f".{RUN}.partial"}
     if strange := sorted({path.name for path in run.iterdir()} - ours) or foreign(run):
         raise RecordError(
             "foreign-files",
-            f"{str(run)!r} holds {strange[0]!r} and no run",
+            f"{str(run)!r} contains {strange[0]!r} and no run",
             "choose another path",
             path=str(run),
             files=strange,

@@ -1,4 +1,4 @@
-"""The Parquet file of a closed segment: what the manifest says, or damaged."""
+"""The Parquet file of a closed segment: it matches the manifest, or is damaged."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _verified: set[tuple[object, ...]] = set()
 
 
 def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
-    """The file, read. Its checksum is computed once in a process, as long as the file is not touched.
+    """Read the file. Its checksum is computed once per process, as long as the file is unchanged.
 
     Raises
     ------
     RecordError
-        If it is not what the manifest says, or holds more than a segment does.
+        If it does not match the manifest, or contains more than a segment can.
     OSError
         If it cannot be read.
     """
@@ -33,7 +33,7 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
         if status.st_size != segment.size_bytes:
             raise RecordError(
                 "damaged",
-                f"it has {status.st_size} bytes, where the manifest says {segment.size_bytes}",
+                f"it has {status.st_size} bytes, but the manifest states {segment.size_bytes}",
                 "restore it from a backup",
                 path=str(run / segment.name),
                 size_bytes=status.st_size,
@@ -44,7 +44,7 @@ def open_segment(run: Path, segment: Segment) -> pq.ParquetFile:
         if len(data) != segment.size_bytes or hashlib.sha256(data).hexdigest() != segment.sha256:
             raise RecordError(
                 "damaged",
-                "its checksum is not that of the manifest",
+                "its checksum differs from the manifest",
                 "restore it from a backup",
                 path=str(run / segment.name),
             )
@@ -65,7 +65,7 @@ def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
     if about.num_rows != segment.rows:
         raise RecordError(
             "damaged",
-            f"it has {about.num_rows} rows, where the manifest says {segment.rows}",
+            f"it has {about.num_rows} rows, but the manifest states {segment.rows}",
             "restore it from a backup",
             path=segment.name,
             rows=about.num_rows,
@@ -74,7 +74,7 @@ def _check_size(about: pq.FileMetaData, segment: Segment) -> None:
     if max(about.num_rows * about.num_columns, size_bytes // 8) > _VALUES_MAX:
         raise RecordError(
             "too-large",
-            f"its {about.num_rows} rows are more than a segment holds",
+            f"its {about.num_rows} rows are more than a segment can have",
             "move it away",
             path=segment.name,
             rows=about.num_rows,

@@ -1,4 +1,4 @@
-"""The closed segments of a run: journals become Parquet, and the oldest segments leave when the budget is used up."""
+"""The closed segments of a run: journals become Parquet, and the oldest segments are removed above the budget."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _logger = logging.getLogger(__name__)
 
 
 class Shelf:
-    """Closes journals and keeps the budget.
+    """Closes journals and applies the budget.
 
-    What the manifest says counts: a segment is written before its line, a journal removed after it, and a segment
-    removed after the line that says so, so that a kill between two steps leaves only files that nobody counts.
+    The manifest is authoritative: a segment is written before its line, a journal is removed after it, and a segment is
+    removed after the line on its removal. A kill between two steps leaves only files without an entry.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Shelf:
 
     @property
     def used_bytes(self) -> int:
-        """Of the manifest, the segments that are recorded and the damaged journals that are retained."""
+        """The recorded segments and retained damaged journals of the manifest."""
         sizes = [one.size_bytes for one in self._segments] + [one.size_bytes for one in self._retained]
         return self._file.length + sum(sizes)
 
@@ -62,22 +62,22 @@ class Shelf:
 
     @property
     def sealed(self) -> list[int]:
-        """Numbers of the journals that are still to be closed."""
+        """Numbers of the journals that are not closed yet."""
         return list(self._sealed)
 
     def seal(self, number: int) -> None:
-        """This journal is complete; another one goes on."""
+        """This journal is complete; another one continues."""
         self._sealed.append(number)
 
     def close_journals(self) -> None:
-        """Turn the sealed journals into segments; OSError leaves those that are not turned as they were."""
+        """Convert the sealed journals to segments; after an OSError the others are unchanged."""
         self.discard()
         while self._sealed:
             self._turn(self._sealed[0])
             del self._sealed[0]
 
     def make_room(self, bytes_max: int) -> list[Segment]:
-        """Remove the oldest segments until no more than this is used: of samples first, then of all others alike."""
+        """Remove the oldest segments until at most this is used: first those of samples, then all others equally."""
         gone: list[Segment] = []
         excess = self.used_bytes - bytes_max
         order = sorted(self._segments, key=lambda segment: segment.table != FIRST_TO_GO)
@@ -93,7 +93,7 @@ class Shelf:
         return gone
 
     def discard(self, *names: str) -> None:
-        """Remove files that nobody counts; those that cannot be removed now are tried again the next time."""
+        """Remove files without an entry; those that cannot be removed now are tried again next time."""
         self._unwanted = [name for name in (*self._unwanted, *names) if not _removed(self._run, name)]
 
     def close(self) -> None:
@@ -112,7 +112,7 @@ class Shelf:
             self.discard(journal.name_of(number))
         else:
             self._retained.append(retained)
-            with contextlib.suppress(OSError):  # then it is done when the run is continued
+            with contextlib.suppress(OSError):  # it is then done when the run is continued
                 journal.set_aside(self._run, number)
 
     def _put(self, number: int, table: str, rows: pa.Table) -> Segment:
@@ -140,9 +140,9 @@ class Shelf:
 
 
 def sweep(run: Path, found: Manifest) -> None:
-    """Remove what a kill left between two steps: segments that the manifest says are removed, and closed journals.
+    """Remove what a kill left between two steps: segments with a line on their removal, and closed journals.
 
-    What else a kill leaves is written again under the same name.
+    Other remainders of a kill are written again with the same name.
     """
     for segment in found.gone:
         _removed(run, segment.name)

@@ -35,32 +35,33 @@ _logger = logging.getLogger(__name__)
 
 
 class Store:
-    """The record of one run, written by one process; see docs/run-directory.md for what it leaves.
+    """The record of one run, written by one process; see docs/run-directory.md for its files.
 
-    Use it as a context manager. Rows and events are kept until `commit` writes them together with the state to go on
-    from. Leaving it writes nothing more, whatever the reason; `finish` does.
+    Use it as a context manager. Rows and events wait until `commit` writes them together with the state to continue
+    from. Leaving the context writes nothing more, for any reason; `finish` does.
 
-    A disk that takes nothing pauses the record and never raises: `commit` tries again each time, and Events say when it
-    paused, when it went on, and what was lost.
+    A disk error pauses the record and raises nothing: `commit` tries again each time, and Events report the pause, its
+    end, and what was lost.
 
     Parameters
     ----------
     path
-        Directory of the run; made where it is not there.
+        Directory of the run; created if it is missing.
     tables
         Tables by name.
     limits
-        How it is cut.
+        Sizes and budget.
 
     Attributes
     ----------
     last
-        The commit to go on from; None in a new directory, which `begin` makes a run.
+        The commit to continue from; None in a new directory, in which `begin` starts a run.
 
     Raises
     ------
     RecordError
-        On entering: if another process records there, something else is there, or the run is finished or damaged.
+        On entering: if another process records there, the directory has other content, or the run is finished or
+        damaged.
     """
 
     def __init__(self, path: Path, tables: Mapping[str, Table], limits: Limits) -> None:
@@ -70,7 +71,7 @@ class Store:
         self._waiting = Waiting(tuple(self._tables))
         self._log = EventLog(path)
         self._pause: Event | None = None
-        self._attempts = 0  # to close a segment that failed since the last one that was closed
+        self._attempts = 0  # failed attempts to close a segment since the last closed one
         self._committed_s = self._synced_s = 0.0
         self._syncing = Syncing()
 
@@ -89,7 +90,7 @@ class Store:
         self._files.close()
 
     def begin(self, summary: dict[str, Any], sample: int, time_s: float, states: Mapping[str, bytes]) -> None:
-        """Make the directory a run, with this run.json, that begins at this sample; RecordError if the disk refuses."""
+        """Start a run in the directory, with this run.json, at this sample; RecordError after a disk error."""
         commit = Commit(sample, time_s, time.time(), 0, dict(states))
         with _refusing(self.path, "cannot be recorded in"):
             os.mkdir(self.path / journal.FOLDER)
@@ -102,7 +103,7 @@ class Store:
         _logger.info("%s: the record begins at sample %d", self.path, sample)
 
     def renew(self, summary: dict[str, Any]) -> None:
-        """Write run.json as of a run that is recorded again: what its end found is of the time before."""
+        """Write run.json for a run that continues: the results at its end were previous ones."""
         with _refusing(self.path, "cannot be recorded in"):
             self._write_summary(summary, finished=False)
 
@@ -115,20 +116,20 @@ class Store:
         self._log.add(event)
 
     def drain_events(self) -> list[Event]:
-        """What the record itself has to say since the last call; it is written already, or will be."""
+        """Events of the record itself since the last call; they are written already, or will be."""
         return self._log.drain()
 
     def due(self, sample: int) -> bool:
-        """Whether it is time for a commit, when the next sample has this number."""
+        """Whether a commit is due when the next sample has this number."""
         assert self.last is not None
         long = time.monotonic() - self._committed_s >= self.limits.interval_s
         return long or sample - self._committed >= self.limits.interval_samples
 
     def commit(self, sample: int, time_s: float, states: Mapping[str, bytes], waiting: Sequence[Event] = ()) -> bool:
-        """Make everything up to before this sample part of the record, with the states that go on from there.
+        """Record everything before this sample, with the states that continue from there.
 
-        Events that are `waiting` for a line of their own are in the record until the next commit. Returns whether the
-        disk took it.
+        Events that are `waiting` for a line in events.jsonl are in the record until the next commit. Returns whether
+        the commit was written.
         """
         self._committed_s, self._committed = time.monotonic(), sample
         self._waiting.gather()
@@ -152,7 +153,7 @@ class Store:
             return False
         self._go_on_after_pause(sample, time_s)
         if full:
-            # Where there is no room for it, the journal grows on and this is tried again at the next commit.
+            # Without space for it, the journal continues to grow, and this is tried again at the next commit.
             try:
                 self._close_segment()
             except (OSError, LivebodeError) as error:
@@ -162,12 +163,12 @@ class Store:
         return True
 
     def finish(self, summary: dict[str, Any], *, finished: bool) -> None:
-        """Close what is open and write run.json; a run that is not `finished` may be gone on with later.
+        """Close open files and write run.json; a run that is not `finished` can be continued later.
 
         Raises
         ------
         RecordError
-            If the disk refuses; the record is then as if it had been killed.
+            After a disk error; the record is then as after a kill.
         """
         with _refusing(self.path, "could not be finished in"):
             assert self.last is not None
@@ -176,7 +177,7 @@ class Store:
             self._close_segment()
             if (error := self._closed()) is not None:
                 raise error
-            self.commit(self.last.sample, self.last.time_s, self.last.states)  # with what closing had to say
+            self.commit(self.last.sample, self.last.time_s, self.last.states)  # with the events of closing
             self._not_paused()
             self._write_summary(summary, finished=finished)
             if finished:
@@ -188,7 +189,7 @@ class Store:
             raise RecordError(
                 "not-written",
                 f"the run in {str(self.path)!r} could not be finished: {self._pause.message}",
-                "make room, and continue the run",
+                "free some space, and continue the run",
                 path=str(self.path),
                 errno=self._pause.details.get("errno"),
             )
@@ -214,8 +215,8 @@ class Store:
         pause = f"{away_s:.1f} s after it ended there"
         if away_s < 0:
             pause = (
-                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back meanwhile, so "
-                "that the length of the pause is not known; check its date and time"
+                f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back, so "
+                "the length of the pause is not known; check its date and time"
             )
         self._log.say(
             "record-continued",
@@ -253,7 +254,7 @@ class Store:
         self._began = self._committed = commit.sample
 
     def _sync(self) -> None:
-        """Wait until all that was written is safe."""
+        """Wait until all written data is safe."""
         self._settle(self._syncing.done(wait=True))
         self._syncing.begin(self._journal, self._waiting.written())
         self._settle(self._syncing.done(wait=True))
@@ -269,9 +270,9 @@ class Store:
         self._journal.close()
 
     def _close_segment(self) -> None:
-        """Go on in a new journal, and begin to turn the one before into segments."""
+        """Continue in a new journal, and begin to convert the previous one to segments."""
         assert self.last is not None
-        self._closed()  # a journal that is full before the one before it is turned waits for that
+        self._closed()  # if the journal is full before the previous one is converted, wait for it
         before, number = self._journal, self._number
         self._open_journal(number + 1, self.last)
         before.close()
@@ -284,7 +285,7 @@ class Store:
         self._closing.begin(None if budget is None else budget - used)
 
     def _closed(self) -> OSError | LivebodeError | None:
-        """Wait until the journal before is turned, and say what was removed or damaged; the error where it failed."""
+        """Wait until the previous journal is converted, and report removed and damaged parts; returns an error."""
         gone, error = self._closing.result()
         for retained in self._shelf.retained[self._named :]:
             self._log.say_event(retained.event)
@@ -296,7 +297,7 @@ class Store:
                 "record-removed",
                 self.last.sample,
                 self.last.time_s,
-                f"{names} removed, the oldest of the record, to keep it within {self.limits.budget_bytes} bytes",
+                f"{names} removed, the oldest of the record, to meet the budget of {self.limits.budget_bytes} bytes",
                 removed=[segment.name for segment in gone],
             )
         if error is not None:
@@ -308,7 +309,7 @@ class Store:
         return error
 
     def _not_closed(self, error: OSError | LivebodeError, retried: str) -> None:
-        """Say that a segment cannot be closed: the first, second, fourth, eighth … time."""
+        """Report that a segment cannot be closed: the first, second, fourth, eighth … time."""
         self._attempts += 1
         if self._attempts & (self._attempts - 1):
             return
@@ -332,7 +333,7 @@ class Store:
         self._attempts = 0
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
-        with contextlib.suppress(OSError):  # what was being synced may be safe all the same
+        with contextlib.suppress(OSError):  # data that was being synced may still be safe
             self._settle(self._syncing.done(wait=True))
         self._journal.back_to(self._safe_bytes)
         self._waiting.failed(self.limits.held_bytes)
@@ -341,7 +342,7 @@ class Store:
                 "record-paused",
                 sample,
                 time_s,
-                f"{why(error)}; recording pauses at sample {sample} and goes on when it can be written again",
+                f"{why(error)}; recording pauses at sample {sample} and resumes when the disk can be written again",
                 errno=error.errno,
             )
 
@@ -357,7 +358,7 @@ class Store:
             "record-resumed",
             sample,
             time_s,
-            f"recording goes on at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
+            f"recording resumes at sample {sample}; {what + ' are lost' if lost else 'nothing is lost'}",
             paused_at=self._pause.sample,
             lost=lost,
             lost_events=self._log.take_given_up(),

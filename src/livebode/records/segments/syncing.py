@@ -1,4 +1,4 @@
-"""Syncing: a journal is synced beside what is recorded, so that tracking does not wait for the disk."""
+"""Syncing: a journal is synced in a separate thread, so that tracking does not wait for the disk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from livebode.records.segments.disk import AppendFile
 
 
 class Syncing:
-    """One sync at a time, in a thread of its own; what it came to is known when it is asked for."""
+    """One sync at a time, in a separate thread; its result is available on request."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "livebode syncing")
@@ -16,18 +16,18 @@ class Syncing:
         self._upto = (0, 0)
 
     def begin(self, file: AppendFile, parts: int) -> None:
-        """Sync the file as it is, with so many parts written to it, unless one is still going on."""
+        """Sync the file in its present state, with so many parts written to it, if no other sync is running."""
         if self._running is None:
             self._upto = file.length, parts
             self._running = self._thread.submit(file.sync)
 
     def done(self, *, wait: bool = False) -> tuple[int, int] | None:
-        """Length and parts that are safe since the last call; None where nothing has come to its end.
+        """Length and parts that are safe since the last call; None if no sync has ended.
 
         Raises
         ------
         OSError
-            Where the disk refused.
+            If the sync failed.
         """
         if self._running is None or not (wait or self._running.done()):
             return None

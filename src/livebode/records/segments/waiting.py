@@ -1,4 +1,4 @@
-"""What is recorded but not yet safe on the disk, and what of it had to be given up."""
+"""Rows that are recorded but not yet safe on the disk, and rows that had to be dropped."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class _Part:
 
 
 class Waiting:
-    """Rows since the journal was last synced. After a failure they are written again, or given up and counted.
+    """Rows since the journal was last synced. After a failure they are written again, or dropped and counted.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class Waiting:
     Attributes
     ----------
     rows
-        Of each table since the run began, but for those that were given up.
+        Rows of each table since the run began, without dropped ones.
     lost
-        Rows, first and last sample of what was given up, for each table.
+        Number, first and last sample of the dropped rows, for each table.
     """
 
     def __init__(self, tables: tuple[str, ...]) -> None:
@@ -48,7 +48,7 @@ class Waiting:
             self._new.setdefault(table, []).append(batch)
 
     def gather(self) -> None:
-        """Make one frame for each table of what was added."""
+        """Create one frame for each table from the added rows."""
         for table, batches in self._new.items():
             batch = pa.concat_batches(batches)
             sample = to_numpy(batch["sample"])
@@ -66,7 +66,7 @@ class Waiting:
         return [part.frame for part in self._parts[self._written :]]
 
     def written(self) -> int:
-        """They are in the journal now: so many that are not known to be safe."""
+        """They are in the journal now; so many are not known to be safe."""
         self._written = len(self._parts)
         return self._written
 
@@ -76,7 +76,7 @@ class Waiting:
         self._written -= parts
 
     def failed(self, bytes_max: int) -> None:
-        """Nothing since the last sync counts as written; give all of it up where it is more than this."""
+        """Rows since the last sync count as not written; drop all of them if they are more than this."""
         self._written = 0
         if self.held_bytes <= bytes_max:
             return

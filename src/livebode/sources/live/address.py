@@ -1,4 +1,4 @@
-"""Where a live source is: the URL taken apart."""
+"""Address of a live source: the parts of its URL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PORTS: dict[str, int | None] = {
 
 @dataclass(frozen=True)
 class Address:
-    """Kind of source, host, port and what stands behind them; `path` is the topic of MQTT, or a file."""
+    """Kind of source, host, port and path; `path` is the MQTT topic, or a file."""
 
     scheme: str
     host: str = ""
@@ -34,7 +34,7 @@ def parse_address(url: str) -> Address:
     Raises
     ------
     ConfigError
-        For a kind that is not supported, an invalid port, or a password in it; a password is never repeated.
+        For a kind that is not supported, an invalid port, or a password in the URL; the password is never shown.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def parse_address(url: str) -> Address:
         raise ConfigError(
             "secret-in-url",
             "source.url has a user or password",
-            "take it out, and set source.username and source.password_env or source.password_file",
+            "remove it, and set source.username and source.password_env or source.password_file",
             key="source.url",
         )
     if not url.isprintable() or len(url) > 2000:
@@ -65,16 +65,16 @@ def parse_address(url: str) -> Address:
     except ValueError:
         raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
     if parts.scheme not in PORTS:
-        raise _url_error("is of a kind that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
+        raise _url_error("has a scheme that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
         raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):
-        raise _url_error(f"has a path, which {parts.scheme} does not take", "leave out what is behind the port")
+        raise _url_error(f"has a path, but {parts.scheme} has none", "remove what is after the port")
     return Address(parts.scheme, host, port, path)
 
 
 def _url_error(wrong: str, remedy: str) -> ConfigError:
-    """The error for a URL, without it: any part of one that cannot be read may be a secret."""
+    """The error for a URL, without the URL: any part of an invalid one may be a secret."""
     return ConfigError("value-invalid", f"source.url {wrong}", remedy, key="source.url")

@@ -85,8 +85,8 @@ class AdsSource(LiveSource):
                     ads_error=code,
                 ) from None
             raise ConnectionError(str(error).strip()) from None
-        except RuntimeError as error:  # pyads, of an answer that is shorter than what was asked for
-            raise ConnectionError(f"the PLC's answer cannot be used: {str(error).strip()}"[:200]) from None
+        except RuntimeError as error:  # raised by pyads for an answer that is too short
+            raise ConnectionError(f"the PLC's answer is invalid: {str(error).strip()}"[:200]) from None
         return False
 
     def _place(self, plc: Any) -> tuple[int, int, int]:
@@ -108,7 +108,7 @@ class AdsSource(LiveSource):
         def read(at: int, length: int) -> bytes:
             return bytes(plc.read(group, offset + at, ctypes.c_ubyte * length, return_ctypes=True))
 
-        # Of a record that continues, what is still in the ring is not lost.
+        # When a run continues, the samples that are still in the ring are not lost.
         have, epoch = (None, 0) if self._resumed is None else (self._resumed.number, self._resumed.epoch)
         while not self._stop.is_set():
             try:

@@ -1,4 +1,4 @@
-"""Batch: what a sender delivers at once, and LiveBlock: a Block that knows when it arrived."""
+"""Batch: the samples that a sender delivers at once. LiveBlock: a Block with its time of arrival."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from livebode.sources.live.position import Mark, Origin
 
 CHANNELS_MAX = 1024
 VALUES_MAX = 1 << 20
-"""Most values in one batch; more are taken for rubbish."""
+"""Most values in one batch; a batch with more is treated as damaged."""
 SAMPLE_MAX = 1 << 62
 NAME_MAX = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Consecutive samples from one sender, which numbers its samples.
+    """Consecutive samples from one sender, numbered by the sender.
 
     Parameters
     ----------
     first_sample
-        Number that the sender gave the first one; losses, repeats and reordering are told by it.
+        The sender's number of the first sample; losses, repeats and reordering are detected from it.
     data
         float64, shape (channels, samples).
     channels, rate_hz
         As the sender states them.
     epoch
-        A number that the sender draws at its start, so that a restart is seen; 0 for a sender without one.
+        A number that the sender draws at its start, so that a restart is detected; 0 for a sender without one.
     stamp_s
         The sender's clock at the first sample, seconds since 1970; None where it has none.
     arrived_s
         `time.monotonic()` when the batch was received.
     mark
-        Where the source can read it again; None where it cannot.
+        Position at which the source can read it again; None if it cannot.
 
     Raises
     ------
     SourceError
-        If it has no samples or too many, shapes disagree, or a number or a name cannot be.
+        If it has no samples or too many, shapes disagree, or a number or a name is invalid.
     """
 
     first_sample: int
@@ -88,7 +88,7 @@ class Batch:
 
 
 def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> None:
-    """SourceError where a sender's number, rate or stamp cannot be."""
+    """SourceError if a sender's number, rate or stamp is invalid."""
     if not 0 <= first_sample < SAMPLE_MAX:
         raise wrong_value("first_sample", first_sample, "is not between 0 and 2^62")
     if not (np.isfinite(rate_hz) and 0 < rate_hz < 1e9):
@@ -102,7 +102,7 @@ def wrong_value(key: str, value: float, wrong: str) -> SourceError:
 
 
 def check_channels(channels: tuple[Channel, ...], at_least: int = 1) -> None:
-    """SourceError where a sender's channels have no name, a name twice, or one that no line of text can hold."""
+    """SourceError if a channel name of the sender is missing, duplicated, too long or not printable."""
     if not at_least <= len(channels) <= CHANNELS_MAX:
         raise SourceError(
             "channels-invalid",

@@ -1,4 +1,4 @@
-"""The sender's clock against its sample numbers: a clock that was set, and a rate that is not what it says."""
+"""Compare the sender's clock with its sample numbers: detect a clock that was set, and a wrong rate."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from statistics import median
 from livebode.sources.live.said import Said
 
 JUMP_S = 0.1
-"""A clock that goes wrong by this much from one batch to the next, and right again after, was set."""
+"""A clock that is off by this much for one interval between batches, and right in the next, was set."""
 RATE_TOLERANCE = 0.02
-"""From batch to batch stamps jitter, so the median of their ratio has to be off by this much."""
+"""Stamps jitter from batch to batch, so the median of the ratio must be off by this much."""
 DRIFT_TOLERANCE = 1e-3
 DRIFT_S_MIN = 10.0
 _INTERVALS = 15
@@ -18,11 +18,11 @@ _INTERVALS_MIN = 4
 
 
 class ClockWatch:
-    """Compares stamps with sample numbers of batches in order. Sample numbers are time; stamps only tell.
+    """Compares stamps with sample numbers of batches in order. Sample numbers define time; stamps only check it.
 
-    A step in the stamps alone is a clock that was set (``clock-jump``). Stamps whose intervals disagree with the rate
-    one after another are a wrong rate (``wrong-rate``): at once from 2 %, and from 0.1 % after ten seconds. An interval
-    is judged when the next one is known.
+    A single step in the stamps means that the clock was set (``clock-jump``). Successive intervals that disagree with
+    the rate mean a wrong rate (``wrong-rate``): from 2 % immediately, from 0.1 % after ten seconds. An interval is
+    judged when the next one is known.
     """
 
     def __init__(self, said: Said, rate_hz: float) -> None:
@@ -31,7 +31,7 @@ class ClockWatch:
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew: the sender did."""
+        """Begin again: the sender restarted."""
         self._last: tuple[int, float] | None = None
         self._ratios: deque[float] = deque(maxlen=_INTERVALS)
         self._odd: tuple[float, int] | None = None
@@ -51,7 +51,7 @@ class ClockWatch:
         odd = abs(error_s - (usual - 1) * length_s) > JUMP_S
         self._ratios.append(1 + error_s / length_s)
         if odd:
-            # Two odd intervals in a row are no jump of the clock but another pace.
+            # Two wrong intervals in a row are not a jump of the clock but a different rate.
             self._odd = (error_s, number) if self._odd is None else None
             return
         if self._odd is not None and len(self._ratios) > _INTERVALS_MIN:
@@ -64,7 +64,7 @@ class ClockWatch:
     def _jumped(self, step_s: float, number: int) -> None:
         self._said.say(
             "clock-jump",
-            f"the sender's clock was set by {step_s:+.3f} s; time goes on by sample numbers",
+            f"the sender's clock was set by {step_s:+.3f} s; time continues by sample numbers",
             sample=number,
             rate_hz=self._rate_hz,
             step_s=step_s,
@@ -81,10 +81,10 @@ class ClockWatch:
             measured_hz = self._rate_hz / ratio if ratio > 0 else None
             self._said.say(
                 "wrong-rate",
-                f"by the sender's clock it samples at {measured_hz:.6g} Hz, not at {self._rate_hz:.6g} Hz; "
-                "every frequency is wrong by as much, so correct the rate"
+                f"the sampling rate is {measured_hz:.6g} Hz by the sender's clock, not {self._rate_hz:.6g} Hz; "
+                "every frequency is wrong by the same factor; correct the rate"
                 if measured_hz
-                else "the sender's clock stands still or runs backwards; its rate cannot be checked",
+                else "the sender's clock does not advance or runs backwards; its rate cannot be checked",
                 sample=number,
                 rate_hz=self._rate_hz,
                 measured_hz=measured_hz,

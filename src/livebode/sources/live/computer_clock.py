@@ -1,4 +1,4 @@
-"""This computer's clocks over a restart of the process: how long it was away, and whether that can be believed."""
+"""This computer's clocks over a restart of the process: length of the pause, and whether it is reliable."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from functools import cache
 from pathlib import Path
 
 SET_S = 1.0
-"""A clock that differs by more from the time since the computer was started was set meanwhile."""
+"""A clock whose advance differs by more than this from that of the time since boot was set during the pause."""
 LONGEST_S = 30 * 86400.0
-"""A pause over a restart of the computer that is longer is taken for a wrong clock."""
+"""A longer pause over a restart of the computer is treated as a wrong clock."""
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
 
 
 @dataclass(frozen=True)
 class ClockReading:
-    """Seconds since 1970, which anybody may set, and since the computer was started; `boot` names that start."""
+    """Seconds since 1970 (this clock can be set) and since boot; `boot` identifies the boot."""
 
     unix_s: float
     uptime_s: float
@@ -27,14 +27,14 @@ class ClockReading:
     def at(cls, monotonic_s: float) -> ClockReading:
         """The clocks when `time.monotonic()` was `monotonic_s`."""
         ago_s = time.monotonic() - monotonic_s
-        # The one that counts on while the computer sleeps, where there is one.
+        # If available, the clock that also counts while the computer sleeps.
         uptime = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
         return cls(time.time() - ago_s, time.clock_gettime(uptime) - ago_s, _boot())
 
 
 @dataclass(frozen=True)
 class Pause:
-    """How long it was; None where no clock tells it. `remark` says what is wrong with the clock, and what to do."""
+    """Length of a pause; None if no clock gives it. `remark`: what is wrong with the clock, and what to do."""
 
     seconds: float | None
     remark: str = ""
@@ -44,20 +44,20 @@ def pause(before: ClockReading, now: ClockReading) -> Pause:
     """The time between two readings.
 
     >>> pause(ClockReading(1e9, 50.0, "a"), ClockReading(1e9 - 3580.0, 70.0, "a"))
-    Pause(seconds=20.0, remark="this computer's clock was set by -3600 s meanwhile; check its date and time")
+    Pause(seconds=20.0, remark="this computer's clock was set by -3600 s during the pause; check its date and time")
     """
     by_clock_s = now.unix_s - before.unix_s
     if before.boot and before.boot == now.boot:
         by_uptime_s = max(0.0, now.uptime_s - before.uptime_s)
         step_s = by_clock_s - by_uptime_s
-        remark = f"this computer's clock was set by {step_s:+.0f} s meanwhile; check its date and time"
+        remark = f"this computer's clock was set by {step_s:+.0f} s during the pause; check its date and time"
         return Pause(by_uptime_s, remark if abs(step_s) > SET_S else "")
     if 0 <= by_clock_s <= LONGEST_S:
         return Pause(by_clock_s)
     return Pause(
         None,
-        f"this computer's clock shows {_shown(now)}, and showed {_shown(before)} at the end of the record, so it tells "
-        "no pause; set its date and time",
+        f"this computer's clock shows {_shown(now)}, and showed {_shown(before)} at the end of the record, so the "
+        "pause is unknown; set its date and time",
     )
 
 

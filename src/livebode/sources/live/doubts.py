@@ -1,4 +1,4 @@
-"""Doubts: batches out of place, until enough of a kind have come to believe them."""
+"""Doubts: batches that are out of place, until enough of one kind arrived to accept them."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from livebode.sources.live.said import Said
 from livebode.sources.live.spectra_batch import AnyBatch
 
 CONFIRMED = 2
-"""Batches that another stream must bring before it is believed."""
+"""Batches of another stream that must arrive before it is accepted."""
 CONFIRMED_AHEAD = 3
-"""The same of one that is far ahead: its numbers become a loss, which cannot be taken back."""
+"""The same for a stream that is far ahead: its numbers are reported as a loss, which cannot be undone."""
 CONFIRMED_NEAR = 32
-"""The same where numbers go back by less than a minute: a broker may send that many again."""
+"""The same if numbers go back by less than a minute: a broker may repeat that many."""
 
 
 class Doubts:
-    """Batches that are not where the stream continues, of one kind at a time; those of another kind take their place.
+    """Batches that do not continue the stream, of one kind at a time; a batch of another kind replaces them.
 
     Parameters
     ----------
     said
-        Where those that were not believed are reported.
+        Collector of Events; receives those of rejected batches.
     confirmed
-        Batches that a new epoch must bring.
+        Batches of a new epoch that must arrive before it is accepted.
     reorder
-        Batches that may come late: a replaced epoch must bring more to be believed again.
+        Number of batches that may be late: a replaced epoch needs more than this to be accepted again.
     """
 
     def __init__(self, said: Said, confirmed: int, reorder: int) -> None:
@@ -32,28 +32,28 @@ class Doubts:
         self._doubted: list[AnyBatch] = []
 
     def another_epoch(self, batch: AnyBatch, epoch: int | None, due: int | None, *, replaced: bool) -> list[AnyBatch]:
-        """Take a batch of another epoch than the stream's; what is believed now, if anything."""
+        """Take a batch of another epoch; returns what is accepted now, if anything."""
         follows = bool(self._doubted) and self._doubted[-1].epoch == batch.epoch
         return self._taken(batch, epoch, due, follows, self._confirmed_again if replaced else self._confirmed)
 
     def ahead(self, batch: AnyBatch, epoch: int | None, due: int | None, near: float) -> list[AnyBatch]:
-        """Take a batch that is far ahead; those that follow it are `near` it."""
+        """Take a batch that is far ahead; its successors are `near` it."""
         last = self._doubted[-1] if self._doubted else None
         follows = last is not None and last.epoch == batch.epoch and abs(batch.first_sample - last.stop) <= near
         return self._taken(batch, epoch, due, follows, CONFIRMED_AHEAD)
 
     def behind(self, batch: AnyBatch, epoch: int | None, due: int | None, *, far: bool) -> list[AnyBatch]:
-        """Take a batch that is behind: repeated, or of numbers that begin again."""
+        """Take a batch that is behind: a repeat, or numbers that begin again."""
         last = self._doubted[-1] if self._doubted else None
         follows = last is not None and last.epoch == batch.epoch and last.stop == batch.first_sample
         return self._taken(batch, epoch, due, follows, CONFIRMED if far else CONFIRMED_NEAR)
 
     def dismiss(self, epoch: int | None, due: int | None) -> None:
-        """Drop them: they were repeats, if of the stream's `epoch` and from before the sample that is `due`."""
+        """Drop them; those of the stream's `epoch` from before the sample that is `due` were repeats."""
         doubted, self._doubted = self._doubted, []
         for batch in doubted:
             if batch.epoch == epoch and due is not None and batch.stop <= due:
-                self._said.say("repeat", f"sample {batch.first_sample} of the sender came again and was dropped")
+                self._said.say("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
             else:
                 self._said.say(
                     "foreign",

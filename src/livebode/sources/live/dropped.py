@@ -1,4 +1,4 @@
-"""Dropped: the span of samples that a full queue does not take, reported as it begins and as it ends."""
+"""Dropped: the span of samples that a full queue rejects, reported at its beginning and at its end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from livebode.sources.live.spectra_batch import AnyBatch
 
 
 class Dropped:
-    """Counts what is dropped until the queue takes a batch again; numbers are the sender's own."""
+    """Counts the samples dropped until the queue accepts a batch again; numbers are the sender's."""
 
     def __init__(self, said: Said) -> None:
         self._said = said
@@ -19,19 +19,19 @@ class Dropped:
             self._first = batch.first_sample
             self._said.say(
                 "overflow",
-                f"the queue is full; samples from the sender's {batch.first_sample} on are dropped until a quarter of "
-                "it is free; take a longer tracking.hop, fewer lines or fewer axes on this computer",
+                f"the queue is full; samples from the sender's number {batch.first_sample} are dropped until a quarter "
+                "of it is free; use a longer tracking.hop, fewer lines or fewer axes on this computer",
                 sender_first=batch.first_sample,
             )
         self._samples += batch.samples
         self._last = batch.stop - 1
 
     def finish(self) -> None:
-        """The queue takes batches again, or nothing more will come."""
+        """The queue accepts batches again, or the source ended."""
         if self._samples:
             self._said.say(
                 "overflow",
-                f"the queue was full: {self._samples} samples, the sender's {self._first} … {self._last}, were dropped",
+                f"the queue was full: the sender's samples {self._first} … {self._last} ({self._samples}) were dropped",
                 samples=self._samples,
                 sender_first=self._first,
                 sender_last=self._last,

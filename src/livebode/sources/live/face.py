@@ -1,4 +1,4 @@
-"""Whether a batch is of the stream that was begun: its channels, units and rate against those of the first."""
+"""Check that a batch belongs to the stream: its channels, units and rate are compared with those of the first."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ SAME_RATE = 1e-9
 
 
 class Face:
-    """Channels and rate of a stream. A batch that states others is left out, for its values would mean something else.
+    """Channels and rate of a stream. A batch with others is skipped, because its values have another meaning.
 
-    Channels that come in another order or beside new ones are put in order and taken. Spectra must be of the very same
-    layout, and the first batch says whether the stream is of samples or of spectra.
+    Channels in another order, or with new ones among them, are sorted and used. Spectra must have the same layout. The
+    first batch determines whether the stream contains samples or spectra.
 
     Parameters
     ----------
     said
-        Where changes are told, once for each.
+        Collector of Events; receives each change once.
     rate_hz
-        The rate that must be, where it is known beforehand.
+        Required rate, if it is known in advance.
     """
 
     def __init__(self, said: Said, rate_hz: float | None = None) -> None:
@@ -32,18 +32,18 @@ class Face:
         self.channels: tuple[Channel, ...] = ()
         self.rate_hz = rate_hz
         self.spectra: SpectraLayout | None = None
-        """What the spectra of the stream are of; None for samples."""
+        """Layout of the stream's spectra; None for samples."""
         self._seen: tuple[SpectraLayout | tuple[Channel, ...], float] | None = None
         self._rows: list[int] | None = None
 
     def announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
-        """The stream has these, which are known before its first batch."""
+        """Set the stream's channels, known before its first batch."""
         if not self.channels:
             self.rate_hz = self.rate_hz or rate_hz
             self.channels = channels
 
     def aligned(self, batch: AnyBatch) -> AnyBatch | None:
-        """The batch with the stream's channels; None where it is not of the stream."""
+        """The batch with the stream's channels; None if it does not belong to the stream."""
         stated = (_layout(batch) or batch.channels, batch.rate_hz)
         if not self.channels:
             self.channels, self.spectra = batch.channels, _layout(batch)
@@ -58,12 +58,12 @@ class Face:
         return replace(batch, data=np.ascontiguousarray(batch.data[self._rows]), channels=self.channels)
 
     def _compared(self, batch: AnyBatch) -> list[int] | None:
-        """Rows of the stream's channels in the batch; None where it cannot be taken. Says what changed."""
+        """Rows of the stream's channels in the batch; None if it cannot be used. Reports what changed."""
         assert self.rate_hz is not None
         if abs(batch.rate_hz / self.rate_hz - 1) > SAME_RATE:
             self._said.say(
                 "wrong-rate",
-                f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are left out",
+                f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are skipped",
                 stated_hz=batch.rate_hz,
                 rate_hz_expected=self.rate_hz,
             )
@@ -71,7 +71,7 @@ class Face:
         if (layout := _layout(batch)) != self.spectra:
             now = "samples" if layout is None else "spectra" if self.spectra is None else "spectra of another layout"
             self._said.say(
-                "layout-changed", f"the sender now sends {now}; they are left out until it sends what it began with"
+                "layout-changed", f"the sender now sends {now}; they are skipped until the first layout is back"
             )
             return None
         units = {channel.name: channel.unit for channel in batch.channels}
@@ -79,7 +79,7 @@ class Face:
         if missing := [channel.name for channel in self.channels if channel.name not in units]:
             self._said.say(
                 "layout-changed",
-                f"the sender no longer has channel {missing[0]!r}; its samples are left out until it is back",
+                f"the sender no longer has channel {missing[0]!r}; its samples are skipped until it is back",
                 channels=names,
             )
             return None
@@ -87,15 +87,15 @@ class Face:
             if channel.unit != units[channel.name]:
                 self._said.say(
                     "unit-changed",
-                    f"channel {channel.name!r} came in {channel.unit!r} and now comes in {units[channel.name]!r}; "
-                    "its samples are left out",
+                    f"the unit of channel {channel.name!r} changed from {channel.unit!r} to {units[channel.name]!r}; "
+                    "its samples are skipped",
                     channel=channel.name,
                     unit=units[channel.name],
                 )
                 return None
         if names != [channel.name for channel in self.channels]:
             self._said.say(
-                "layout-changed", "the sender's channels changed; those known before are taken by name", channels=names
+                "layout-changed", "the sender's channels changed; the first ones are used, by name", channels=names
             )
         return [names.index(channel.name) for channel in self.channels]
 

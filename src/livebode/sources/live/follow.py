@@ -1,4 +1,4 @@
-"""Follow: a table in text that grows, or a directory to which whole recordings are added."""
+"""Follow: a text table that grows, or a directory to which whole recordings are added."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from livebode.sources.timing import find_time
 from livebode.sources.units import SECONDS
 
 REPLACED = {
-    "most": "no longer ends as it was read up to byte {end}: what is different there is not recorded",
-    "none": "is another file than the one that was read up to byte {end}: that was truncated or replaced. It is read "
-    "from its beginning; what was added to the other one is not recorded",
+    "most": "changed before byte {end}, up to which it was read: the changes are not recorded",
+    "none": "was truncated or replaced after it was read up to byte {end}. The new file is read "
+    "from its beginning; what was added to the old one is not recorded",
 }
-"""What happened to a file that was read before, by how much of it is as it was."""
+"""Message for a file that was read before, by how much of it is unchanged."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table in text as it stood when it was first looked at: how to read more of it."""
+    """A text table at its first inspection: how to read more of it."""
 
     recording: DelimitedRecording
     columns: tuple[Column, ...]
@@ -53,7 +53,7 @@ class FollowSource(LiveSource):
     """A file of rows that is appended to, or a directory whose files are read in the order of their names.
 
     The time column numbers the samples, so that missing rows are gaps; without one (`rate_hz` given) rows are counted.
-    A file that becomes shorter or is replaced is a restart, unless it begins with all that was read of the other.
+    A file that becomes shorter or is replaced is a restart, except if it begins with everything that was read before.
     """
 
     format: ClassVar[str] = "follow"
@@ -67,7 +67,7 @@ class FollowSource(LiveSource):
         self._behind: tuple[str, int] | None = None
 
     def resume(self, position: Position) -> None:
-        """Continue with the sample that follows in the file or the directory."""
+        """Continue with the next sample in the file or directory."""
         super().resume(position)
         self._epoch, self._due = position.epoch, position.number
         self._mark = position.mark or self._mark
@@ -87,7 +87,7 @@ class FollowSource(LiveSource):
         return False
 
     def _looked_at(self, path: Path) -> Table | None:
-        """The table, once it has enough rows to tell what is in it."""
+        """The table, as soon as it has enough rows to detect its layout."""
         try:
             if not path.exists():
                 raise SourceError("not-found", f"there is no file {path} yet", "check the name", path=str(path))
@@ -98,7 +98,7 @@ class FollowSource(LiveSource):
             return None
 
     def _follow_file(self, path: Path, table: Table) -> None:
-        """Batches of what stands there and of what is added, until the file is another one."""
+        """Batches of the present rows and of those that are added, until the file is replaced."""
         with path.open("rb") as file:
             begin, again = self._begin(path, file, table)
             self._announce(table.channels, table.rate_hz)
@@ -119,7 +119,7 @@ class FollowSource(LiveSource):
                 self._mark = piece.after.as_plain()
 
     def _begin(self, path: Path, file: BinaryIO, table: Table) -> tuple[FileMark, int]:
-        """Where to begin to read, and up to which byte the rows have been read before."""
+        """Where to begin to read, and the byte up to which the rows were already read."""
         start = FileMark.start(file, table.recording.offset)
         if not self._mark:
             return start, start.end
@@ -134,7 +134,7 @@ class FollowSource(LiveSource):
         return start, start.end
 
     def _batches(self, table: Table, lines: bytes, row: int, mark: Mark) -> Iterator[Batch]:
-        """Batches of these lines; a line that does not fit the table is left out."""
+        """Batches of these lines; a line that does not fit the table is skipped."""
         if not lines.strip():
             return
         wanted = [*table.columns, *([table.time] if table.time else [])]
@@ -166,7 +166,7 @@ class FollowSource(LiveSource):
             names = sorted(name for name in os.listdir(folder) if name > seen and not name.startswith("."))
             for at, name in enumerate(names):
                 whole = self._segment(folder / name, seen, counted)
-                # A file that cannot be read may still be written, unless a later one is there.
+                # A file that cannot be read may still be incomplete, except if there is a later one.
                 if whole is None and at == len(names) - 1:
                     break
                 seen, counted = self._behind = name, counted if whole is None else whole
@@ -174,13 +174,13 @@ class FollowSource(LiveSource):
             self._stop.wait(TICK_S)
 
     def _begin_folder(self, folder: Path) -> tuple[str, int]:
-        """Behind which name to begin to read, and the rows that were counted up to there."""
+        """Name after which to begin to read, and the number of rows up to there."""
         if not self._mark:
             return "", 0
         mark = FolderMark.of(self._mark)
         path = folder / mark.name
         if path.exists() and checksum(path) == mark.crc:
-            return mark.seen, mark.counted  # its rows that were recorded are left out
+            return mark.seen, mark.counted  # its recorded rows are skipped
         due, self._due = self._due, -1
         whole = mark.last is not None and due >= mark.last
         if whole and not path.exists():
@@ -192,7 +192,7 @@ class FollowSource(LiveSource):
         return mark.name, max(mark.counted, mark.stop)
 
     def _segment(self, path: Path, seen: str, counted: int) -> int | None:
-        """Deliver one recording whose rows are counted from `counted` on; the count behind it, None if unreadable."""
+        """Deliver one recording whose rows are counted from `counted`; the count after it, None if unreadable."""
         try:
             log = open_log(path, rate_hz=self.settings.rate_hz or self._sequencer.face.rate_hz, time=self.settings.time)
             labels, mark = log.channels, FolderMark(path.name, checksum(path), seen, counted, log.timing is not None)
@@ -214,14 +214,14 @@ class FollowSource(LiveSource):
         return last
 
     def _pass_on(self, batch: Batch | None) -> None:
-        """Deliver it, unless it was recorded before."""
+        """Deliver the recording if it is not recorded yet."""
         if batch is not None and batch.stop > self._due:
             self._deliver(batch)
             self._due = batch.stop
 
 
 def table_of(log: Log, time: str | None, inode: int) -> Table:
-    """How to continue reading the table that a log is of; SourceError where it is not a table."""
+    """How to continue reading the table of a log; SourceError if it is not a table."""
     recording: Recording = log._recording
     if not isinstance(recording, DelimitedRecording):
         raise SourceError(
@@ -242,7 +242,7 @@ def table_of(log: Log, time: str | None, inode: int) -> Table:
 def numbered(
     numbers: NDArray[np.int64], values: list[Any], channels: tuple[Channel, ...], rate_hz: float, epoch: int, mark: Mark
 ) -> Iterator[Batch]:
-    """Batches of the samples with these numbers, each as long as they follow each other and a batch may be."""
+    """Batches of the samples with these numbers, each as long as they are consecutive and a batch may be."""
     cuts = np.flatnonzero(np.diff(numbers) != 1) + 1
     most = max(1, VALUES_MAX // len(channels))
     for first, last in zip([0, *cuts.tolist()], [*cuts.tolist(), len(numbers)]):
@@ -253,7 +253,7 @@ def numbered(
 
 
 def is_another(path: Path, inode: int, read: int) -> bool:
-    """Whether another file stands at `path`, or the same one is shorter than what was read of it."""
+    """Whether there is another file at `path`, or the same one is shorter than what was read of it."""
     try:
         found = path.stat()
     except FileNotFoundError:

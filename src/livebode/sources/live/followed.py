@@ -1,4 +1,4 @@
-"""What was read of a followed file or directory: marks to continue at, and the lines of a file between two marks."""
+"""Progress in a followed file or directory: marks to continue at, and the lines between two marks."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FileMark(_Plain):
 
     @classmethod
     def start(cls, file: BinaryIO, offset: int) -> FileMark:
-        """Before the first row, `offset` bytes from the beginning of the file."""
+        """Mark before the first row, `offset` bytes from the beginning of the file."""
         crc, _ = _checksum(file, 0, offset, 0)
         return cls(offset, 0, crc, offset, crc)
 
@@ -47,7 +47,7 @@ class FileMark(_Plain):
             return "none"
         if _checksum(file, self.offset, self.end, crc) == (self.end_crc, self.end):
             return "all"
-        return "most" if self.rows else "none"  # two files may well begin with the same headings
+        return "most" if self.rows else "none"  # two files may begin with the same headings
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class FolderMark(_Plain):
     """A file of a directory, with the CRC-32 `crc` of its bytes.
 
     `seen` is the name before it, `counted` the rows up to there, `stop` those with it; `last` is the number of the
-    sample behind its last one, once it was read whole; `timed` says that a column of time numbers its samples.
+    sample after its last one, if it was read completely; `timed`: a time column numbers its samples.
     """
 
     name: str
@@ -69,7 +69,7 @@ class FolderMark(_Plain):
 
 @dataclass(frozen=True)
 class Piece:
-    """Whole lines, and where they are."""
+    """Complete lines, and their position."""
 
     raw: bytes
     mark: FileMark
@@ -82,17 +82,17 @@ class Piece:
 
 
 class FileLines:
-    """Reads a file that grows in pieces of whole lines, from a mark on."""
+    """Reads a growing file in pieces of complete lines, from a mark."""
 
     def __init__(self, file: BinaryIO, begin: FileMark, encoding: str) -> None:
         self._file, self._encoding, self._at = file, encoding, begin
         self._begun = b""
         self.cut = False
-        """Whether the last piece left out a line that is too long."""
+        """Whether a line of the last piece was skipped because it is too long."""
         file.seek(begin.offset)
 
     def read(self, until: int) -> Piece | None:
-        """The next lines, and none from beyond byte `until` with those before it; None where nothing was added."""
+        """The next lines, which do not cross byte `until`; None if nothing was added."""
         before = until - self._file.tell()
         read = self._file.read(min(PIECE_BYTES, before) if before > 0 else PIECE_BYTES)
         if not read:
@@ -118,7 +118,7 @@ def checksum(path: Path) -> int:
 
 
 def _checksum(file: BinaryIO, first: int, last: int, crc: int) -> tuple[int, int]:
-    """CRC-32 of the bytes from `first` to before `last` behind those of `crc`, and where the file ended before that."""
+    """`crc` continued over the bytes from `first` to before `last`, and where the file ends if it ends earlier."""
     file.seek(first)
     while first < last and (piece := file.read(min(PIECE_BYTES, last - first))):
         crc, first = zlib.crc32(piece, crc), first + len(piece)
@@ -126,7 +126,7 @@ def _checksum(file: BinaryIO, first: int, last: int, crc: int) -> tuple[int, int
 
 
 def whole_lines(raw: bytes, encoding: str) -> tuple[bytes, bytes]:
-    r"""The lines that have ended, and the beginning of the next.
+    r"""The complete lines, and the beginning of the next.
 
     >>> whole_lines(b"1,2\n3,4\n5", "utf-8")
     (b'1,2\n3,4\n', b'5')

@@ -1,4 +1,4 @@
-"""The binary frame of livebode: what UDP, TCP and MQTT carry. docs/live.md has it byte by byte."""
+"""The binary frame of livebode, for UDP, TCP and MQTT. docs/live.md describes it byte by byte."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def encode_layout(channels: Sequence[Channel], rate_hz: float, *, epoch: int = 0
 
 
 def encode_samples(batch: Batch, *, sequence: int = 0, double: bool = False) -> bytes:
-    """A frame with the samples of a batch, as float32 unless `double`.
+    """A frame with the samples of a batch, as float32, or as float64 with `double`.
 
     >>> batch = Batch(7, np.zeros((1, 10)), (Channel("w", "N m"),), 4000.0)
     >>> len(encode_samples(batch)), FrameDecoder().decode(encode_layout(batch.channels, 4000) ) is None
@@ -76,7 +76,7 @@ def encode_samples(batch: Batch, *, sequence: int = 0, double: bool = False) -> 
 
 
 class FrameDecoder:
-    """Turns frames into Batches; remembers the layouts that were announced."""
+    """Turns frames into Batches; remembers the announced layouts."""
 
     LAYOUTS_MAX = 16
 
@@ -84,12 +84,12 @@ class FrameDecoder:
         self._layouts: dict[tuple[int, int], tuple[Channel, ...] | SpectraLayout] = {}
 
     def decode(self, frame: bytes | memoryview, arrived_s: float = float("nan")) -> AnyBatch | None:
-        """The batch in a frame; None for a layout, and for samples or spectra whose layout has not come yet.
+        """The batch in a frame; None for a layout, and for samples or spectra whose layout is not known yet.
 
         Raises
         ------
         SourceError
-            Where the frame is damaged, of another version or kind, or contradicts itself.
+            If the frame is damaged, inconsistent, or of an unknown version or kind.
         """
         header = read_header(frame)
         if header.length != len(frame):

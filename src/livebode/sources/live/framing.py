@@ -1,4 +1,4 @@
-"""What all frames have in common: header, CRC, and how they are cut out of a stream.
+"""Common to all frames: header, CRC, and how frames are cut out of a stream.
 
 The header is little endian: magic, version, kind, flags, length, sequence, epoch, sample, stamp, rate, layout,
 channels, samples; then the payload; then the CRC-32 of all before.
@@ -49,7 +49,7 @@ def framed(
     kind: int, flags: int, sequence: int, epoch: int, sample: int, stamp_ns: int, rate_hz: float, layout: int,
     channels: int, samples: int, payload: bytes,
 ) -> bytes:  # fmt: skip
-    """A whole frame; SourceError where it would be too long."""
+    """A complete frame; SourceError if it would be too long."""
     length = FRAME_BYTES_MIN + len(payload)
     if length > FRAME_BYTES_MAX:
         raise SourceError(
@@ -66,7 +66,7 @@ def framed(
 
 
 def read_header(frame: bytes | memoryview) -> Header:
-    """The header of what may be a frame; SourceError where it cannot begin one."""
+    """The header of a possible frame; SourceError if it is not a valid one."""
     if len(frame) < FRAME_BYTES_MIN:
         raise damaged_frame(f"a frame of {len(frame)} bytes is shorter than a header", bytes=len(frame))
     header = Header(*HEADER.unpack_from(frame))
@@ -97,17 +97,17 @@ def inconsistent_frame(message: str, **facts: object) -> SourceError:
 
 
 class FrameSplitter:
-    """Cuts a stream of bytes into frames, and finds the next one behind rubbish. Memory: one frame."""
+    """Cuts a stream of bytes into frames, and finds the next one after invalid bytes. Memory: one frame."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
         self.skipped = 0
-        """Bytes that belonged to no frame."""
+        """Bytes that did not belong to a frame."""
         self.damaged = 0
-        """Frames with a wrong CRC since the last whole one."""
+        """Frames with a wrong CRC since the last intact one."""
 
     def feed(self, piece: bytes) -> list[bytes]:
-        """Frames that `piece` completes."""
+        """Frames completed by `piece`."""
         self._bytes += piece
         frames = []
         while len(self._bytes) >= FRAME_BYTES_MIN:
@@ -121,7 +121,7 @@ class FrameSplitter:
             frame = bytes(self._bytes[: header.length])
             if zlib.crc32(frame[: -CRC.size]) != CRC.unpack(frame[-CRC.size :])[0]:
                 self.damaged += 1
-                self._skip()  # its length may be what is damaged
+                self._skip()  # its length field may be damaged
                 continue
             self.damaged = 0
             del self._bytes[: header.length]

@@ -1,4 +1,4 @@
-"""Health: how a live source is doing."""
+"""Health: state of a live source."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Health:
-    """How a live source is doing.
+    """State of a live source.
 
     Parameters
     ----------
     connected
-        Whether a connection stands.
+        Whether there is a connection.
     counts
-        How often each kind of Event happened, as in `livebode.sources.live.KINDS`.
+        Number of Events of each kind in `livebode.sources.live.KINDS`.
     lost
-        Samples that did not come, of those whose number is known.
+        Samples known to be lost.
     silent_s
         Seconds since the last batch; None before the first.
     measured_hz
@@ -24,8 +24,8 @@ class Health:
     clock_offset_s
         The sender's clock at its sample 0, seconds since 1970; None where it sends no stamps.
     latency_s
-        This computer's clock at the arrival of the newest batch less the sender's at its last sample; it means
-        something where both clocks are synchronised.
+        This computer's clock at the arrival of the newest batch minus the sender's clock at its last sample; meaningful
+        only if both clocks are synchronised.
     waiting_bytes
         Received and not yet tracked.
     waiting_s

@@ -1,4 +1,4 @@
-"""Inbox: what was received and not yet looked at, in bounded memory."""
+"""Inbox: batches that were received and not yet processed, in bounded memory."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from collections import deque
 from livebode.sources.live.spectra_batch import AnyBatch
 
 INBOX_S_MAX = 60.0
-"""The machine's time that may wait: longer than any pause of a tracker that works."""
+"""Longest machine time in the queue: longer than any pause of a working tracker."""
 INBOX_BYTES_MIN, INBOX_BYTES_MAX = 1 << 20, 64 << 20
-"""What may wait however long it is, and what may not however short: many axes share one computer."""
+"""Bytes that may always wait, and bytes that may never wait: many axes share one computer."""
 RESUMES_AT = 0.75
-"""A queue that was full takes batches again when no more than this share of it is used: what is dropped is in few long
-spans, and the windows between them are whole."""
+"""A queue that was full accepts batches again when at most this share of it is used: dropped samples then form few long
+spans, with complete windows between them."""
 WAITING_S_MAX = 0.1
-"""The same where the sender can wait: what it still has is not lost when this process is killed."""
+"""The same if the sender can wait: samples that are still at the sender are not lost when this process is killed."""
 _ENTRY_BYTES = 1000
 
 
 class Inbox:
     """A queue of batches between the thread that receives and the one that tracks: at most 60 s of them, and 64 MiB.
 
-    Where the sender waits, at most 0.1 s, or one batch.
+    If the sender can wait: at most 0.1 s, or one batch.
     """
 
     def __init__(self, bytes_max: int = INBOX_BYTES_MAX, *, waits: bool = False) -> None:
@@ -37,7 +37,7 @@ class Inbox:
 
     @property
     def seconds(self) -> float:
-        """The machine's time that waits."""
+        """Machine time in the queue."""
         return self._seconds
 
     @property
@@ -46,14 +46,12 @@ class Inbox:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is in it and nothing more will come."""
+        """Whether the queue is empty and closed."""
         with self._changed:
             return self._closed and not self._batches
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
-        """Whether the batch was taken. A full inbox refuses it and those behind it until a quarter is free, or with
-        `wait` lets the sender wait.
-        """
+        """Whether it was accepted. A full inbox rejects batches until a quarter is free, or with `wait` waits."""
         with self._changed:
             if wait:
                 self._changed.wait_for(lambda: self._closed or self._has_room(batch))
@@ -71,11 +69,11 @@ class Inbox:
 
     def _count(self, batch: AnyBatch, sign: int) -> None:
         self._bytes += sign * _size_bytes(batch)
-        self._seconds = self._seconds + sign * _seconds(batch) if self._batches else 0.0  # no rounding stays
+        self._seconds = self._seconds + sign * _seconds(batch) if self._batches else 0.0  # no rounding error remains
         self._changed.notify_all()
 
     def get(self, timeout_s: float) -> AnyBatch | None:
-        """The oldest batch; None where none came in time or none will come."""
+        """The oldest batch; None if none arrived in time or the queue is closed."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._batches, timeout_s)
             if not self._batches:
@@ -85,7 +83,7 @@ class Inbox:
             return batch
 
     def close(self) -> None:
-        """Nothing more will come; what is in it can still be had."""
+        """Close the queue; its contents can still be read."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""Standard input: batches as NDJSON from a program that is piped into livebode."""
+"""Standard input: batches as NDJSON from a program that writes to a pipe."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from livebode.core import LivebodeError
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
 from livebode.sources.live.source import TICK_S, LiveSource
 
-_PIECE_BYTES = 1 << 13  # what was read and is not recorded a kill costs
+_PIECE_BYTES = 1 << 13  # bytes that were read but not recorded are lost when the process is killed
 
 
 class StdinSource(LiveSource):
-    """Lines of JSON on standard input; ends where it ends, and lets its writer wait where it is too fast."""
+    """Lines of JSON on standard input; ends with it, and blocks a writer that is too fast."""
 
     format: ClassVar[str] = "ndjson"
     waits: ClassVar[bool] = True
@@ -47,7 +47,7 @@ class StdinSource(LiveSource):
 
 
 class LineSplitter:
-    r"""Cuts a stream of bytes into lines; one that is too long is left out, so that memory stays bounded.
+    r"""Cuts a stream of bytes into lines; a line that is too long is skipped, so that memory is bounded.
 
     >>> splitter = LineSplitter()
     >>> splitter.feed(b"a\nb"), splitter.feed(b"c\n\n"), splitter.feed(b"")
@@ -58,10 +58,10 @@ class LineSplitter:
         self._parts: list[bytes] = []
         self._size = 0
         self.cut = 0
-        """Lines that were too long."""
+        """Number of lines that were too long."""
 
     def feed(self, piece: bytes) -> list[bytes]:
-        """Lines that `piece` completes, empty ones left out; an empty piece is the end, and completes the last one."""
+        """Lines completed by `piece`, without empty ones; an empty piece is the end and completes the last line."""
         *ends, rest = piece.split(b"\n")
         lines = []
         for end in ends:

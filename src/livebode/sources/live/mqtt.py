@@ -1,4 +1,4 @@
-"""MQTT: frames, or NDJSON lines, that a broker passes on."""
+"""MQTT: frames or NDJSON lines from a broker."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from livebode.sources.live.source import TICK_S, LiveSource
 
 KEEPALIVE_S = 15
 SESSION_S = 3600
-"""How long a broker keeps what comes while a client with a `client_id` is away."""
+"""How long a broker stores messages while a client with a `client_id` is disconnected."""
 PACKET_BYTES_MAX = 8 * FRAME_BYTES_MAX
 _TOPIC_BYTES_MAX = 65535
 _REFUSALS = {0x84, 0x85, 0x86, 0x87, 0x8A, 0x8C, 0x9D}
@@ -111,7 +111,7 @@ class MqttSource(LiveSource):
             close_left(error)
             raise SourceError(
                 "refused",
-                f"no TLS with the broker: {getattr(error, 'verify_message', '') or error.reason}",
+                f"TLS with the broker failed: {getattr(error, 'verify_message', '') or error.reason}",
                 "check source.ca_file and the broker's certificate",
             ) from None
 
@@ -121,7 +121,7 @@ class MqttSource(LiveSource):
             if self._tls is not None and self._unanswered >= _UNANSWERED_MAX:
                 raise SourceError(
                     "refused",
-                    "the broker ends the connection before it answers",
+                    "the broker closes the connection before it answers",
                     "if it requires a certificate, check source.certificate_file and source.key_file",
                 )
         raise ConnectionError(self._mqtt.error_string(code).rstrip("."))
@@ -130,7 +130,7 @@ class MqttSource(LiveSource):
         self._answered, self._unanswered = True, 0
         if reason.value in _REFUSALS:
             self._refusal = SourceError(
-                "refused", f"the broker refused: {reason}", "check source.username and its password"
+                "refused", f"the broker rejected the connection: {reason}", "check source.username and its password"
             )
         elif not reason.is_failure:
             client.subscribe(self.address.path, qos=1)
@@ -139,7 +139,7 @@ class MqttSource(LiveSource):
         if any(reason.is_failure for reason in reasons):
             self._refusal = SourceError(
                 "refused",
-                f"the broker does not let us read {self.address.path}: {reasons[0]}",
+                f"the broker denies the subscription to {self.address.path}: {reasons[0]}",
                 "check the topic and the broker's access rights",
                 topic=self.address.path,
             )
@@ -158,7 +158,7 @@ class MqttSource(LiveSource):
 
 
 def tls_context(settings: SourceSettings) -> ssl.SSLContext:
-    """What TLS needs: the authority that is trusted, and our own certificate where one is given."""
+    """TLS context: the trusted authority, and our own certificate if there is one."""
     authority = None if settings.ca_file is None else existing(settings.ca_file, "ca_file")
     try:
         context = ssl.create_default_context(cafile=authority)
@@ -176,7 +176,7 @@ def tls_context(settings: SourceSettings) -> ssl.SSLContext:
 
 
 def close_left(error: ssl.SSLError) -> None:
-    """Close the socket that paho leaves open where the handshake fails; nothing but the error still knows it."""
+    """Close the socket that paho leaves open after a failed handshake; only the error refers to it."""
     trace = error.__traceback__
     while trace is not None:
         for left in trace.tb_frame.f_locals.values():

@@ -1,4 +1,4 @@
-"""Batches as JSON, one object a line: for programs that have no binary frame at hand."""
+"""Batches as JSON, one object per line: for programs that cannot write binary frames."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def encode_line(batch: Batch) -> bytes:
 
 
 class LineDecoder:
-    """Turns lines into Batches; what a line leaves out of channels, rate and epoch is as in the one before.
+    """Turns lines into Batches; channels, rate and epoch that a line omits are those of the previous line.
 
     Parameters
     ----------
     rate_hz
-        The rate, where lines do not state it.
+        The rate, if lines do not contain it.
     """
 
     def __init__(self, rate_hz: float | None = None) -> None:
@@ -51,7 +51,7 @@ class LineDecoder:
 
     def decode(self, line: bytes, arrived_s: float = float("nan")) -> Batch:
         """The batch in a line: an object with `sample`, `data` (a list of numbers for each channel; null is NaN), and
-        where they are new `channels` ("name [unit]"), `rate_hz`, `epoch` and `stamp_s`.
+        if they are new `channels` ("name [unit]"), `rate_hz`, `epoch` and `stamp_s`.
 
         Raises
         ------

@@ -14,14 +14,14 @@ from livebode.sources.live.batch import Batch
 Sample = tuple[int, float, NDArray[np.float64]]
 """Number, stamp in seconds since 1970, and a value for each channel."""
 NEAR = 0.5
-"""A stamp within half a period of where the next sample is due is that sample's."""
+"""A stamp within half a period of the time at which the next sample is due belongs to that sample."""
 
 
 class Numbered:
-    """Turns stamped samples into Batches: the number is the stamp times the rate, to the nearest whole.
+    """Turns stamped samples into Batches: the number is the stamp times the rate, rounded.
 
-    A stamp that is less than half of what it stands for away from where the stream goes on is taken as going on, so
-    that jitter makes neither gaps nor repeats; what adds up beyond that is seen as lost or repeated samples.
+    A stamp that differs from the due time by less than half of its batch continues the stream, so that jitter causes
+    neither gaps nor repeats; a larger accumulated difference is detected as lost or repeated samples.
     """
 
     def __init__(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
@@ -29,7 +29,7 @@ class Numbered:
         self._next: int | None = None
 
     def number(self, stamp_s: float, samples: int) -> int:
-        """Number of the first of `samples` samples, that was taken at `stamp_s`, seconds since 1970."""
+        """Number of the first of `samples` samples, which was taken at `stamp_s`, seconds since 1970."""
         if not 0 <= stamp_s < 1e11:
             raise SourceError(
                 "value-invalid",
@@ -45,12 +45,12 @@ class Numbered:
         return number
 
     def sample(self, stamp_s: float, row: bytes) -> Sample:
-        """One sample: a row of REAL or LREAL that was taken at `stamp_s`. SourceError where it is not one."""
+        """One sample: a row of REAL or LREAL, taken at `stamp_s`. SourceError if it is not one."""
         taken = values(row, len(self._channels))
         return self.number(stamp_s, 1), stamp_s, taken
 
     def batches(self, samples: Sequence[Sample]) -> list[Batch]:
-        """Batches of these samples, those that follow each other in one."""
+        """Batches of these samples; consecutive ones form one batch."""
         cuts = [0, *(i for i, (a, b) in enumerate(pairwise(samples), 1) if b[0] != a[0] + 1), len(samples)]
         pieces = [samples[a:b] for a, b in pairwise(cuts) if b > a]
         return [
@@ -66,7 +66,7 @@ class Numbered:
 
 
 def values(row: bytes, width: int) -> NDArray[np.float64]:
-    """Numbers in a row of REAL or LREAL, told by its length."""
+    """Numbers in a row of REAL or LREAL; its length determines the type."""
     dtype = {4 * width: "<f4", 8 * width: "<f8"}.get(len(row))
     if dtype is None:
         raise SourceError(

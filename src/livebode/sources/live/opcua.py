@@ -23,7 +23,7 @@ from livebode.sources.live.source import TICK_S, LiveSource
 REQUEST_S = 5.0
 PUBLISH_MS = 50
 QUEUE = 1000
-"""Batches that the server is asked to keep between two publications."""
+"""Size of the server's queue between two publications, in batches."""
 INCOMPLETE_MAX = 64
 _REFUSALS = (
     "BadCertificate", "BadSecurityChecksFailed", "BadIdentityToken", "BadUserAccessDenied", "BadSecurityPolicyRejected",
@@ -32,9 +32,9 @@ _REFUSALS = (
 
 
 class Gathered:
-    """Puts together what belongs to one moment: one array for each channel, and the number of its first sample.
+    """Combines the values of one time stamp: one array for each channel, and the number of its first sample.
 
-    At most 64 moments wait for their missing parts; older ones are given up and become gaps.
+    At most 64 time stamps wait for missing parts; older ones are dropped and become gaps.
     """
 
     def __init__(self, nodes: dict[str, str], rate_hz: float, sample_node: str | None) -> None:
@@ -46,12 +46,12 @@ class Gathered:
         self._moments: OrderedDict[datetime, dict[str, Any]] = OrderedDict()
 
     def take(self, key: str, value: Any, stamp: datetime | None) -> Batch | None:
-        """A new value of node `key`; the batch that it completes. SourceError where no batch can be made from it."""
+        """Add a new value of node `key`; returns the batch that it completes. SourceError if the values are invalid."""
         if stamp is None:
             raise SourceError(
                 "key-missing",
                 f"node {key} has no source timestamp",
-                "let the server give one for each array",
+                "configure the server to send one with each array",
                 key="SourceTimestamp",
                 node=key,
             )
@@ -68,8 +68,8 @@ class Gathered:
             lengths = [len(row) for row in rows][:8]
             raise SourceError(
                 "batch-shape",
-                f"the arrays of one moment have the lengths {lengths}",
-                "let the server give arrays of one length",
+                f"the arrays of one time stamp have different lengths {lengths}",
+                "configure the server to send arrays of equal length",
                 lengths=lengths,
             )
         stamp_s = stamp.replace(tzinfo=stamp.tzinfo or UTC).timestamp()
@@ -120,7 +120,7 @@ class OpcUaSource(LiveSource):
                 extra="opcua",
             ) from None
         self._asyncua: Any = asyncua
-        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # else it says on its own what we say in Events
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its messages would repeat our Events
         if not settings.nodes or settings.rate_hz is None:
             raise ConfigError(
                 "key-missing",
@@ -163,7 +163,7 @@ class OpcUaSource(LiveSource):
             raise ConfigError(
                 "key-missing",
                 f"source.security needs source.{missing[0]}",
-                "set it; the identity is proved with it",
+                "set it; it authenticates the client",
                 key="source",
                 keys=missing,
             )
@@ -179,7 +179,7 @@ class OpcUaSource(LiveSource):
             if name.startswith(_REFUSALS):
                 raise SourceError(
                     "refused",
-                    f"the server refused ({name})",
+                    f"the server rejected the connection ({name})",
                     "check user, password, certificates and the server's security policies",
                     status=name,
                 ) from None
@@ -206,7 +206,7 @@ class OpcUaSource(LiveSource):
                 if isinstance(item, self._asyncua.ua.StatusCode):
                     raise SourceError(
                         "refused",
-                        f"the server does not give node {text} ({item.name})",
+                        f"the server does not provide node {text} ({item.name})",
                         "check source.nodes",
                         node=text,
                         status=item.name,
@@ -222,7 +222,7 @@ class OpcUaSource(LiveSource):
         policy = getattr(security_policies, f"SecurityPolicy{self.settings.security}")
         try:
             expected = await uacrypto.load_certificate(Path(server))
-            # Asked without security: only what comes next proves that the server has the key as well.
+            # Read without security: only the secure connection proves that the server also has the key.
             plain = self._asyncua.Client(str(self.address), timeout=REQUEST_S)
             shown = {endpoint.ServerCertificate for endpoint in await plain.connect_and_get_server_endpoints()}
             expected_is_shown = uacrypto.der_from_x509(expected) in shown  # type: ignore[no-untyped-call]
@@ -245,7 +245,7 @@ class OpcUaSource(LiveSource):
 
 
 class Handler:
-    """Where asyncua brings data changes."""
+    """Receives data changes from asyncua."""
 
     def __init__(self, source: OpcUaSource, gathered: Gathered, by_node: dict[Any, str]) -> None:
         self._source, self._gathered, self._by_node = source, gathered, by_node

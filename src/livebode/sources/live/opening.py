@@ -1,4 +1,4 @@
-"""From the settings to the source: a new kind is one line in MODULES."""
+"""Create the source from its settings: a new kind is one line in MODULES."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODULES = {
     "opc.tcp": "opcua",
     "ads": "ads",
 }
-"""The module of each kind of URL; it ends with SOURCE, and imports its library when the source is made."""
+"""The module of each kind of URL; it ends with SOURCE, and imports its library when the source is created."""
 
 
 def open_source(settings: SourceSettings) -> LiveSource:
@@ -28,17 +28,17 @@ def open_source(settings: SourceSettings) -> LiveSource:
     Raises
     ------
     ConfigError
-        Where the settings do not fit the kind of source.
+        If the settings do not fit the kind of source.
     ExtraError
-        Where the package that it needs is not installed.
+        If the package that it needs is not installed.
     SourceError
-        Where the peer refuses us, or no samples come within `timeout_s`.
+        If the peer rejects the connection, or no samples arrive within `timeout_s`.
     """
     return make_source(settings).open()
 
 
 def make_source(settings: SourceSettings) -> LiveSource:
-    """The same, still to be opened; errors as `open_source` where settings do not fit or a package is missing."""
+    """The same, not yet opened; raises the errors of `open_source` for settings and missing packages."""
     if settings.url is None:
         check_keys(settings, "log")
         if settings.log is None or not settings.follow:
@@ -56,7 +56,7 @@ def make_source(settings: SourceSettings) -> LiveSource:
 
 
 def checked_address(url: str, settings: SourceSettings) -> Address:
-    """The address in the url of these settings; ConfigError where it or a key beside it is invalid."""
+    """The address in the url of these settings; ConfigError if it or a related key is invalid."""
     address = parse_address(url)
     check_keys(settings, address.scheme)
     return address

@@ -9,7 +9,7 @@ LONGEST_S = 30.0
 
 
 class Pauses:
-    """Pauses that double from 0.1 s to 30 s, each shortened by up to a half at random: many clients come back apart.
+    """Pauses that double from 0.1 s to 30 s, each shortened by up to half at random, to spread out many clients.
 
     >>> pauses = Pauses()
     >>> all(0.05 * 2**k <= pauses.next_s() <= 0.1 * 2**k for k in range(8))
@@ -25,5 +25,5 @@ class Pauses:
         return pause * random.uniform(0.5, 1.0)
 
     def reset(self) -> None:
-        """Samples came: the next pause is short again."""
+        """Samples arrived: the next pause is short again."""
         self._pause_s = FIRST_S

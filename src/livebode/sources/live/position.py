@@ -9,7 +9,7 @@ from typing import Any
 from livebode.sources.live.computer_clock import ClockReading
 
 Mark = Mapping[str, Any]
-"""Where a source that can be read again has the samples of a batch, as plain data."""
+"""Position of a batch in a source that can be read again, as plain data."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Position:
     rate_hz
         Samples per second.
     mark
-        Where a source that can be read again had the samples before.
+        Position of the previous samples in a source that can be read again.
     arrived
         This computer's clocks when the last sample arrived.
     """

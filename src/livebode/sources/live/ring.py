@@ -17,12 +17,12 @@ MAGIC = 0x474E524C  # "LRNG"
 VERSION = 1
 HEADER = struct.Struct("<IHHIIdQQ")
 FILETIME_1970 = 116_444_736_000_000_000
-"""1970 in the PLC's unit of time: 100 ns since 1601."""
+"""The year 1970 in the PLC's unit of time: 100 ns since 1601."""
 
 
 @dataclass(frozen=True)
 class Ring:
-    """The header at one moment: `count` samples were written, the last one at `stamp` (100 ns since 1601)."""
+    """The header at one time: `count` samples were written, the last one at `stamp` (100 ns since 1601)."""
 
     magic: int
     version: int
@@ -35,17 +35,17 @@ class Ring:
 
     @property
     def stamp_s(self) -> float | None:
-        """When the last sample was written, seconds since 1970; None where the PLC does not say."""
+        """When the last sample was written, seconds since 1970; None if the PLC does not state it."""
         return (self.stamp - FILETIME_1970) / 1e7 if self.stamp else None
 
 
 def read_ring(raw: bytes, symbol_bytes: int) -> tuple[Ring, np.dtype[np.floating]]:
-    """The header in `raw`, and the type of the numbers behind it, told by the size of the whole symbol.
+    """The header in `raw`, and the type of the numbers after it, derived from the size of the whole symbol.
 
     Raises
     ------
     SourceError
-        Where it is not a ring, or its numbers contradict its size.
+        If it is not a ring, or its numbers contradict its size.
     """
     if len(raw) < HEADER.size:
         raise wrong_ring(f"a ring of {len(raw)} bytes is shorter than its header", bytes=len(raw))
@@ -83,12 +83,12 @@ def wrong_ring(message: str, **facts: object) -> SourceError:
 
 
 def new_rows(ring: Ring, have: int | None) -> list[tuple[int, int]]:
-    """Samples to read, as ranges of numbers that lie in one piece in the ring: those after `have` that still stand.
+    """Samples to read, as ranges that are contiguous in the ring: those after `have` that are not overwritten yet.
 
     >>> new_rows(Ring(MAGIC, 1, 1, 100, 0, 4000.0, 0, 250), 190)
     [(190, 200), (200, 250)]
     """
-    # The slot of the oldest sample is the one that is written next.
+    # The slot of the oldest sample is written next.
     first = max(ring.count - ring.length + 1, 0 if have is None else have)
     if have is not None and have > ring.count:
         first = max(ring.count - ring.length + 1, 0)
@@ -101,7 +101,7 @@ def new_rows(ring: Ring, have: int | None) -> list[tuple[int, int]]:
 def ring_batch(
     raw: bytes, first: int, ring: Ring, after: Ring, dtype: np.dtype[np.floating], channels: tuple[Channel, ...]
 ) -> Batch | None:
-    """The rows from sample `first` on, without those that `after` tells were written over meanwhile; None for none."""
+    """The rows from sample `first`, without those overwritten by the time of `after`; None if there are none."""
     if len(channels) != ring.channels:
         raise SourceError(
             "channels-invalid",

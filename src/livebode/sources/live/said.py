@@ -1,4 +1,4 @@
-"""What a live source has to say: counts without limit, Events at a bounded pace."""
+"""Reports of a live source: counts without limit, Events at a limited rate."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KINDS = (
     "connected", "disconnected", "refused", "loss", "repeat", "reordered", "restart", "clock-jump", "wrong-rate",
     "layout-changed", "unit-changed", "malformed", "foreign", "overflow", "resumed", "replaced", "computer-clock",
 )  # fmt: skip
-"""Kinds of Events of live sources; docs/live.md says what each means."""
+"""Kinds of Events of live sources; docs/live.md explains them."""
 
 LEVELS = dict.fromkeys(KINDS, logging.WARNING) | {
     "connected": logging.INFO,
@@ -34,10 +34,10 @@ MESSAGE_MAX = 500
 
 
 class Said:
-    """Collects Events from any thread. Of each kind 50 may come at once and then 5 a second.
+    """Collects Events from any thread. Of each kind at most 50 at once, then 5 per second.
 
-    Those held back are counted, and the next Event of their kind says how many in ``details["more"]``: a flood of
-    rubbish fills neither memory nor disk.
+    The others are counted, and the next Event of their kind gives their number in ``details["more"]``: a flood of
+    invalid data fills neither memory nor disk.
 
     Parameters
     ----------
@@ -57,16 +57,16 @@ class Said:
         self._held: Counter[str] = Counter()
         self._counts = Counter(dict.fromkeys(KINDS, 0))
         self.position: tuple[int, float] = (0, 0.0)
-        """Sample and time that Events speak for which do not say it themselves."""
+        """Sample and time of Events that do not specify them."""
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often each kind happened."""
+        """Number of Events of each kind."""
         with self._lock:
             return dict(self._counts)
 
     def say(self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any) -> None:
-        """Count `kind`, and make an Event of it if there is room."""
+        """Count `kind`, and create an Event if the rate allows it."""
         with self._lock:
             self._counts[kind] += 1
             if not self._room(kind):

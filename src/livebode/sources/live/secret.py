@@ -1,4 +1,4 @@
-"""Passwords and tokens: from the environment or a file, held nowhere else, shown nowhere."""
+"""Passwords and tokens: from the environment or a file; never stored elsewhere, never shown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SECRET_BYTES_MAX = 1 << 16
 
 
 def password(settings: SourceSettings) -> str | None:
-    """The password that the settings point to; None where they point to none.
+    """The password that the settings refer to; None if there is none.
 
     Raises
     ------
@@ -24,12 +24,12 @@ def password(settings: SourceSettings) -> str | None:
 
 
 def secret(section: str, key: str, variable: str | None, path: Path | None) -> str | None:
-    """What the section's `key`_env or `key`_file points to; None where neither is given, ConfigError as `password`."""
+    """The secret at the section's `key`_env or `key`_file; None if neither is given, ConfigError as `password`."""
     if variable is not None and path is not None:
         raise ConfigError(
             "key-conflict",
             f"[{section}] has both {key}_env and {key}_file",
-            "leave out one of them",
+            "remove one of them",
             key=section,
             keys=[f"{key}_env", f"{key}_file"],
         )
@@ -47,7 +47,7 @@ def secret(section: str, key: str, variable: str | None, path: Path | None) -> s
 
 
 def _in_file(path: Path, key: str) -> str:
-    """The text of a file without the line's end behind it."""
+    """The text of a file without a line break at its end."""
     try:
         if path.stat().st_size > SECRET_BYTES_MAX:
             raise ConfigError(
@@ -71,7 +71,7 @@ def _in_file(path: Path, key: str) -> str:
 
 
 def existing(path: Path, what: str) -> str:
-    """The path as text; ConfigError where there is no readable file."""
+    """The path as text; ConfigError if there is no readable file."""
     if not path.is_file():
         raise ConfigError(
             "file-unreadable",

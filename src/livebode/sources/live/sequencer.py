@@ -1,4 +1,4 @@
-"""Sequencer: batches as they arrive in, Blocks in order out."""
+"""Sequencer: takes batches as they arrive, returns Blocks in order."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 FAR_BACK_S = 60.0
 FAR_AHEAD_S = 3600.0
 JUMP_S = 1.0
-"""A batch that is further ahead than this, and than those that may be missing, is believed when more follow it."""
+"""A batch that is further ahead than this and than possible losses is accepted only when more follow it."""
 CLOCK_S = 10.0
-"""How much longer than this computer's clock says the pause of a sender without an epoch may be by its numbers."""
+"""How much the pause of a sender without an epoch may be longer by its numbers than by this computer's clock."""
 _EPOCHS_REMEMBERED = 64
 
 
 class Sequencer:
     """Puts batches in order by the numbers of their samples.
 
-    Batches that arrive at most `reorder` batches late are put right; what is then still missing is lost: the next Block
-    begins at the later number with its gap flag. What comes twice is dropped. A restart of the sender, told by its
-    epoch or by numbers that begin again, is a gap of unknown size. Blocks are numbered from the first sample received,
-    or from where a record continues (`resume`).
+    Batches that arrive at most `reorder` batches late are sorted; samples that are then still missing are lost: the
+    next Block begins at the later number with its gap flag. Repeats are dropped. A restart of the sender, detected
+    from its epoch or from numbers that begin again, is a gap of unknown size. Blocks are numbered from the first
+    sample received, or from the position at which a run continues (`resume`).
 
-    A batch out of place is believed only when more of its kind follow and none of the stream comes between them; a
-    sender that was replaced is believed again in the same way. Memory is bounded by that and by `reorder`.
+    A batch that is out of place is accepted only when more of its kind follow, with none of the stream between them; a
+    sender that was replaced is accepted again in the same way. This and `reorder` bound the memory.
 
     Parameters
     ----------
     said
-        Where losses, repeats, reordering and restarts are told.
+        Collector of Events; receives losses, repeats, reordering and restarts.
     reorder
-        Batches to wait for a missing one; also how many are gathered before the stream begins.
+        Number of batches to wait for a missing one, and to collect before the stream begins.
     wait_s
         Longest time to wait for a missing one.
     rate_hz
-        The rate that must be, where it is known beforehand.
+        Required rate, if it is known in advance.
     confirmed
-        Batches that a new epoch must bring before it is believed: 1 where nobody else can send.
+        Batches of a new epoch that must arrive before it is accepted: 1 if only one sender is possible.
     """
 
     def __init__(
@@ -71,18 +71,18 @@ class Sequencer:
         self._resumed: Position | None = None
         self._paced = True
         self.lost = 0
-        """Samples that were lost, of those whose number is known."""
+        """Samples known to be lost."""
 
     @property
     def first_sample(self) -> int | None:
-        """The sender's number of the sample at which it was begun, or begun anew; None before."""
+        """The sender's number of the sample at its last start; None before the first."""
         return None if self._next is None else self._begun_at
 
     def resume(self, position: Position, *, paced: bool = True) -> None:
-        """Continue a record at this position, before anything came.
+        """Continue a record at this position; to be called before the first batch.
 
-        The sender's numbers tell exactly what is missing. Where it was restarted, this computer's clock estimates it,
-        if the sender is `paced`: sends its samples when they are taken.
+        The sender's numbers give exactly what is missing. After a restart of the sender, this computer's clock
+        estimates it, if the sender is `paced`, that is sends its samples when they are taken.
         """
         self._resumed, self._paced = position, paced
         self._epoch, self._next, self._number = position.epoch, position.number, position.sample
@@ -90,26 +90,26 @@ class Sequencer:
         self._said.position = (position.sample, position.sample / position.rate_hz)
 
     def push(self, batch: AnyBatch) -> list[LiveBlock]:
-        """Blocks that this batch completes."""
+        """Blocks completed by this batch."""
         aligned = self.face.aligned(batch)
         if aligned is None:
             return []
         if self._epoch is None:
             self._epoch = batch.epoch
         if self._fits(aligned):
-            self._doubts.dismiss(self._epoch, self._next)  # the stream goes on, so they were none of it
+            self._doubts.dismiss(self._epoch, self._next)  # the stream continues, so they did not belong to it
             return self._insert(aligned)
         return self._doubt(aligned)
 
     def poll(self, now_s: float) -> list[LiveBlock]:
-        """Blocks that have waited long enough for what is missing before them; `now_s` as in `arrived_s`."""
+        """Blocks that waited long enough for missing samples before them; `now_s` as in `arrived_s`."""
         if not self._waiting:
             return []
         since = max(self._progress_s, min(batch.arrived_s for batch in self._waiting.values()))
         return self._release(0) if now_s - since > self._wait_s else []
 
     def finish(self) -> list[LiveBlock]:
-        """Blocks of everything that still waits: nothing more will come."""
+        """Blocks of all waiting batches, at the end of the source."""
         self._doubts.dismiss(self._epoch, self._next)
         return self._release(0)
 
@@ -124,7 +124,7 @@ class Sequencer:
         return batch.stop > self._next and batch.first_sample <= max(self._next, self._highest) + ahead
 
     def _ahead_max(self, batch: AnyBatch) -> float:
-        """How many samples a sender can be ahead of where the stream was, unless it was restarted."""
+        """How many samples a sender that was not restarted can be ahead of the stream."""
         if self._epoch:
             return float("inf")
         seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
@@ -141,13 +141,13 @@ class Sequencer:
             self._repeat(batch)
             return []
         if batch.first_sample < self._highest:
-            self._said.say("reordered", f"sample {batch.first_sample} of the sender came late and was put in its place")
+            self._said.say("reordered", f"sample {batch.first_sample} of the sender arrived late and was sorted in")
         self._highest = max(self._highest, batch.first_sample)
         self._waiting[batch.first_sample] = batch
         return self._release(self._reorder)
 
     def _release(self, waiting_max: int) -> list[LiveBlock]:
-        """What is in order, and beyond what is missing while more than `waiting_max` batches wait."""
+        """Blocks in order; while more than `waiting_max` batches wait, also those after missing samples."""
         blocks = []
         while self._waiting:
             first = min(self._waiting)
@@ -183,10 +183,10 @@ class Sequencer:
         rate_hz = self.face.rate_hz or 1.0
         self.lost += missing
         self._number += missing
-        unsure = "; the sender sends no epoch, so that a restart of it meanwhile would not be seen"
+        unsure = "; the sender sends no epoch, so a restart during the pause would not be detected"
         self._said.say(
             "loss",
-            f"{missing} samples did not come{unsure if self._resumed is not None and not self._epoch else ''}",
+            f"{missing} samples were lost{unsure if self._resumed is not None and not self._epoch else ''}",
             sample=self._number,
             rate_hz=rate_hz,
             missing_samples=missing,
@@ -194,10 +194,10 @@ class Sequencer:
         self._next, self._gap = first, True
 
     def _repeat(self, batch: AnyBatch) -> None:
-        self._said.say("repeat", f"sample {batch.first_sample} of the sender came again and was dropped")
+        self._said.say("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
 
     def _doubt(self, batch: AnyBatch) -> list[LiveBlock]:
-        """A batch that is not where the stream goes on: a repeat, a jump, another sender, or this one begun anew."""
+        """Handle a batch that does not continue the stream: a repeat, a jump, another sender, or a restart."""
         far = self._next is None or batch.stop < self._next - FAR_BACK_S * batch.rate_hz
         ahead = batch.epoch == self._epoch and self._next is not None and batch.first_sample > self._next
         if self._is_told_again(batch):
@@ -216,12 +216,12 @@ class Sequencer:
         return self._restart(believed)
 
     def _is_told_again(self, batch: AnyBatch) -> bool:
-        """Whether a broker gives again what the record has already: an epoch that is the same was not begun anew."""
+        """Whether a broker repeats samples that are already recorded: with the same epoch there was no restart."""
         known = self._resumed is not None and bool(self._epoch) and batch.epoch == self._epoch
         return known and self._next is not None and batch.stop <= self._next
 
     def _restart(self, believed: list[AnyBatch]) -> list[LiveBlock]:
-        """Go on with these batches of another epoch, or of numbers that begin again."""
+        """Continue with these batches of another epoch, or of numbers that begin again."""
         blocks = self._release(0)
         epoch, first = believed[0].epoch, min(batch.first_sample for batch in believed)
         offset = self._left.pop(epoch, None)
@@ -244,27 +244,27 @@ class Sequencer:
 
     def _begin_anew(self, batch: AnyBatch, first: int) -> None:
         seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
-        missing, how = 0, "how long it paused is not known"
+        missing, how = 0, "the length of its pause is not known"
         if seconds is not None:
             step = batch.layout.hop if isinstance(batch, SpectraBatch) else 1
             missing = step * round(seconds * batch.rate_hz / step)
-            how = f"by this computer's clock it paused for {seconds:.1f} s, which is an estimate"
+            how = f"its pause was {seconds:.1f} s by this computer's clock, which is an estimate"
         self._number += missing
         self._say_restart(
-            f"the sender started again at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
+            f"the sender restarted at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
         )
         self._next, self._resumed = None, None
 
     def _return_to(self, epoch: int, offset: int, first: int) -> None:
-        """Trust a replaced sender again: its numbers still tell the time."""
+        """Accept a replaced sender again: its numbers still give the time."""
         lost = max(0, self._number + offset - first)
         self.lost += lost
         self._next = self._number + offset
         other = "" if self._epoch is None else f" {self._epoch:#x}"
         self._say_restart(
-            f"the sender of epoch {epoch:#x} still sends, and that of epoch{other}, which had replaced it, is silent; "
-            f"it continues at its sample {max(first, self._next)}, and {lost} samples of it were not recorded. "
-            "If only one machine may send, name its address in source.sender",
+            f"the sender of epoch {epoch:#x} still sends, and the one that replaced it (epoch{other}) is silent; "
+            f"the first continues at its sample {max(first, self._next)}; {lost} of its samples were not recorded. "
+            "If only one machine may send, set its address in source.sender",
             epoch, first, lost_samples=lost,
         )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The keys of [source], as plain data, and which of them belong together."""
+"""The keys of [source], as plain data, and which of them can be combined."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ TAKEN: dict[str, set[str]] = {
     "opc.tcp": {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | LOGIN | TLS - {"ca_file"},
     "ads": {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"},
 }
-"""Which keys each kind of URL takes, beside `url` and `timeout_s`."""
+"""Keys of each kind of URL, in addition to `url` and `timeout_s`."""
 LOG = {"log", "time", "rate_hz", "follow"}
 
 
 class SourceSettings(BaseModel):
     """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/live.md has its keys.
 
-    Relative paths are from the file that names them.
+    Relative paths are relative to the file that contains them.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -64,12 +64,12 @@ class SourceSettings(BaseModel):
 
     @property
     def live(self) -> bool:
-        """Whether the samples come as time passes."""
+        """Whether the samples arrive in real time."""
         return self.url is not None or self.follow
 
     @property
     def title(self) -> str:
-        """What to call it in a picture."""
+        """Name of the source in a picture."""
         return self.log.name if self.log is not None else self.url or ""
 
     def beside(self, folder: Path) -> SourceSettings:
@@ -81,13 +81,13 @@ class SourceSettings(BaseModel):
 
 
 def check_keys(settings: SourceSettings, kind: str) -> None:
-    """ConfigError for a key that has no meaning for this kind of source: the scheme of a URL, or "log"."""
+    """ConfigError for a key that does not apply to this kind of source: the scheme of a URL, or "log"."""
     taken = LOG if kind == "log" else TAKEN[kind] | {"url"}
     if stray := sorted(settings.model_fields_set - taken - {"timeout_s"}):
         raise ConfigError(
             "key-unused",
-            f"source.{stray[0]} has no meaning for {kind}",
-            f"take it out; {kind} takes {', '.join(sorted(taken))}",
+            f"source.{stray[0]} does not apply to {kind}",
+            f"remove it; the keys of {kind} are {', '.join(sorted(taken))}",
             key=f"source.{stray[0]}",
             source=kind,
             allowed=sorted(taken),

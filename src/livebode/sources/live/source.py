@@ -1,4 +1,4 @@
-"""LiveSource: what every live source has in common. A new one implements `_receive`."""
+"""LiveSource: the common part of all live sources. A new one implements `_receive`."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.naming import nearest
 
 TICK_S = 0.1
-"""How soon a request to end is seen."""
+"""Longest time until a request to end is detected."""
 
 
 class LiveSource(ABC):
     """A machine that sends its samples in batches, as a source of Blocks.
 
-    A thread receives and reconnects by itself with growing pauses; `blocks` puts the batches in order. A source that is
-    not emptied fast enough drops what comes then, which becomes a gap, unless its sender can wait.
+    A thread receives and reconnects with increasing delay; `blocks` sorts the batches. A source that is not read fast
+    enough makes its sender wait; if the sender cannot wait, samples are dropped, which is a gap.
 
     Use it as a context manager, or call `close`.
     """
@@ -47,9 +47,9 @@ class LiveSource(ABC):
     reorders: ClassVar[bool] = False
     """Whether batches can arrive in another order than they were sent."""
     waits: ClassVar[bool] = False
-    """Whether the sender can wait until there is room."""
+    """Whether the sender can wait until the queue has room."""
     paced: ClassVar[bool] = True
-    """Whether samples come when they are taken, so that this computer's clock tells how long it was paused."""
+    """Whether samples arrive when they are taken, so that this computer's clock gives the length of a pause."""
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
@@ -71,7 +71,7 @@ class LiveSource(ABC):
         self._outage = False
         self._failure: BaseException | None = None
         self._refused: SourceError | None = None
-        self._trouble: object = "nobody sent anything"
+        self._trouble: object = "nothing was received"
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
@@ -79,19 +79,19 @@ class LiveSource(ABC):
 
     @abstractmethod
     def _receive(self) -> bool:
-        """Connect and call `_deliver` for what comes, until `_stop` is set (then False) or the sender's end (True).
+        """Connect and call `_deliver` for each batch, until `_stop` is set (then False) or the sender's end (True).
 
         Raises
         ------
         OSError
-            Where there is no connection, or no longer one; it is tried again.
+            If there is no connection, or it is lost; `_receive` is called again.
         SourceError
-            With the code "refused" where trying again would not help (certificate, password, policy).
+            With the code "refused" if a retry would not help (certificate, password, policy).
         """
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Channels of the stream, as its first batch named them."""
+        """Channels of the stream, as in its first batch."""
         return self._sequencer.face.channels
 
     @property
@@ -101,17 +101,17 @@ class LiveSource(ABC):
 
     @property
     def spectra(self) -> SpectraLayout | None:
-        """What its spectra are of, where the drive sends spectra; None where it sends samples."""
+        """Layout of its spectra, if the drive sends spectra; None if it sends samples."""
         return self._sequencer.face.spectra
 
     @property
     def samples(self) -> int | None:
-        """None: it has no end that is known."""
+        """None: the end is not known."""
         return None
 
     @property
     def first_sample(self) -> int | None:
-        """The sender's number of the sample at which it was begun (or begun anew)."""
+        """The sender's number of the sample at its last start."""
         return self._sequencer.first_sample
 
     @property
@@ -134,24 +134,24 @@ class LiveSource(ABC):
 
     @property
     def waiting_s(self) -> float:
-        """The machine's time that was received and is not tracked yet: the backlog."""
+        """Machine time that was received and is not tracked yet: the backlog."""
         return self._inbox.seconds
 
     def resume(self, position: Position) -> None:
         """Continue a record at this position: to be called before `open`.
 
-        Blocks are numbered on from there, and the sender's numbers and epoch tell exactly what is missing.
+        Blocks are numbered from there, and the sender's numbers and epoch give exactly what is missing.
         """
         self._resumed = position
         self._sequencer.resume(position, paced=self.paced)
         exact = (
-            "its numbers tell what is missing"
+            "its numbers give what is missing"
             if position.epoch
-            else "it sends no epoch, so that what is missing is an estimate if it was restarted meanwhile"
+            else "it sends no epoch: if it was restarted during the pause, what is missing is an estimate"
         )
         self._said.say(
             "resumed",
-            f"continues behind sample {position.number - 1} of the sender; {exact}",
+            f"continues after sample {position.number - 1} of the sender; {exact}",
             sender_sample=position.number,
             epoch=f"{position.epoch:#x}",
         )
@@ -161,15 +161,15 @@ class LiveSource(ABC):
     def open(self, late: Callable[[str], None] | None = None) -> Self:
         """Begin to receive, and wait for the first batch.
 
-        Where none comes within `timeout_s`, SourceError; with `late` a sentence is handed to it once, and the wait
-        continues until the machine sends, refuses or the source is stopped.
+        If none arrives within `timeout_s`: SourceError. With `late`, it is called once with a message, and the wait
+        continues until the machine sends, rejects the connection, or the source is stopped.
         """
         self._log(logging.INFO, f"opening {self.address}")
         self._thread.start()
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
             if late is not None and time.monotonic() > until:
-                late(f"{self.address}: no samples came within {self.settings.timeout_s:g} s ({self._trouble})")
+                late(f"{self.address}: no samples arrived within {self.settings.timeout_s:g} s ({self._trouble})")
                 until = math.inf
             if self._inbox.ended or time.monotonic() > until:
                 asked = self._stop.is_set()
@@ -183,13 +183,12 @@ class LiveSource(ABC):
     def blocks(
         self, channels: Sequence[str] | None = None, until: Callable[[], bool] = lambda: False
     ) -> Iterator[LiveBlock]:
-        """The samples of `channels` as they come, from the first received; ends with the sender or with `close`.
+        """The samples of `channels` as they arrive, from the first received; ends with the sender or with `close`.
 
-        Of a drive that sends spectra they are LiveSpectra, whose sums are of all its signals.
-
-        There is one stream: what one iteration took, another does not see. An iteration that ended because `until`
-        became true (asked before each Block and ten times a second) took nothing more: another one goes on with the
-        next sample.
+        For a drive that sends spectra they are LiveSpectra, with the sums of all its signals.
+        There is one stream: samples read by one iteration are not available to another. An iteration that ends because
+        `until` is true (checked before each Block and ten times a second) reads nothing more: the next iteration
+        continues with the next sample.
 
         Raises
         ------
@@ -215,11 +214,11 @@ class LiveSource(ABC):
         return self._said.drain()
 
     def stop(self) -> None:
-        """Ask it to end: `blocks` gives what was received and then ends. May be called from a signal handler."""
+        """Request the end: `blocks` returns what was received and then ends. May be called from a signal handler."""
         self._stop.set()
 
     def close(self) -> None:
-        """End it and wait until its connection is closed."""
+        """End the source and wait until its connection is closed."""
         self.stop()
         self._inbox.close()
         if self._thread.ident is not None:
@@ -252,12 +251,12 @@ class LiveSource(ABC):
             self._ready += self._sequencer.push(batch)
 
     def _silence(self, asked: bool) -> SourceError:
-        """The error that no samples came, until the end was asked for or time was up."""
-        when = "before it was ended" if asked else f"within {self.settings.timeout_s:g} s"
+        """The error that no samples arrived before the source was stopped or the timeout."""
+        when = "before the source was stopped" if asked else f"within {self.settings.timeout_s:g} s"
         address, cause = str(self.address), self._trouble.code if isinstance(self._trouble, LivebodeError) else ""
         return SourceError(
             "no-samples",
-            f"no samples came {when} ({self._trouble})",
+            f"no samples arrived {when} ({self._trouble})",
             "check that the machine is on and sends",
             address=address,
             timeout_s=self.settings.timeout_s,
@@ -279,10 +278,10 @@ class LiveSource(ABC):
                     pause_s = self._pauses.next_s()
                     self._log(logging.DEBUG, f"no connection ({self._trouble}); next attempt in {pause_s:.1f} s")
                     self._stop.wait(pause_s)
-        except BaseException as error:  # of ours, or the library's: it must not vanish with the thread
+        except BaseException as error:  # any error: it must not be lost with the thread
             if isinstance(error, SourceError) and error.code == "source.refused":
                 self._refused = error.at(str(self.address))
-                self._said.say("refused", f"{self._refused}; it is not tried again")
+                self._said.say("refused", f"{self._refused}; no further attempt is made")
             else:
                 self._failure = error
         finally:
@@ -297,18 +296,18 @@ class LiveSource(ABC):
         self._logger.log(level, "%s", message if address in message else f"{address}: {message}")
 
     def _stands(self) -> None:
-        """A connection stands."""
+        """The connection is established."""
         self._connected, self._outage = True, False
         self._said.say("connected", f"connected to {self.address}")
 
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
-        """Of a record that continues the channels are known before new samples come."""
+        """Set the channels of a record that continues; they are known before new samples arrive."""
         if self._resumed is not None:
             self._sequencer.face.announce(channels, rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
-            self._said.say("disconnected", f"{self.address}: {why}; it is tried again with growing pauses")
+            self._said.say("disconnected", f"{self.address}: {why}; retrying with increasing delay")
         self._connected, self._outage, self._trouble = False, True, why
 
     def _malformed(self, why: object) -> None:

@@ -1,4 +1,4 @@
-"""SpectraBatch: what a drive delivers at once that sends spectra, and LiveSpectra: Spectra that know when they came."""
+"""SpectraBatch: spectra that a drive delivers at once. LiveSpectra: Spectra with their time of arrival."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class LiveSpectra(Spectra, LiveBlock):
 
 @dataclass(frozen=True, eq=False)
 class SpectraBatch:
-    """Consecutive spectra from one sender; each stands for the `hop` samples that end with its window's newest one.
+    """Consecutive spectra from one sender; each represents the `hop` samples that end with its window's newest one.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ class SpectraBatch:
     values
         float64, shape (values, spectra).
     layout
-        What the spectra are of.
+        Signals, values and lines of the spectra.
     rate_hz, epoch, stamp_s, arrived_s
         As in `Batch`.
 
     Raises
     ------
     SourceError
-        If there are no spectra or too many, shapes disagree, or a number cannot be.
+        If there are no spectra or too many, shapes disagree, or a number is invalid.
     """
 
     first_sample: int
@@ -85,7 +85,7 @@ class SpectraBatch:
 
     @property
     def samples(self) -> int:
-        """Samples that the spectra stand for."""
+        """Number of samples that the spectra represent."""
         return len(self.state) * self.layout.hop
 
     @property
@@ -98,7 +98,7 @@ class SpectraBatch:
         return int(self.sums.nbytes + self.values.nbytes + self.state.nbytes)
 
     def block(self, number: int, start: int, gap: bool) -> LiveSpectra:
-        """Spectra from sample `start` of the sender on, which get the number `number`."""
+        """Spectra from sample `start` of the sender, which gets the number `number`."""
         skipped = (start - self.first_sample) // self.layout.hop
         layout, sums = self.layout, self.sums[:, skipped:]
         shown = dict(zip((c.name for c in layout.signals), rms(sums, layout)))

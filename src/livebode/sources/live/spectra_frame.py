@@ -1,7 +1,7 @@
-r"""Spectra in frames, and the text that says what they are of. docs/live.md has both byte by byte.
+r"""Spectra in frames, and the text of their layout. docs/live.md describes both byte by byte.
 
-The text is UTF-8, one thing in each line, its parts set apart by tabs: ``window``, ``hop``, ``lines``, ``quiet``, then
-a ``signal`` for each spectrum and a ``value`` for each plain value, in the order of the payload.
+The text is UTF-8, one item per line, its parts separated by tabs: ``window``, ``hop``, ``lines``, ``quiet``, then a
+``signal`` for each spectrum and a ``value`` for each plain value, in the order of the payload.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def spectra_text(layout: SpectraLayout) -> bytes:
 
 
 def read_spectra_text(text: bytes) -> SpectraLayout:
-    """The layout in such a text; SourceError where it is not one."""
+    """The layout in such a text; SourceError if it is not one."""
     found: dict[str, list[list[str]]] = {word: [] for word in ("window", "hop", "lines", "quiet", "signal", "value")}
     try:
         rows = text.decode("utf-8").removesuffix("\n").split("\n")
@@ -53,7 +53,7 @@ def read_spectra_text(text: bytes) -> SpectraLayout:
         found[word].append(parts)
     for word in ("window", "hop", "lines", "quiet"):
         if [len(parts) for parts in found[word]] not in ([1], [] if word == "quiet" else [1]):
-            raise _wrong(f"a layout of spectra needs one line {word!r} with one part behind it", word=word)
+            raise _wrong(f"a layout of spectra needs one line {word!r} with one part after it", word=word)
     signals = [_signal(parts) for parts in found["signal"]]
     values = [_channel("value", parts, 2) for parts in found["value"]]
     check_channels(tuple(signal for signal, _, _ in signals))
@@ -106,7 +106,7 @@ def _signal(parts: list[str]) -> tuple[Channel, float, bool]:
 
 
 def encode_spectra_layout(layout: SpectraLayout, rate_hz: float, *, epoch: int = 0, sequence: int = 0) -> bytes:
-    """A frame that says what spectra are of; a sender sends it first, and then once a second.
+    """A frame with the layout of spectra; a sender sends it first, and then once a second.
 
     >>> layout = SpectraLayout((Channel("w", "N m"),), (), window=400, hop=20, lines=(2, 4))
     >>> len(encode_spectra_layout(layout, 4000))
@@ -118,7 +118,7 @@ def encode_spectra_layout(layout: SpectraLayout, rate_hz: float, *, epoch: int =
 
 
 def encode_spectra(batch: SpectraBatch, *, sequence: int = 0, double: bool = False) -> bytes:
-    """A frame with the spectra of a batch, as float32 unless `double`."""
+    """A frame with the spectra of a batch, as float32, or as float64 with `double`."""
     layout = batch.layout
     dtype = _payload(layout, double)
     rows = np.zeros(len(batch.state), dtype)
@@ -142,7 +142,7 @@ def _payload(layout: SpectraLayout, double: bool) -> np.dtype[Any]:
 
 
 def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLayout, arrived_s: float) -> SpectraBatch:
-    """The batch in the payload of a frame; SourceError where it contradicts its header or its layout."""
+    """The batch in the payload of a frame; SourceError if it contradicts its header or its layout."""
     count = len(layout.signals) + len(layout.values)
     if header.channels != count:
         raise inconsistent_frame(

@@ -1,4 +1,4 @@
-"""TCP: frames one behind the other from a sender that listens."""
+"""TCP: consecutive frames from a sender that listens."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from livebode.sources.live.source import TICK_S, LiveSource
 PIECE_BYTES = 1 << 16
 CONNECT_S = 5.0
 SILENCE_S = 30.0
-"""A connection that is silent for so long is given up: its sender may be gone without a word."""
+"""A connection without data for this time is closed: its sender may be gone without closing it."""
 DAMAGED_MAX = 16
 
 
@@ -34,7 +34,7 @@ class TcpSource(LiveSource):
                 except TimeoutError:
                     silent_s += TICK_S
                     if silent_s > SILENCE_S:
-                        raise ConnectionError(f"the sender was silent for {SILENCE_S:g} s") from None
+                        raise ConnectionError(f"the sender sent nothing for {SILENCE_S:g} s") from None
                     continue
                 if not piece:
                     raise ConnectionError("the sender closed the connection")
@@ -42,10 +42,10 @@ class TcpSource(LiveSource):
                 for frame in splitter.feed(piece):
                     self._decode(decoder, frame)
                 if splitter.skipped > skipped:
-                    self._malformed(f"{splitter.skipped - skipped} bytes belong to no frame")
+                    self._malformed(f"{splitter.skipped - skipped} bytes do not belong to a frame")
                     skipped = splitter.skipped
                 if splitter.damaged > DAMAGED_MAX:
-                    raise ConnectionError("the sender sends nothing but damaged frames")
+                    raise ConnectionError("the sender sends only damaged frames")
         return False
 
     def _decode(self, decoder: FrameDecoder, frame: bytes) -> None:

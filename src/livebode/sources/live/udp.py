@@ -1,4 +1,4 @@
-"""UDP: frames that anyone may send to a port of ours."""
+"""UDP: frames that any sender may send to our port."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class UdpSource(LiveSource):
 
 
 def plain_address(host: str) -> IPv4Address | IPv6Address:
-    """The address without a zone, and of IPv4 where an IPv6 port shows it as one of its own.
+    """The address without a zone; an IPv4 address that an IPv6 port maps to IPv6 is IPv4 again.
 
     >>> plain_address("::ffff:192.168.0.5"), plain_address("fe80::1%eth0")
     (IPv4Address('192.168.0.5'), IPv6Address('fe80::1'))
