@@ -78,7 +78,7 @@ def style(dark: bool) -> Style:
 
 @contextmanager
 def drawing(look: Style) -> Iterator[None]:
-    """Use Matplotlib's defaults with this look, whatever the user's matplotlibrc is; restore the settings afterwards."""
+    """Use Matplotlib's defaults with this look, whatever the user's matplotlibrc is; restore settings afterwards."""
     import matplotlib
 
     settings: Any = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith("backend")}
@@ -168,8 +168,8 @@ def empty_note(axes: Axes, look: Style, text: str = "no valid response") -> None
 def shortened(text: str, letters: int) -> str:
     """One line of at most `letters` columns: control characters become spaces, and the middle is removed.
 
-    >>> shortened("a channel name that goes on", 15)
-    'a chann…goes on'
+    >>> shortened("a channel with a long name", 15)
+    'a chann…ng name'
     """
     text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     if columns(text) <= letters:
