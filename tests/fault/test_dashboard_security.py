@@ -66,7 +66,7 @@ def test_a_viewer_may_only_look(watched: Watched) -> None:
     assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
     headers = {"Origin": origin(watched), "Cookie": mine, "Content_Type": "application/json"}
     status, _, body = ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, **headers)
-    assert (status, json.loads(body)["error"]) == (403, "this session may only look")
+    assert (status, json.loads(body)["error"]) == (403, "this session is read-only")
     with connect(
         f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched), additional_headers={"Cookie": mine}
     ) as live:

@@ -38,7 +38,7 @@ class Recent:
         self._kept += len(kept)
         self.count += len(kept)
         if len(self._parts) > _PARTS_MAX or self._kept > 2 * self._most(responses):
-            # The data of a one-row part are a third of its memory; its array objects are the rest. Joined rows are a copy.
+            # A one-row part takes three times the memory of its data, for its array objects. Joined rows are a copy.
             self._parts = [Responses.join([Responses.join(self._parts)[-self._most(responses) :]])]
             self._kept = len(self._parts[0])
 
