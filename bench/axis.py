@@ -41,7 +41,7 @@ def ratio(options: dict) -> float:
 
 
 def verdict(reached: bool) -> str:
-    return "reached" if reached else "SHORT"
+    return "met" if reached else "missed"
 
 
 def main() -> None:

@@ -43,7 +43,7 @@ def main() -> None:
     print(f"{'what':28} {'spectra/s':>9} {'samples B/s':>12} {'spectra B/s':>12} {'ratio':>7} {'target':>7}")
     for what, per_second, samples, spectra in measure():
         target = TARGETS[per_second]
-        verdict = "" if spectra <= target * samples else "  SHORT"
+        verdict = "" if spectra <= target * samples else "  missed"
         print(
             f"{what:28} {per_second:9} {samples:12.0f} {spectra:12.0f} {'1/' + format(samples / spectra, '.1f'):>7} "
             f"{'1/' + format(1 / target, '.0f'):>7}{verdict}"

@@ -116,7 +116,7 @@ def main() -> None:
     parser.add_argument("--browsers", type=int, default=1)
     asked = parser.parse_args()
     lines = Lines(tuple(range(5, 5 + asked.lines)), WINDOW, RATE_HZ)
-    load, met = os.getloadavg()[0], {True: "met", False: "SHORT"}
+    load, met = os.getloadavg()[0], {True: "met", False: "missed"}
     print(f"{os.cpu_count()} cores, load {load:.1f} before; {asked.lines} lines, browsers: {asked.browsers}")
     got = measured(asked.seconds, lines, asked.browsers)
     frames, cpu = got["frames"], got["cpu"]

@@ -83,7 +83,7 @@ def main() -> None:
     found = {name: min(way() for _ in range(REPEATS if name[0] == "l" else 3)) for name, way in ways.items()}
     theirs = found["scipy least_squares"]
     for name, ms in found.items():
-        verdict = "" if name[0] == "s" else f"target ≤ {TARGET_MS:g} ms: {'reached' if ms <= TARGET_MS else 'SHORT'}"
+        verdict = "" if name[0] == "s" else f"target ≤ {TARGET_MS:g} ms: {'met' if ms <= TARGET_MS else 'missed'}"
         print(f"{name:26}{ms:8.3f} ms{theirs / ms:8.1f} × scipy's speed   {verdict}")
 
 

@@ -203,7 +203,7 @@ def report(scenario: Scenario, found: dict[str, float]) -> None:
         (f"p99 ≤ {1e3 * TARGET_S:g} ms", found["p99, ms"] <= 1e3 * TARGET_S),
         (f"nothing lost, at most {CORES} cores", whole),
     ):
-        print(f"  target {target}: {'reached' if reached else 'SHORT'}", flush=True)
+        print(f"  target {target}: {'met' if reached else 'missed'}", flush=True)
 
 
 def _free_ports(count: int) -> list[int]:

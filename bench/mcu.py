@@ -101,7 +101,7 @@ def main() -> None:
             m4f = counted.kernel[21, "rows"]
     cycles = CYCLES * m4f.sample
     share = cycles * RATE_HZ / CLOCK_HZ
-    verdict = "" if m4f.sample <= LIMIT else " SHORT"
+    verdict = "" if m4f.sample <= LIMIT else " missed"
     print(
         f"{M4F.name}, 21 lines, {CHANNELS} channels: {m4f.sample:.0f} of {LIMIT} instructions a sample{verdict}, about"
     )

@@ -81,4 +81,4 @@ def report(result: dict[str, float]) -> None:
         print(f"{label:60}{value:12.4g}")
     for label in ("responses", "with samples"):
         share = result[f"{label}: share of one core for {AXES} axes"]
-        print(f"target ≤ {TARGET:g} of one core, {label}: {share:.3f} ({'reached' if share <= TARGET else 'SHORT'})")
+        print(f"target ≤ {TARGET:g} of one core, {label}: {share:.3f} ({'met' if share <= TARGET else 'missed'})")

@@ -77,7 +77,7 @@ def show(lines: list[Record], instruction_set: str) -> None:
             print(f"  {question}")
         sign = "≥" if line["more_is_better"] else "≤"
         target = "" if line["reached"] is None else f"{sign} {line['bound']:<5g}"
-        verdict = {None: "", True: "reached", False: "SHORT"}[line["reached"]]
+        verdict = {None: "", True: "met", False: "missed"}[line["reached"]]
         print(f"    N = {line['window']:<5} K = {line['bins']:<4} {line['ratio']:7.2f} × {target:9}{verdict}")
 
 

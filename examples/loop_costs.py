@@ -1,4 +1,4 @@
-"""What each wrong word about the loop costs the indirect estimator, on the axis of Nevaranta 2016, Table I."""
+"""Error of the indirect estimator for each error in the loop description, on the axis of Nevaranta 2016, Table I."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def position(**wrong: object) -> PID:
 
 LOOPS = {
     "as it is": Loop(Cascade(velocity(), position())),
-    "the position loop's hold forgotten": Loop(Cascade(velocity(), position(hold="none"))),
-    "a continuous PI": Loop(Cascade(velocity(integrator="continuous"), position())),
-    "the wrong integrator rule": Loop(Cascade(velocity(integrator="forward"), position())),
+    "hold of the position loop missing": Loop(Cascade(velocity(), position(hold="none"))),
+    "continuous PI": Loop(Cascade(velocity(integrator="continuous"), position())),
+    "wrong integrator rule": Loop(Cascade(velocity(integrator="forward"), position())),
     "no position loop": Loop(velocity()),
-    "a tick of delay that is not there": Loop(Cascade(velocity(delay_ticks=1), position())),
-    "w said to be logged before the update": Loop(Cascade(velocity(), position()), excitation_logged="before"),
+    "one tick of delay too many": Loop(Cascade(velocity(delay_ticks=1), position())),
+    "w described as logged before the update": Loop(Cascade(velocity(), position()), excitation_logged="before"),
 }
 
 

@@ -1,4 +1,4 @@
-"""The paper's experiments and ours on the simulated axis: `python -m studies`, or `make studies`."""
+"""The experiments of the paper and of livebode on the simulated axis: `python -m studies`, or `make studies`."""
 
 from studies import budget, fig8_9, fig10, fig12, fig13, fig14, fits, float32, motion, nonlinearity
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 EDGES_M = np.linspace(0.25, 1.6, 28)  # a frozen machine stands for each of these 5 cm
 BACKWARD = Strokes(start_m=1.6, end_m=0.25, speed_m_per_s=STROKE.speed_m_per_s, dwell_s=STROKE.dwell_s)
 PARTS = ("noise", "motion, odd in speed", "motion, even in speed", "transient of the acceleration", "linearisation")
-PAPER = "N trades noise against lag. The budget is ours."
+PAPER = "The choice of N is a compromise between noise and lag. The budget is ours."
 
 
 def errors(recording: Recording, truth: Local, **options: object) -> tuple[Floats, Floats]:
@@ -102,7 +102,7 @@ def measure(short: bool = False) -> Result:
         whole = (float(rms(parts[name])) for name in ("total", "noise", PARTS[3], PARTS[4]))
         rows.append((way, total, *by_part.values(), summed, *whole))
         why = "the parts are not independent: " + ", ".join(f"{name} {e:.3g}" for name, e in by_part.items())
-        verdicts.append(Verdict(f"{way}: root of the parts' squares off the total, %",
+        verdicts.append(Verdict(f"{way}: root of the parts' sum of squares, difference from the total, %",
                                 100 * abs(summed / total - 1), 10.0, why=why))  # fmt: skip
     header = ("dated at", "total", *PARTS, "root of the sum of squares", *(
         f"whole stroke: {name}" for name in ("total", "noise", "transient", "linearisation")))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Crest factors by clipping, another method than ours: E. Van der Ouderaa, J. Schoukens, J. Renneboog 1988.
+"""Crest factors by clipping, an alternative method: E. Van der Ouderaa, J. Schoukens, J. Renneboog 1988.
 
 The period is clipped at a share of its peak, and the phases of what is left go back to the wanted amplitudes, again and
 again; the share rises slowly. From Schroeder's phases and many random ones.

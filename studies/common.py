@@ -63,7 +63,7 @@ def track(block: Block, window: int = WINDOW, **options: Any) -> Responses:
 
 
 def correct(axis: BeltAxis, block: Block, chunk: int, told: Settings, **options: Any) -> Responses:
-    """The same through a MotionCorrection that fits `chunk` samples at a time."""
+    """The same with a MotionCorrection that fits `chunk` samples at a time."""
     correction = MotionCorrection(told, radius_m=axis.mechanics.radius_m, chunk_samples=chunk, **options)
     return Responses.join([correction.process(block), correction.finish()])
 

@@ -2,8 +2,8 @@
 
 python -m studies.crest [--long]
 
-One search is by our own method, the other by clipping. Without --long they are left out, which take half an hour; what
-they found earlier stands in.
+One search is by our own method, the other by clipping. They take half an hour. Without --long they are left out, and
+their earlier results are used.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def row(count: int, long: bool) -> str:
         own = crest(count, low_crest_phases(np.arange(1, count + 1), seed=LONG_SEED, starts=starts))
         clipped = crest(count, clipped_phases(count, clipping_starts, LONG_SEED))
     best = min(own, clipped)
-    verdict = "reached" if found <= TARGET * best else "SHORT"
+    verdict = "met" if found <= TARGET * best else "missed"
     return (
         f"| {count} | {crest(count, schroeder_phases(count)):.3f} | {found:.3f} | {seconds:.1f} s | {own:.4f} "
         f"| {starts} | {clipped:.4f} | {clipping_starts} | {found / best:.3f}, {verdict} |"

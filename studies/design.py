@@ -1,4 +1,4 @@
-"""Peaks that a design predicts beside those of the simulated axis, in the periodic state and brought in from rest.
+"""Peaks predicted by a design, compared with the simulated axis, in the periodic state and after a start from rest.
 
 python -m studies.design
 """
@@ -21,7 +21,7 @@ RAMP_S, SECONDS = 0.5, 20.0
 
 
 def row(name: str, axis: BeltAxis, lines, samples: np.ndarray) -> str:
-    """Predicted/simulated for each quantity, and what switching on from rest does to the following error."""
+    """Predicted/simulated for each quantity, and the following error when the excitation is switched on at rest."""
     at_m = axis.motion.cycle(axis.drive.rate_hz)[0]
     moves = len(at_m) > 1
     simulated = extremes(
@@ -30,14 +30,14 @@ def row(name: str, axis: BeltAxis, lines, samples: np.ndarray) -> str:
     predicted = worst(peaks(Waveform(lines, samples), belt_machine(axis)))
     cells, ratios = [], []
     for quantity, (low, high) in simulated.items():
-        told, seen = predicted[quantity].size, max(high, -low)
+        forecast, seen = predicted[quantity].size, max(high, -low)
         if quantity == "travel":  # of a moving axis the end at which it is predicted worst
             beyond = [(at_m.min() - predicted[quantity].low, at_m.min() - low)]
             beyond += [(predicted[quantity].high - at_m.max(), high - at_m.max())]
-            told, seen = max(beyond, key=lambda pair: abs(pair[0] / pair[1] - 1) if moves else pair[1])
-        ratios.append(told / seen)
-        cells.append(f"{told:.3g} / {seen:.3g}")
-    verdict = "reached" if max(abs(r - 1) for r in ratios) <= TARGET else "SHORT"
+            forecast, seen = max(beyond, key=lambda pair: abs(pair[0] / pair[1] - 1) if moves else pair[1])
+        ratios.append(forecast / seen)
+        cells.append(f"{forecast:.3g} / {seen:.3g}")
+    verdict = "met" if max(abs(r - 1) for r in ratios) <= TARGET else "missed"
     at_once, ramped = (f"{x:.2f}" if not moves else "" for x in started(axis, samples))
     span = f"{min(ratios):.3f} … {max(ratios):.3f}"
     return f"| {name} | {' | '.join(cells)} | {span}, {verdict} | {at_once} | {ramped} |"

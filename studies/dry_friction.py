@@ -1,4 +1,4 @@
-"""What of a standing axis under dry friction the motion's correction declares invalid, and what of a smooth one."""
+"""Windows that the correction of motion marks as not valid: at standstill under dry friction, and without friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fig. 10: the response at standstill, online with bounds and offline by a chirp; exactness and wrong words."""
+"""Fig. 10: the response at standstill, online with bounds and offline by a chirp; errors of the loop description."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PROMISES = {1.0: -expm1(-1.0), 2.0: -expm1(-4.0), THREE_SIGMA: -expm1(-(THREE_SI
 BAND_HZ = (10.0, 150.0)
 PAPER = (
     "At standstill at 0.8 m: online estimates with 3σ bars, and an offline response by chirp and (2) with coherence; "
-    "both against (14)."
+    "both compared with (14)."
 )
 
 
@@ -106,7 +106,12 @@ def against_14(shown: dict[str, Response]) -> Table:
         f = response.lines.frequency_hz[at]
         off_14, off = response.value[at] / belt().response(f), response.value[at] / sampled(f)
         rows.append((name, float(rms(decibels(off_14))), float(rms(decibels(off))), float(np.max(np.abs(off - 1)))))
-    header = ("estimate", "against (14), rms dB", "against the sampled plant, rms dB", "largest relative error")
+    header = (
+        "estimate",
+        "difference from (14), rms dB",
+        "difference from the sampled plant, rms dB",
+        "largest relative error",
+    )
     return Table(f"\\|G\\| over {BAND_HZ[0]:g} … {BAND_HZ[1]:g} Hz, one run", header, rows)
 
 
@@ -139,7 +144,7 @@ def coverage_table(machines: dict[str, list[Response]]) -> Table:
         for c, promise, inside in zip(PROMISES, PROMISES.values(), coverage(found)):
             rows.append((f"{name}, c = {c:g}", 100 * promise, float(np.mean(inside)), *inside))
         rows.append((f"{name}, mean error over sigma", "", "", *bias(found)))
-    header = ("machine, bound", "promised, %", "found, %", *(f"{f:g} Hz" for f in lines().frequency_hz))
+    header = ("machine, bound", "nominal, %", "measured, %", *(f"{f:g} Hz" for f in lines().frequency_hz))
     runs = len(machines["linear"])
     return Table(f"Share of {runs} stretches of 5 s whose error lies within the bound, %", header, rows)
 
@@ -152,10 +157,10 @@ def bound_verdicts(machines: dict[str, list[Response]]) -> list[Verdict]:
         at = lines().frequency_hz[np.argmax(most)]
         for (c, p), inside in zip(PROMISES.items(), coverage(found)):
             least = 100 * (p - 2 * np.sqrt(p * (1 - p) / (len(found) * len(inside))))
-            claim = f"{name}: errors within c = {c:g}, %, promised {100 * p:.1f} less two standard errors"
-            why = f"the mean error is {most.max():.2g} sigma at {at:g} Hz, which more averaging cannot take away"
+            claim = f"{name}: errors within c = {c:g}, %, nominal {100 * p:.1f} less two standard errors"
+            why = f"the mean error is {most.max():.2g} sigma at {at:g} Hz, which averaging does not reduce"
             if name != "linear":
-                why += "; the axis's own vibration modulates its stiffness (compare the linear machine)"
+                why += "; the vibration of the axis modulates its stiffness (compare the linear machine)"
             verdicts.append(Verdict(claim, float(np.mean(inside)), float(least), at_least=True, why=why))
     return verdicts
 

@@ -1,4 +1,4 @@
-"""Fig. 12: what a longer window costs and gains, and which window is best at a speed and a noise."""
+"""Fig. 12: the effect of a longer window, and the best window for a speed and a noise."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ CROSSES_M = (0.35, 0.5, 0.7, 0.9, 1.15, 1.4)
 # The same way for every window and speed: beyond the acceleration, and the longest window's centre lies within.
 PART_M = (0.5, 1.4)
 SHOWN_HZ = 60.0
-PAPER = "N = 50, 100 and 200 at 1 ms, and an offline response at six positions: noise against lag as N grows."
+PAPER = (
+    "N = 50, 100 and 200 at 1 ms, and an offline response at six positions: compromise between noise and lag as N "
+    "grows."
+)
 
 
 def samples(window_ms: float) -> int:
@@ -58,7 +61,7 @@ def error(recording: Recording, window_ms: float, truth: Local, newest: bool = F
 
 
 def noise_db(window_ms: float, sigma: float, truth: Local) -> float:
-    """The same of noise alone, foretold: sigma² = N·σ²/|U|², and U from the loop; no simulation."""
+    """The same of noise alone, predicted: sigma² = N·σ²/|U|², and U from the loop; no simulation."""
     window, f = samples(window_ms), lines().frequency_hz
     axis = BeltAxis()
     w = np.abs(np.fft.rfft(np.resize(EXCITATION, window))[np.rint(f * window / RATE_HZ).astype(int)])
@@ -85,21 +88,21 @@ def best_windows(law: tuple[float, float], truth: Local, short: bool) -> tuple[T
     rows, losses = [], []
     for v in SPEEDS[2:] if short else SPEEDS:
         for sigma in SIGMAS[1:2] if short else SIGMAS:
-            foretold = [
+            predicted = [
                 float(np.hypot(np.hypot(law[0] * v, law[1] * (v * t / 1000) ** 2), noise_db(t, sigma, truth)))
                 for t in WINDOWS_MS
             ]
             recording = at_speed(v, sigma, seed=1)
             found = [error(recording, t, truth) for t in WINDOWS_MS]
-            chosen, best = int(np.argmin(foretold)), int(np.argmin(found))
+            chosen, best = int(np.argmin(predicted)), int(np.argmin(found))
             loss = found[chosen] / found[best]
-            losses.append((loss, foretold[chosen] / found[chosen]))
-            rows.append((v, sigma, WINDOWS_MS[chosen], foretold[chosen], WINDOWS_MS[best], found[best], found[chosen]))
+            losses.append((loss, predicted[chosen] / found[chosen]))
+            rows.append((v, sigma, WINDOWS_MS[chosen], predicted[chosen], WINDOWS_MS[best], found[best], found[chosen]))
     header = (
-        *("speed, m/s", "noise, rad/s", "window chosen, ms", "error foretold, dB"),
-        *("best in simulation, ms", "its error, dB", "error of the chosen, dB"),
+        *("speed, m/s", "noise, rad/s", "window selected, ms", "predicted error, dB"),
+        *("best in simulation, ms", "its error, dB", "error of the selected window, dB"),
     )
-    return Table("The window that should be best, and the one that is", header, rows), losses
+    return Table("Best window by prediction, and by simulation", header, rows), losses
 
 
 def measure(short: bool = False) -> Result:
@@ -107,7 +110,7 @@ def measure(short: bool = False) -> Result:
     quiet, noisy = at_speed(STROKE.speed_m_per_s, 0.0), at_speed(STROKE.speed_m_per_s, SIGMA)
     curves = {
         "bias, no noise": [error(quiet, t, truth) for t in WINDOWS_MS],
-        "noise, foretold": [noise_db(t, SIGMA, truth) for t in WINDOWS_MS],
+        "noise, predicted": [noise_db(t, SIGMA, truth) for t in WINDOWS_MS],
         "total, dated at the centre": [error(noisy, t, truth) for t in WINDOWS_MS],
         "total, dated at the newest sample": [error(noisy, t, truth, newest=True) for t in WINDOWS_MS],
     }
@@ -121,12 +124,15 @@ def measure(short: bool = False) -> Result:
     positions = np.array(CROSSES_M)
     found_at = (f"{x:g} m" for x in CROSSES_M)
     apart = np.array(crosses) - decibels(truth(positions))
-    of_crosses = Table("Offline crosses at standstill, error of \\|G\\|, rms over the lines in dB", tuple(found_at),
-                       [tuple(rms(apart, axis=1))])  # fmt: skip
+    of_crosses = Table(
+        "Offline estimates at standstill (crosses), error of \\|G\\|, rms over the lines in dB",
+        tuple(found_at),
+        [tuple(rms(apart, axis=1))],
+    )
     worst = max(loss for loss, _ in losses)
-    why = f"the law (a = {law[0]:.3g}, b = {law[1]:.3g}) foretells errors {min(f for _, f in losses):.2g} … "
-    why += f"{max(f for _, f in losses):.2g} times those found"
-    verdicts = [Verdict("error of the window chosen beforehand over that of the best one", worst, 1.1, why=why)]
+    why = f"the law (a = {law[0]:.3g}, b = {law[1]:.3g}) predicts errors {min(f for _, f in losses):.2g} … "
+    why += f"{max(f for _, f in losses):.2g} times those measured"
+    verdicts = [Verdict("error of the window selected by prediction over that of the best window", worst, 1.1, why=why)]
     drawn = {"errors": curves, "record": noisy, "truth": truth, "crosses": np.array(crosses)[:, at], "law": law}
     return Result([Table(caption, ("window, ms", *curves), rows), best, of_crosses], verdicts, drawn)
 

@@ -1,4 +1,4 @@
-"""Fig. 8, 9: |G| tracked along a stroke, by the paper's way and by ours, two masses and three."""
+"""Fig. 8, 9: |G| tracked along a stroke, by the method of the paper and by livebode, two masses and three."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Name, what it does, and the target in dB.
+# Name, method, and the target in dB.
 WAYS: list[tuple[str, Way, float | None]] = [
     ("the paper's: 1 ms, newest sample", newest_at_1_ms, None),
     ("loop's rate, newest sample", newest, None),
@@ -38,7 +38,7 @@ WAYS: list[tuple[str, Way, float | None]] = [
     ("with the reference model, driven by u", by_model, 0.15),
     ("with the reference model, driven by w", by_model_under_w, None),
 ]
-PAPER = "|G| tracked along the stroke, line by line, with noise of 0.1 rad/s, against (14) at each position."
+PAPER = "|G| tracked along the stroke, line by line, with noise of 0.1 rad/s, compared with (14) at each position."
 
 
 # Parts of the stroke, each of the windows wholly within it: from this long after the acceleration on (None: with it).
@@ -99,17 +99,17 @@ def measure(short: bool = False) -> Result:
         if target:
             verdicts += judged(name, errors.parts, without.parts, target)
         left_out.append((name, *errors.after, *without.after))
-    header = ("way", *PARTS, *(f"{part}, no noise" for part in PARTS))
+    header = ("method", *PARTS, *(f"{part}, no noise" for part in PARTS))
     caption = f"Two masses, {len(seeds)} strokes: error of \\|G\\|, rms over all lines in dB"
     per_line = [(name, *rms(errors.db[errors.after_s >= 0], axis=0)) for name, errors in found.items()]
     of_lines = Table(
-        "The same by line, constant speed", ("way", *(f"{f:g} Hz" for f in lines().frequency_hz)), per_line
+        "The same by line, constant speed", ("method", *(f"{f:g} Hz" for f in lines().frequency_hz)), per_line
     )
     heads = ["all" if t is None else f"{t:g} s" for t in AFTER_S]
     of_time = Table(
-        "The same by what is left out: windows that begin this long after the acceleration, up to braking; all targets "
-        f"hold {held_from([(errors.after, target) for errors, (_, _, target) in zip(found.values(), WAYS)])}",
-        ("way", *heads, *(f"{head}, no noise" for head in heads)),
+        "The same for windows that begin at least this long after the acceleration, up to braking; all targets are "
+        f"met {held_from([(errors.after, target) for errors, (_, _, target) in zip(found.values(), WAYS)])}",
+        ("method", *heads, *(f"{head}, no noise" for head in heads)),
         left_out,
     )
     curves = {"record": records[0], "errors": found, "truth": truth}
@@ -128,9 +128,9 @@ def judged(name: str, errors: dict[str, float], without: dict[str, float], targe
     """The target on each part of the stroke."""
     whole, steady, beyond, settled = PARTS
     why = {
-        whole: "windows that accelerate or brake are in it, with what they leave ringing",
-        steady: "the acceleration still rings, and near the motor the stiffness changes fastest",
-        beyond: "the axis changes within the window, and the error budget splits that",
+        whole: "includes windows during acceleration and braking, and the ringing after them",
+        steady: "ringing from the acceleration remains, and near the motor the stiffness changes fastest",
+        beyond: "the axis changes within the window (see the error budget)",
         settled: "the axis changes within the window",
     }
     return [
@@ -147,12 +147,12 @@ def three_masses(seeds: list[int]) -> Table:
     rows = []
     for name, way, _ in WAYS:
         rows.append((name, *(e for errors in Errors.of(way, records, own, two) for e in errors.parts.values())))
-    header = (f"{part}, against {truth}" for truth in ("their own", "(14)") for part in PARTS)
+    header = (f"{part}, {truth}" for truth in ("own linearisation", "(14)") for part in PARTS)
     apart = float(rms(decibels(own(np.linspace(0.3, 1.55, 51)) / two(np.linspace(0.3, 1.55, 51)))))
     caption = (
-        f"Three masses: the same against their own linearisation and against (14); the two are {apart:.2f} dB apart"
+        f"Three masses: the same, compared with their own linearisation and with (14); these differ by {apart:.2f} dB"
     )
-    return Table(caption, ("way", *header), rows)
+    return Table(caption, ("method", *header), rows)
 
 
 def draw(result: Result) -> Figure:

@@ -26,8 +26,8 @@ FROZEN = Mechanics(frozen_position_m=PLACE_M)
 TRUTH = np.array([FROZEN.inertia_kg_m2, FROZEN.load_kg, FROZEN.stiffness_n_per_m, FROZEN.damping_n_s_per_m, 0, 0, 0])
 AFTER_S = 0.1  # of an acceleration's end: what is judged of a stroke begins this long after it
 PAPER = (
-    "no numbers; these are ours. At standstill a response is the average of 30 windows of 100 ms; over a stroke it is "
-    "one window of 100 ms with the motion's correction, sigma from quiet bins."
+    "no numbers; these are ours. At standstill a response is the average of 30 windows of 100 ms. Along a stroke it is "
+    "one window of 100 ms with the correction of motion, sigma from detection lines."
 )
 
 
@@ -105,9 +105,9 @@ def rubbing(short: bool) -> Table:
     header = (
         "friction, N",
         "largest error of \\|G\\|, dB",
-        "fits that hold, %",
+        "valid fits, %",
         "status friction, %",
-        "Keff of those that hold, %",
+        "Keff of the valid fits, %",
     )
     return Table("Standstill under dry friction of the cart, single windows", header, rows)
 
@@ -129,7 +129,7 @@ def measure(short: bool = False) -> Result:
     worst = float(np.max(np.abs(cover - 0.95)))
     verdicts = [
         Verdict("standstill: worst variance of Js, mL, Keff, bs over the Cramér–Rao bound", float(ratio.max()), 1.2),
-        Verdict("standstill: coverage of the 95 % bounds, farthest from 95 %, in points", 100 * worst, 2.0),
+        Verdict("standstill: coverage of the 95 % bounds, largest difference from 95 %, points", 100 * worst, 2.0),
     ]
     errors, curves = [], {"z": z}
     for seed in range(1 if short else 6):
@@ -140,7 +140,7 @@ def measure(short: bool = False) -> Result:
         errors.append((seed, *(100 * float(rms(x[found.ok] - 1)) for x in (keff, js)), *shares(found.ok, held)))
         if seed == 0:
             curves |= {"stroke": found, "stiffness": m.stiffness_at(found.schedule), "inertia": m.inertia_kg_m2}
-    along = ("seed", "Keff, rms in %", "Js, rms in %", "fits that hold, %", "Keff within its 95 % bound, %")
+    along = ("seed", "Keff, rms in %", "Js, rms in %", "valid fits, %", "Keff within its 95 % bound, %")
     tables.append(Table("One window of 100 ms along a stroke at 0.38 m/s, corrected", along, errors))
     tables.append(rubbing(short))
     keff, js = (float(rms(np.array([e[i] for e in errors]))) for i in (1, 2))

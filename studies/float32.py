@@ -1,4 +1,4 @@
-"""Fig. 8, 9 through the float32 kernel: what a drive without double precision loses, as it comes and with offsets."""
+"""Fig. 8, 9 through the float32 kernel: the loss on a drive without double precision, with and without offsets."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ WAYS = {
 OF_MODEL_MAX = 100.0
 FINEST_DB = 0.15  # the smallest target of Fig. 8, 9
 LIMITS_DB = {0.0: FINEST_DB / 100, 100.0: FINEST_DB / 10}  # by offset
-PAPER = "The number format is not a subject. The study is ours: the largest difference that is of no account."
+PAPER = "The number format is not discussed. The study is ours: the target is a negligible difference."
 
 
 def offset(recording: Recording, by: float) -> Recording:
@@ -69,7 +69,7 @@ class Apart:
 
 
 def promised(recording: Recording) -> float:
-    """Largest difference of a response over what the kernel promises: 1e-6 of √N·‖x‖₂ of the window, for both signals.
+    """Largest difference of a response over the bound of the kernel: 1e-6 of √N·‖x‖₂ of the window, for both signals.
 
     Half a unit of a sample's last digit is added, for the samples are rounded before.
     """
@@ -100,9 +100,16 @@ def measure(short: bool = False) -> Result:
             db = np.concatenate([part.db for part in parts])
             errors = [float(rms(np.array([getattr(p, of) for p in parts]))) for of in ("error_db", "error64_db")]
             rows.append((name, by, f"{rms(db):.2g}", f"{np.max(np.abs(db)):.2g}", *errors))
-    header = ("way", "offset, N m and rad/s", "difference, rms dB", "largest, dB", "error, float32", "error, float64")
+    header = (
+        "method",
+        "offset, N m and rad/s",
+        "difference, rms dB",
+        "largest, dB",
+        "error, float32",
+        "error, float64",
+    )
     caption = (
-        f"\\|G\\| through float32 against float64, whole stroke, {len(records)} strokes; and the error of each, rms dB"
+        f"Difference of \\|G\\| between float32 and float64, whole stroke, {len(records)} strokes; and errors, rms dB"
     )
     verdicts = list(judged(found, [offset(records[0], by) for by in offsets]))
     return Result([Table(caption, header, rows)], verdicts, {"found": found})
@@ -113,12 +120,12 @@ def judged(found: dict[str, dict[float, list[Apart]]], offsets: list[Recording])
     for name, each in found.items():
         for by, target in LIMITS_DB.items():
             if by in each:
-                claim = f"{name}, {f'offset {by:g}' if by else 'as it comes'}, difference in rms dB"
+                claim = f"{name}, {f'offset {by:g}' if by else 'no offset'}, difference in rms dB"
                 value = float(rms(np.concatenate([part.db for part in each[by]])))
                 verdicts.append(Verdict(claim, value, target, why="the window's rms is far above its lines"))
-    claim = "largest difference over what the kernel promises (docs/kernel.md), all offsets"
+    claim = "largest difference over the bound of the kernel (docs/kernel.md), all offsets"
     worst = max(promised(recording) for recording in offsets)
-    return [*verdicts, Verdict(claim, worst, 1.0, why="the promise does not hold")]
+    return [*verdicts, Verdict(claim, worst, 1.0, why="the bound of the kernel is exceeded")]
 
 
 def draw(result: Result) -> Figure:
@@ -139,7 +146,7 @@ def draw(result: Result) -> Figure:
         left.set_xlabel("constant offset on w, u and velocity, N m and rad/s")
         left.set_ylabel("difference of |G|, rms, dB")
         left.legend(loc="upper left", bbox_to_anchor=(0.0, 0.82))
-        right.set_title("as it comes", size=10, loc="left")
+        right.set_title("no offset", size=10, loc="left")
         right.set_xlabel("cart position, m")
         right.set_ylabel("difference of |G|, rms over lines, dB")
     return figure

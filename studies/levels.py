@@ -1,4 +1,4 @@
-"""Levels of noise, even and odd distortion: an odd random-phase multisine with quiet lines, and what it shows.
+"""Levels of noise, even and odd distortion: an odd random-phase multisine with detection lines.
 
 
 The odd-odd multisine with random quiet lines and its robust method (many phase realisations, several periods each) are
@@ -28,7 +28,7 @@ CHANCE = 1e-3  # of noise alone to be taken for more
 
 
 def odd_multisine_lines(seed: int = 0) -> Lines:
-    """Odd lines, less one of every GROUP at random; quiet are those and the even ones between."""
+    """Odd lines, less one of every GROUP at random; these and the even ones between are detection lines."""
     odd = np.arange(LOWEST_HZ, HIGHEST_HZ, 2)
     generator = np.random.default_rng(seed)
     # The outermost stay excited, so that Ĝ is never extrapolated.
@@ -69,7 +69,7 @@ class Levels:
 
     @property
     def odd(self) -> Any:
-        """The quiet ones."""
+        """The detection lines."""
         return ~self.even & ~np.isin(self.bins, self.lines.bins)
 
     def within(self, band_hz: tuple[float, float]) -> dict[str, float]:

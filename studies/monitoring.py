@@ -1,4 +1,4 @@
-"""Changes of the simulated axis: found, named, sized and placed, against the targets, and false alarms counted.
+"""Changes of the simulated axis: detection, name, amount and place compared with the targets; count of false alarms.
 
 `python -m studies.monitoring` learns a baseline from 40 healthy strokes, then judges 1,000 healthy ones and 1,000 of
 each fault, all at random speeds (0.3 … 1 times 0.38 m/s) in both directions, with σ = 0.1 rad/s, friction of 15 N and a
@@ -90,10 +90,10 @@ class Study:
             self.numbers[name] = {k: getattr(known, k).tolist() for k in ("inflation", "scatter", "smallest")}
 
     def target(self, what: str, value: float, limit: float, at_least: bool = False) -> None:
-        reached = bool(value >= limit if at_least else value <= limit)
-        self.numbers["targets"].append({"what": what, "value": value, "limit": limit, "reached": reached})
+        met = bool(value >= limit if at_least else value <= limit)
+        self.numbers["targets"].append({"what": what, "value": value, "limit": limit, "met": met})
         sign = "≥" if at_least else "≤"
-        print(f"  {what:66} {value:9.4g}  {sign} {limit:<7g} {'reached' if reached else 'SHORT'}", flush=True)
+        print(f"  {what:66} {value:9.4g}  {sign} {limit:<7g} {'met' if met else 'missed'}", flush=True)
 
     def healthy(self) -> None:
         """One monitor over all strokes, one recording of 20 after the other; its evidence is kept for other rates."""
@@ -118,7 +118,7 @@ class Study:
         self._rates(seen.rows(seen.judged))
 
     def _rates(self, seen: Evidence) -> None:
-        """What other settings give on the same healthy windows: the detector starts afresh after each alarm."""
+        """False alarms of other settings on the same healthy windows: the detector restarts after each alarm."""
         step_s = WINDOW / RATE_HZ
         rows = []
         for strokes_between in (5, 20, 100):
@@ -130,7 +130,7 @@ class Study:
                 alarms, first = alarms + (at < len(seen)), at + 1
             rows.append({"asked": self.count / strokes_between, "came": alarms})
             print(
-                f"  asked for one in {strokes_between} strokes: {alarms} came, {self.count / strokes_between:g} allowed"
+                f"  one in {strokes_between} strokes: {alarms} false alarms, {self.count / strokes_between:g} allowed"
             )
         self.numbers["rates"] = rows
         self.target("false alarms over those allowed, at worst", max(r["came"] / r["asked"] for r in rows), 1.0)
@@ -234,10 +234,10 @@ class Study:
         self._found("damping_20", "20 % more damping", done, "damping", 20.0)
 
     def windows(self) -> None:
-        """What one window tells, and what friction makes of the slowest stroke, each way."""
+        """Information of one window, and the effect of friction on the slowest stroke, by direction."""
         for speed, seed in ((0.38, 1), (0.114, 2)):
             row = {}
-            for way, ends in (("there", (LOW_M, HIGH_M)), ("back", (HIGH_M, LOW_M))):
+            for way, ends in (("forward", (LOW_M, HIGH_M)), ("return", (HIGH_M, LOW_M))):
                 watcher, kept = monitor(self.machine), []
                 for block in run(axis(RandomStrokes((speed,), *ends), seed))():
                     watcher.process(block, kept.append)
@@ -249,8 +249,8 @@ class Study:
                     "free_percent": _free(seen).tolist(),
                     "mean_percent": (100 * seen.score.sum(axis=0) / information.sum(axis=0)).tolist(),
                 }
-                told = {k: np.round(v, 3).tolist() for k, v in row[way].items()}
-                print(f"  {speed} m/s, {way}: {json.dumps(told)}")
+                shown = {k: np.round(v, 3).tolist() for k, v in row[way].items()}
+                print(f"  {speed} m/s, {way}: {json.dumps(shown)}")
             self.numbers[f"windows_{speed}"] = row
 
     def cost(self) -> None:
@@ -264,7 +264,7 @@ class Study:
             times.append(time.process_time() - begun)
         cost_us = min(times) / blocks[-1].stop * 1e6
         self.numbers["cost_us_per_sample"] = cost_us
-        print(f"\ncost: {cost_us:.2f} µs a sample, {cost_us * RATE_HZ / 1e4:.2f} % of a core at {RATE_HZ:g} Hz")
+        print(f"\ncost: {cost_us:.2f} µs per sample, {cost_us * RATE_HZ / 1e4:.2f} % of a core at {RATE_HZ:g} Hz")
 
 
 def _free(seen: Evidence) -> np.ndarray:
@@ -300,9 +300,9 @@ def main() -> None:
         study.numbers["cpu_s"] = time.process_time() - begun
         (options.out / "monitoring.json").write_text(json.dumps(study.numbers, indent=1) + "\n")
     draw(study.machine, options.out / "monitoring.png")
-    missed = [t["what"] for t in study.numbers["targets"] if not t["reached"]]
+    missed = [t["what"] for t in study.numbers["targets"] if not t["met"]]
     print(f"\n{study.numbers['cpu_s'] / 60:.1f} min of one core")
-    print("all targets reached" if not missed else f"SHORT: {'; '.join(missed)}")
+    print("all targets met" if not missed else f"missed: {'; '.join(missed)}")
 
 
 if __name__ == "__main__":

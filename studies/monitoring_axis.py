@@ -1,4 +1,4 @@
-"""The simulated axis of the monitoring study: strokes of random speed there and back."""
+"""The simulated axis of the monitoring study: forward and return strokes of random speed."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def strokes(count: int, generator: np.random.Generator) -> RandomStrokes:
 
 
 def axis(motion: Any, seed: int, **options: Any) -> BeltAxis:
-    """The axis that the targets speak of: σ = 0.1 rad/s, friction of 15 N, 20-bit encoder."""
+    """The axis of the targets: σ = 0.1 rad/s, friction of 15 N, 20-bit encoder."""
     seconds = options.pop("seconds", motion.edges_s[-1] + 2 * WINDOW / RATE_HZ if hasattr(motion, "edges_s") else 10.0)
     given: dict[str, Any] = {
         "friction": Friction(load_coulomb_n=15.0),

@@ -1,4 +1,4 @@
-"""The axis in motion: what a window's response is worth without and with the motion's correction.
+"""The axis in motion: the error of a window's response without and with the correction of motion.
 
 Truth is the local linearisation at the window's centre, sampled at the loop's rate.
 """
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 LINES = lines()
 SEEDS = 6
-PAPER = "N trades noise against lag; what the motion does to a window is left in. The study is ours."
+PAPER = (
+    "The choice of N is a compromise between noise and lag; the effect of motion on a window is not corrected. The "
+    "study is ours."
+)
 AFTER_S = 0.1  # what is judged: windows that begin this long after the acceleration's end, up to its next start
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x")
 
@@ -45,7 +48,7 @@ class Judged:
 
 
 def axis(sigma: float, strokes: int = 1, seed: int = 0, **options: Any) -> BeltAxis:
-    """Strokes there and back, whole dwells included."""
+    """Forward and return strokes, whole dwells included."""
     motion = options.pop("motion", Strokes())
     half = motion.cycle(RATE_HZ)[0].size // 2
     sensor = Sensor(noise_rad_per_s=sigma, encoder_counts_per_turn=options.pop("counts", 0))
@@ -175,7 +178,7 @@ def magnitude_db(run: BeltAxis, responses: Responses) -> float:
 
 
 class Campaign:
-    """All that is measured, as tables and verdicts."""
+    """All measurements, as tables and verdicts."""
 
     def __init__(self) -> None:
         self.tables: list[Table] = []
@@ -202,7 +205,7 @@ class Campaign:
         per_line = np.sqrt(np.mean(found["model driven by u"].db ** 2, axis=0))
         heads = (*(f"{f:g} Hz" for f in LINES.frequency_hz), "white noise alone, all lines")
         self.tables.append(Table("Model driven by u: error of \\|G\\| by line, rms dB", heads, [(*per_line, floor)]))
-        ours, noise = rows["model driven by u"], f"white noise alone makes {floor:.3g} dB of |G|"
+        ours, noise = rows["model driven by u"], f"white noise alone causes {floor:.3g} dB of |G|"
         self.target("per window, |G| in dB", ours["db"], 0.15, noise)
         self.target("per window, Keff in %", ours["keff"], 0.65, noise)
         self.target("per window, Js in %", ours["js"], 0.4, noise)
@@ -210,13 +213,13 @@ class Campaign:
     def noise_free(self) -> None:
         run = axis(0.0)
         block, _ = SimulatedAxis(run).run()
-        rows = self.table("no noise", "sigma_0", ways(run, block))
-        why = "what the model does not share with the machine stays"
+        rows = self.table("No noise", "sigma_0", ways(run, block))
+        why = "the difference between model and machine remains"
         self.target("without noise, |G| in dB", rows["model driven by u"]["db"], 0.05, why)
         loop = replace(SETTINGS, loop=run.drive.loop())
         by_w, by_u = corrected(run, block, loop, driven_by="excitation"), corrected(run, block)
         self.table(
-            "no noise, by what is judged",
+            "No noise, windows from this time after acceleration on",
             "settling",
             {
                 f"driven by {name}, {after_s:g} s after acceleration": judge(run, responses, after_s=after_s)
@@ -234,13 +237,19 @@ class Campaign:
             for name, responses in (("centre", raw), ("model driven by u", ours))
             for way, directions in (("forward", (True,)), ("backward", (False,)), ("both, 20 strokes", (True, False)))
         }
-        rows = self.table("ten strokes of each direction averaged, σ = 0.1", "ten_strokes", found)
+        rows = self.table("Ten strokes of each direction averaged, σ = 0.1", "ten_strokes", found)
         ours, single = rows["model driven by u, forward"], self.numbers["sigma_0.1"]["model driven by u"]
         for name, what, most in (("keff", "Keff", 0.3), ("js", "Js", 0.1)):
-            why = f"a window alone is {single[name]:.2g} % off, and √10 of that is {single[name] / np.sqrt(10):.2g} %"
+            least = single[name] / np.sqrt(10)
+            why = f"the error of a window is {single[name]:.2g} %; divided by √10 this is {least:.2g} %"
             self.target(f"ten forward strokes, {what} in %", ours[name], most, why)
         js = 100 * float(np.abs(model_inertias(run, block)[::2].mean() / run.mechanics.inertia_kg_m2 - 1))
-        self.target("ten forward strokes, Js of the moving model in %", js, 0.1, "the model lacks what the machine has")
+        self.target(
+            "ten forward strokes, Js of the moving model in %",
+            js,
+            0.1,
+            "the model does not contain all effects of the machine",
+        )
 
     def bounds(self, seeds: int) -> None:
         rows = []
@@ -250,9 +259,11 @@ class Campaign:
             shares = 100 * np.concatenate(each, axis=1).mean(axis=(1, 2))
             rows.append((f"{speed:g} m/s", *shares))
             for c, share, promised, most in zip((1, 2), shares, (63.2, 98.2), (3.0, 1.0)):
-                claim = f"{speed:g} m/s, coverage by bound({c}), points off {promised} %"
-                self.target(claim, abs(float(share) - promised), most, "what the motion leaves is not in sigma")
-        heads = ("strokes there and back, all that is in them", "within bound(1), %", "within bound(2), %")
+                claim = f"{speed:g} m/s, coverage by bound({c}), difference from {promised} %, points"
+                self.target(
+                    claim, abs(float(share) - promised), most, "sigma does not contain the remaining effect of motion"
+                )
+        heads = ("forward and return strokes, all windows", "within bound(1), %", "within bound(2), %")
         self.tables.append(Table(f"Bounds after the correction, σ = 0.1, {seeds} seeds", heads, rows))
 
     def three_masses(self) -> None:
@@ -263,22 +274,27 @@ class Campaign:
             plain, hann = Tracker(SETTINGS).process(block), Tracker(replace(SETTINGS, hann=True)).process(block)
             db = [magnitude_db(run, responses) for responses in (plain, hann, corrected(run, block))]
             rows.append((f"{sigma:g}", *db))
-            claim = f"three masses, σ = {sigma:g}, |G| corrected against Hann"
+            claim = f"three masses, σ = {sigma:g}: error of |G|, corrected over Hann"
             self.target(claim, db[2] / db[1], 1.0, "the free pulley is not in the model")
         heads = ("σ, rad/s", "centre", "Hann", "corrected")
-        self.tables.append(Table("Three masses against their own linearisation, rms of \\|G\\| in dB", heads, rows))
+        self.tables.append(
+            Table("Three masses compared with their own linearisation, rms of \\|G\\| in dB", heads, rows)
+        )
 
     def friction(self) -> None:
         rows = [dwelling(amplitude, friction) for amplitude in (0.3, 1.0, 3.0) for friction in (0.0, 1.0, 5.0, 15.0)]
-        heads = ("N m a line", "friction, N", "uncorrected, dB", "valid ones, dB", "events", "windows invalid, %")
-        caption = "Dry friction, dwells of 1 s: worst line of \\|G\\| while the cart stands, 95 % of windows"
+        heads = ("N m per line", "friction, N", "uncorrected, dB", "valid windows, dB", "events", "windows invalid, %")
+        caption = "Dry friction, dwells of 1 s: worst line of \\|G\\| at standstill of the cart, 95 % of windows"
         self.tables.append(Table(caption, heads, rows))
         found = [(amplitude, *smooth(amplitude, v)) for amplitude in (0.3, 1.0, 3.0) for v in (0.1, 0.38, 0.8, 1.2)]
-        heads = ("N m a line", "speed, m/s", "events", "windows invalid, %")
-        self.tables.append(Table("The same looked for where there is no dry friction", heads, found))
+        heads = ("N m per line", "speed, m/s", "events", "windows invalid, %")
+        self.tables.append(Table("The same detection without dry friction", heads, found))
         worst = max(row[3] for row in found)
         self.target(
-            "no dry friction: windows declared held, %", worst, 0.0, "what else the model lacks is taken for it"
+            "no dry friction: windows marked as held, %",
+            worst,
+            0.0,
+            "another effect that the model lacks is taken for friction",
         )
 
     def imperfect(self, seeds: int) -> None:
@@ -291,11 +307,13 @@ class Campaign:
             },
         }
         found = {name: self._pooled(seeds, **case) for name, case in cases.items()}
-        rows = self.table(f"friction and encoder, σ = 0.1, {seeds} seeds, model driven by u", "imperfect", found)
+        rows = self.table(f"Friction and encoder, σ = 0.1, {seeds} seeds, model driven by u", "imperfect", found)
         clean = self.numbers["sigma_0.1"]["model driven by u"]
         for name, what in (("db", "|G|"), ("keff", "Keff"), ("js", "Js")):
             why = "friction and rounding are not in the model"
-            self.target(f"friction and encoder, {what} against without", rows["both"][name] / clean[name], 1.1, why)
+            self.target(
+                f"friction and encoder: error of {what} over that without", rows["both"][name] / clean[name], 1.1, why
+            )
 
     def other_motions(self) -> None:
         motions = {f"forward, {v:g} m/s": Strokes(speed_m_per_s=v) for v in (0.1, 0.2, 0.38, 0.8, 1.2)}
@@ -305,7 +323,7 @@ class Campaign:
         for name, motion in both.items():
             found[f"{name}: centre"] = self._pooled(2, raw=True, motion=motion)
             found[f"{name}: corrected"] = self._pooled(2, motion=motion)
-        self.table("other speeds and directions, σ = 0.1, 2 seeds", "motions", found)
+        self.table("Other speeds and directions, σ = 0.1, 2 seeds", "motions", found)
 
     def _pooled(self, seeds: int, raw: bool = False, **case: Any) -> Judged:
         parts = []
@@ -329,7 +347,7 @@ class Campaign:
 
         tracker, ours = least(lambda: Tracker(SETTINGS).process(block)), least(lambda: corrected(run, block))
         heads = ("tracker alone", "corrected", "share of a core at 4 kHz, %")
-        self.tables.append(Table("Cost, µs a sample", heads, [(tracker, ours, ours * RATE_HZ / 1e4)]))
+        self.tables.append(Table("Cost, µs per sample", heads, [(tracker, ours, ours * RATE_HZ / 1e4)]))
 
 
 def measure(short: bool = False) -> Result:

@@ -1,4 +1,4 @@
-"""Noise, even and odd distortion of the axis with friction off and on, at standstill and slowly; Schroeder beside."""
+"""Noise, even and odd distortion of the axis with and without friction, at standstill and slowly; Schroeder phases."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ LEAD = PERIOD  # samples of each record before the first period, for a motion's 
 FRICTION = Friction(load_coulomb_n=15.0, load_stribeck_n=10.0)
 FROZEN = Mechanics(frozen_position_m=POSITION_M)
 PAPER = (
-    "Schroeder phases keep the peaks low; being fixed, they serve the detection of nonlinearity less well than random "
-    "ones. Friction near standstill is named as a weakness. The levels are ours."
+    "Schroeder phases keep the peaks low. Because they are fixed, they are less suitable for the detection of "
+    "nonlinearity than random phases. Friction near standstill is named as a weakness. The levels are ours."
 )
 
 
@@ -117,11 +117,13 @@ def measure(short: bool = False) -> Result:
         rows.append((case.name, each.crest, *whole.values(), off, apart if case in (STANDING, SCHROEDER) else ""))
         if case in (SMOOTH, STANDING, SCHROEDER, SLOW):
             of_bands += [(case.name, f"{a} … {b}", *each.within((a, b)).values()) for a, b in BANDS_HZ]
-    header = ("case", "crest factor", "noise, dB", "even, dB", "odd, dB", "\\|G\\| against the linear machine, rms dB",
-              "one run against the mean of all phases, rms dB")  # fmt: skip
+    header = (
+        *("case", "crest factor", "noise, dB", "even, dB", "odd, dB"),
+        *("\\|G\\| relative to the linear machine, rms dB", "one run relative to the mean of all phases, rms dB"),
+    )
     caption = (
-        f"At {POSITION_M} m, {realisations} phase realisations of {PERIODS} periods of 1 s: levels against the output "
-        "at the excited lines; noise is that of the mean over the periods, and is in the other two"
+        f"At {POSITION_M} m, {realisations} phase realisations of {PERIODS} periods of 1 s: levels relative to the "
+        "output at the excited lines; the noise is that of the mean over the periods, and the other two contain it"
     )
     bands = Table("The same by band", ("case", "band, Hz", "noise, dB", "even, dB", "odd, dB"), of_bands)
     return Result([Table(caption, header, rows), bands], judged(found), {"found": found})
@@ -135,23 +137,25 @@ def judged(found: dict[Case, Levels]) -> list[Verdict]:
     ]
     for kind in ("even", "odd"):
         ratio, most = found[LINEAR].above_noise(getattr(found[LINEAR], kind))
-        claim = f"{LINEAR.name}: power at the quiet {kind} lines over that of the noise"
+        claim = f"{LINEAR.name}: power at the {kind} detection lines over that of the noise"
         verdicts.append(Verdict(claim, ratio, most, why=f"chance exceeds it once in {1 / CHANCE:g}"))
     standing = whole[STANDING]
     margin = standing["odd"] - standing["even"]
     why = "the springs, which follow the cart, are even"
     verdicts.append(Verdict(f"{STANDING.name}, standstill: odd above even, dB", margin, 20.0, at_least=True, why=why))
     ratio, least = found[STANDING].above_noise(found[STANDING].odd)
-    claim = f"{STANDING.name}, standstill: power at the quiet odd lines over that of the noise"
-    verdicts.append(Verdict(claim, ratio, least, at_least=True, why="the friction is not seen"))
+    claim = f"{STANDING.name}, standstill: power at the odd detection lines over that of the noise"
+    verdicts.append(Verdict(claim, ratio, least, at_least=True, why="the friction is not detected"))
     quiet_odd = rms(np.abs(found[STANDING].mean[:, found[STANDING].odd]))
     apart = abs(float(decibels(np.array(found[STANDING].spread() / quiet_odd))))
     here, there = whole[SCHROEDER]["odd"], standing["odd"]
-    why = "with the phases of one signal, what falls on each line does not average"
-    claim = f"{SCHROEDER.name}, standstill: odd level against that of random phases, dB apart"
+    why = "with the phases of one signal, the distortion at each line does not average"
+    claim = f"{SCHROEDER.name}, standstill: odd level, difference from that with random phases, dB"
     verdicts.append(Verdict(claim, abs(here - there), 3.0, why=why))
-    claim = "friction: spread of the excited lines over the phases against the level at the quiet odd ones, dB apart"
-    verdicts.append(Verdict(claim, apart, 3.0, why="what the quiet lines show is not what the excited ones suffer"))
+    claim = "friction: spread of the excited lines over the phases, difference from the odd detection lines, dB"
+    verdicts.append(
+        Verdict(claim, apart, 3.0, why="the detection lines do not show the distortion at the excited lines")
+    )
     return verdicts
 
 
@@ -177,8 +181,10 @@ def _spectrum(axes: Axes, found: Levels) -> None:
     f, rest_db = found.bins, decibels(rms(np.abs(found.mean), axis=0))
     axes.plot(found.lines.frequency_hz, decibels(rms(np.abs(found.y), axis=0)), ".", color=LIGHT.ink, markersize=4,
               label="response at the excited lines")  # fmt: skip
-    axes.plot(f[found.odd], rest_db[found.odd], "^", color=LIGHT.traces[6], markersize=5, label="quiet odd lines")
-    axes.plot(f[found.even], rest_db[found.even], "o", color=LIGHT.traces[0], markersize=3, label="quiet even lines")
+    axes.plot(f[found.odd], rest_db[found.odd], "^", color=LIGHT.traces[6], markersize=5, label="odd detection lines")
+    axes.plot(
+        f[found.even], rest_db[found.even], "o", color=LIGHT.traces[0], markersize=3, label="even detection lines"
+    )
     noise = decibels(np.sqrt(found.noise.mean(axis=0) / PERIODS))
     axes.plot(f, noise, color=LIGHT.muted, linewidth=0.9, label="noise, from the scatter between periods")
 

@@ -1,8 +1,9 @@
-"""docs/studies.md from the studies' numbers: no number on that page is typed by hand."""
+"""Writes docs/studies.md from the numbers of the studies: no number on that page is typed by hand."""
 
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,10 @@ from studies.result import Study
 
 HEAD = """# The studies: the paper's experiments, measured
 
-Written by `make studies`; each study alone by `python -m studies NAME`. Figures and numbers (JSON) lie in
+`make studies` writes this page; `python -m studies NAME` runs one study. Figures and numbers (JSON) are in
 `docs/images/studies/`. The axis is that of [axis.md](axis.md), the estimates are those of
 [estimators.md](estimators.md), and the paper is Nevaranta et al. 2016, whose equations are cited as (1) … (28).
-A target that is missed says SHORT, with the reason.
+Each target is marked **met** or **missed**; a missed target has a reason.
 """
 
 
@@ -27,10 +28,15 @@ def write_page(studies: Sequence[Study], folder: Path, page: Path) -> None:
 
 def _section(study: Study, numbers: dict[str, Any]) -> str:
     figure = f"![{study.title}](images/studies/{study.name}.png)"
-    verdicts = [f"- {_verdict(v)}" for v in numbers["verdicts"]]
+    verdicts = [_wrapped(f"- {_verdict(v)}", "  ") for v in numbers["verdicts"]]
     tables = [_table(t) for t in numbers["tables"]]
-    paper = f"**The paper:** {study.paper}"
+    paper = _wrapped(f"**The paper:** {study.paper}")
     return "\n".join([f"## {study.title}\n", figure + "\n", paper + "\n", *verdicts, "", *tables])
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    """Lines of at most 120 columns."""
+    return textwrap.fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _verdict(verdict: dict[str, Any]) -> str:
@@ -42,7 +48,7 @@ def _table(table: dict[str, Any]) -> str:
     head = "| " + " | ".join(table["header"]) + " |"
     rule = "|" + "---|" * len(table["header"])
     rows = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in table["rows"]]
-    return "\n".join([table["caption"] + ":\n", head, rule, *rows, ""])
+    return "\n".join([_wrapped(table["caption"] + ":") + "\n", head, rule, *rows, ""])
 
 
 def _cell(cell: Any) -> str:

@@ -181,7 +181,7 @@ def main(names: list[str]) -> int:
         missed += not found.met
         shares = ", ".join(f"{way} {c[0]:.0%}/{c[1]:.0%}" for way, c in found.coverage.items())
         reasons = "; ".join(f"{k}: {', '.join(f'{f:g}' for f in v)} Hz" for k, v in found.reasons.items())
-        verdict = "met" if found.met else "MISSED"
+        verdict = "met" if found.met else "missed"
         print(f"{verdict:6} {case.name}: {shares}; {found.valid:.0%} valid{f' ({reasons})' if reasons else ''}")
     return int(missed > 0)
 

@@ -1,4 +1,4 @@
-"""The form of a study and of what it found."""
+"""The form of a study and of its results."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Verdict:
-    """A target and what was measured; `why` is the reason, measured too, and is said where the target is missed.
+    """A target and what was measured; `why` is the reason, also measured, and is printed if the target is missed.
 
     >>> print(Verdict("dated at the centre, dB", 0.24, 0.28))
-    reached  dated at the centre, dB: 0.24 ≤ 0.28
+    met      dated at the centre, dB: 0.24 ≤ 0.28
     >>> print(Verdict("dated at the centre, dB", 0.3, 0.28, why="the axis moves"))
-    SHORT    dated at the centre, dB: 0.3 > 0.28: the axis moves
+    missed   dated at the centre, dB: 0.3 > 0.28: the axis moves
     """
 
     claim: str
@@ -24,17 +24,17 @@ class Verdict:
     why: str = ""
 
     @property
-    def reached(self) -> bool:
+    def met(self) -> bool:
         return bool(self.value >= self.target if self.at_least else self.value <= self.target)
 
     @property
     def word(self) -> str:
-        return "reached" if self.reached else "SHORT"
+        return "met" if self.met else "missed"
 
     def __str__(self) -> str:
         sign = {(True, True): "≥", (True, False): "<", (False, True): "≤", (False, False): ">"}
-        line = f"{self.word:8} {self.claim}: {self.value:.3g} {sign[self.at_least, self.reached]} {self.target:.4g}"
-        return line if self.reached else f"{line}: {self.why}"
+        line = f"{self.word:8} {self.claim}: {self.value:.3g} {sign[self.at_least, self.met]} {self.target:.4g}"
+        return line if self.met else f"{line}: {self.why}"
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Result:
-    """What a study found. `curves` are for its figure alone and are not written."""
+    """The results of a study. `curves` are for its figure only and are not written."""
 
     tables: list[Table]
     verdicts: list[Verdict]
@@ -62,7 +62,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Study:
-    """One script: how it measures, how it draws, and what the paper says."""
+    """One script: its measurement, its figure, and the content of the paper."""
 
     name: str
     title: str

@@ -1,4 +1,4 @@
-"""Amounts that the tables report for steps of a standing axis, against the truth: how many bounds cover it.
+"""Amounts that the tables report for steps of an axis at standstill, compared with the true amounts: coverage.
 
 `python -m studies.table_amounts` learns the lines of an axis at 0.8 m (3 × 100 s), lets its belt lose 2, 5 and 10 % at
 30 s, and compares each reported amount of a line's magnitude and phase, and the date, with the exact linear response.

@@ -1,4 +1,4 @@
-"""A belt whose stiffness falls by 0.2 % a kelvin: false alarms, and what is found, with and without a sensor.
+"""A belt whose stiffness falls by 0.2 % per kelvin: false alarms and detected changes, with and without a sensor.
 
 `python -m studies.temperature` learns from five runs of 60 s that are up to `--spread` kelvin off 22 °C, once with the
 temperature as a covariate and once without. Then it judges healthy runs at other temperatures of that range, and runs

@@ -38,10 +38,10 @@ def hann(recording: Recording) -> Found:
 
 
 def by_model(recording: Recording, driven_by: str = "torque", **options: object) -> Found:
-    """The stroke as one chunk: two masses that move as the axis did are fitted, and their motion's error taken off."""
+    """The stroke as one chunk: two masses that move as the axis did are fitted, and the error of motion is removed."""
     block = recording.block
-    told = settings(block.rate_hz, loop=recording.axis.drive.loop(), **options)
-    found = correct(recording.axis, block, len(block), told, driven_by=driven_by)
+    chosen = settings(block.rate_hz, loop=recording.axis.drive.loop(), **options)
+    found = correct(recording.axis, block, len(block), chosen, driven_by=driven_by)
     found = within_stroke(found, recording)
     return found, found.schedule
 

@@ -1,12 +1,13 @@
-"""`python -m studies.peers`: livebode and what others would take, on the same simulated recordings.
+"""`python -m studies.peers`: livebode and other methods on the same simulated recordings.
 
-With --write the tables of docs/peers.md are renewed.
+With --write the tables of docs/peers.md are updated.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from dataclasses import asdict
 from pathlib import Path
 
@@ -31,23 +32,25 @@ def page(results: dict[Case, dict[str, Score]], seeds: int) -> str:
     costs, fit_s = cost.per_sample_s(recording)
     answers = {peer.name: peer.estimate(recording) for peer in PEERS}
     delays = {name: (answer.delay, answer.waits) for name, answer in answers.items()}
-    parts = [f"Root mean squares over {seeds} recordings a case; loops per sample in {LANGUAGE}."]
+    parts = [f"Root mean squares over {seeds} recordings per case; loops per sample in {LANGUAGE}."]
     parts += [f"### {case.name}\n\n{table.errors(scores)}" for case, scores in results.items()]
-    parts.append(f"### Delay, cost, and what must be told\n\n{table.terms(costs, delays)}")
-    parts.append(f"A minimal fit, which all but the EKF need besides, takes {1e6 * fit_s:.0f} µs a response.")
-    parts.append(starts.sentence())
+    parts.append(f"### Delay, cost and required inputs\n\n{table.terms(costs, delays)}")
+    parts.append(
+        f"A minimal fit, which all methods except the EKF need in addition, takes {1e6 * fit_s:.0f} µs per response."
+    )
+    parts.append(textwrap.fill(starts.sentence(), 120, break_on_hyphens=False))
     for case in CASES[:2]:
         parts.append(
             f"### Targets: error in Keff, {case.name[0].lower()}{case.name[1:]}\n\n{table.targets(results[case])}"
         )
-    parts.append(f"### Who is best\n\n{table.winners(results)}")
+    parts.append(f"### Best method in each case\n\n{table.winners(results)}")
     return "\n\n".join(parts)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m studies.peers", description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="recordings of each case")
-    parser.add_argument("--write", action="store_true", help="renew the tables of docs/peers.md")
+    parser.add_argument("--write", action="store_true", help="update the tables of docs/peers.md")
     options = parser.parse_args()
     results = {case: judge(case, range(options.seeds)) for case in CASES}
     text = page(results, options.seeds)

@@ -39,5 +39,5 @@ class Peer:
 
     name: str
     estimate: Callable[[Recording], Estimates]
-    told: str
+    inputs: str
     language: str

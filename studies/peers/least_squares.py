@@ -1,4 +1,4 @@
-"""An ARX model by least squares over the newest window, anew at every row."""
+"""An ARX model by least squares over the newest window, computed again at every row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The contenders, in the order of the table. One more is one more entry here."""
+"""The compared methods, in the order of the table. To add a method, add an entry here."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from studies.peers.compiled import LANGUAGE
 from studies.peers.estimates import Peer
 from studies.peers.tracked import by, track
 
-_DATED = "how late it is"
+_DATED = "its delay"
 _ARX = f"the band, a rate, an order, a memory, {_DATED}"
 _FILTER = (
-    "that there are two masses and dry friction, the radius, starting values, the noise, how fast each of nine states "
-    "may wander"
+    "two masses and dry friction as structure, the radius, starting values, the noise, the random walks of nine states"
 )
 _LINES = "the lines and their window"
-_POSITION = "that there are two masses, how long a stroke is, the cart's position as a signal"
+_POSITION = "two masses as structure, the duration of a stroke, the cart's position as a signal"
 
 PEERS = (
     Peer("RLS, textbook", rls.textbook, "an order, a memory", LANGUAGE),
@@ -29,12 +28,12 @@ PEERS = (
         _FILTER,
         LANGUAGE,
     ),
-    Peer("EKF, smoothed over the stroke", smoother.by_stroke, f"{_FILTER}, how long a stroke is", LANGUAGE),
+    Peer("EKF, smoothed over the stroke", smoother.by_stroke, f"{_FILTER}, the duration of a stroke", LANGUAGE),
     Peer("livebode", by(track), _LINES, "C"),
     Peer("livebode, Hann", by(partial(track, hann=True)), _LINES, "C"),
-    Peer("livebode, Hann, dated as it fits best", by(partial(track, hann=True), 260.0), f"{_LINES}, {_DATED}", "C"),
+    Peer("livebode, Hann, best effective time", by(partial(track, hann=True), 260.0), f"{_LINES}, {_DATED}", "C"),
     Peer(
-        "livebode, Hann, 200 ms, dated so too",
+        "livebode, Hann, 200 ms, best effective time",
         by(partial(track, hann=True, window=800), 460.0),
         f"{_LINES}, {_DATED}",
         "C",

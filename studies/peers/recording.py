@@ -42,7 +42,7 @@ class Case:
 MAIN = Case("The paper's stroke")
 CASES = (
     MAIN,
-    Case("There and back, from the acceleration on", settled_s=0.1, backward=True),
+    Case("Forward and return, from the acceleration on", settled_s=0.1, backward=True),
     Case("15 N of friction at the cart", options={"friction": Friction(load_coulomb_n=15.0)}),
     Case("A 20-bit encoder", encoder_counts_per_turn=1 << 20),
     Case("0.2 m/s", strokes=Strokes(speed_m_per_s=0.2)),

@@ -20,9 +20,9 @@ def backwards(u, states, covariances, first, last, wander, tick_s):
     for n in range(last - 1, first - 1, -1):
         x, covariance = states[n], covariances[n]
         new, slope = moved(x, u[n], tick_s)
-        foretold = x.copy()
-        foretold[:3] = new
-        foretold[3] += tick_s * x[DRIFT]
+        predicted = x.copy()
+        predicted[:3] = new
+        predicted[3] += tick_s * x[DRIFT]
         after = spread(covariance, slope, tick_s, wander)
         step = np.eye(STATES)
         step[:3, :DRIFT] = slope
@@ -30,7 +30,7 @@ def backwards(u, states, covariances, first, last, wander, tick_s):
         # The states differ by nine powers of ten: in units of their own deviations the matrix can be inverted.
         size = np.sqrt(np.diag(after))
         scaled = after / size.reshape(-1, 1) / size
-        pull = np.linalg.solve(scaled, (found[n + 1 - first] - foretold) / size) / size
+        pull = np.linalg.solve(scaled, (found[n + 1 - first] - predicted) / size) / size
         found[n - first] = x + covariance @ (step.T @ pull)
     return found
 
@@ -39,8 +39,8 @@ def by_stroke(recording: Recording) -> Estimates:
     """Each stroke once it and a window more are known, as the correction for motion has it."""
     u, y, tick_s = recording.block["u"], recording.block["velocity"], 1 / RATE_HZ
     covariances = np.empty((len(y), STATES, STATES))
-    told = kalman.START, kalman.DOUBT, kalman.WANDER, NOISE_RAD_PER_S, tick_s
-    states = kalman.filtered(u, y, *told, covariances)
+    inputs = kalman.START, kalman.DOUBT, kalman.WANDER, NOISE_RAD_PER_S, tick_s
+    states = kalman.filtered(u, y, *inputs, covariances)
     stroke, parts = recording.stroke_samples, []
     for first in range(0, len(y), stroke):
         last = min(first + stroke + LINES.window, len(y)) - 1

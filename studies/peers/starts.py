@@ -1,4 +1,4 @@
-"""How much of its start the extended Kalman filter has to be told: in how many runs it diverges."""
+"""Sensitivity of the extended Kalman filter to its start: the number of runs in which it diverges."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def beginning(seed: int) -> Block:
 
 
 def diverges(block: Block, doubt: np.ndarray) -> bool:
-    told = kalman.START, doubt, kalman.WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ, kalman.NONE
+    inputs = kalman.START, doubt, kalman.WANDER, NOISE_RAD_PER_S, 1 / RATE_HZ, kalman.NONE
     with np.errstate(all="ignore"):
-        logs = kalman.filtered(block["u"], block["velocity"], *told)[:, 3:7]
+        logs = kalman.filtered(block["u"], block["velocity"], *inputs)[:, 3:7]
     return not bool(np.all(np.abs(logs - kalman.START[3:7]) < np.log(FACTOR_MAX)))
 
 
@@ -36,6 +36,6 @@ def sentence() -> str:
     blocks = [beginning(seed) for seed in SEEDS]
     narrow, wide = (sum(diverges(block, doubt) for block in blocks) for doubt in (kalman.DOUBT, WIDE))
     return (
-        f"Of {len(SEEDS)} starts of the EKF {narrow} diverge; with ten times the doubt about torsion and speeds and "
-        f"twice that about the masses {wide} do."
+        f"Of {len(SEEDS)} starts of the EKF, {narrow} diverge; with ten times the initial uncertainty of torsion and "
+        f"speeds and twice that of the masses, {wide} diverge."
     )

@@ -1,4 +1,4 @@
-"""The run's results as Markdown: tables, targets, and who is best at what."""
+"""The results of the run as Markdown: tables, targets, and the best method in each case."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from studies.peers.recording import RATE_HZ, Case
 from studies.peers.score import Score
 
 Scores = Mapping[str, Score]  # by the peer's name
-# Whose Keff, whether ours is to be that much better or may be that much worse.
+# Method, and the required ratio of its error in Keff to that of livebode, or the reverse.
 TARGETS = (
     (TEXTBOOK, "≥", 50.0, "better than"),
     (TUNED, "≥", 1.8, "better than"),
@@ -27,19 +27,19 @@ def errors(scores: Scores) -> str:
 
 
 def terms(costs_s: Mapping[str, float], delays: Mapping[str, tuple[float, float]]) -> str:
-    """What each costs and has to be told."""
-    heads = ("", "delay, ms", "cost, ns a sample", "in", "must be told")
+    """Cost and required inputs of each method."""
+    heads = ("", "delay, ms", "cost, ns per sample", "in", "required inputs")
     return _rows(heads, [_term(peer, costs_s[peer.name], delays[peer.name]) for peer in PEERS])
 
 
 def _term(peer: Peer, cost_s: float, delay: tuple[float, float]) -> list[str]:
     known, waits = (1e3 * samples / RATE_HZ for samples in delay)
     late = f"{known:.0f}" + (f", with the stroke up to {known + waits:.0f}" if waits else "")
-    return [peer.name, late, f"{1e9 * cost_s:.0f}", peer.language, peer.told]
+    return [peer.name, late, f"{1e9 * cost_s:.0f}", peer.language, peer.inputs]
 
 
 def targets(scores: Scores) -> str:
-    """Each of livebode's ways against the three peers that the project measures itself by."""
+    """Each livebode method compared with the three methods that the targets name."""
     heads = ["", *(f"{sign} {bound:g} × {what} {name}" for name, sign, bound, what in TARGETS)]
     ours = [name for name in scores if name.startswith(OURS)]
     return _rows(tuple(heads), [[name, *(_verdict(scores, name, target) for target in TARGETS)] for name in ours])
@@ -48,8 +48,8 @@ def targets(scores: Scores) -> str:
 def _verdict(scores: Scores, ours: str, target: tuple[str, str, float, str]) -> str:
     name, sign, bound, _ = target
     ratio = scores[name].stiffness_percent / scores[ours].stiffness_percent
-    found, reached = (ratio, ratio >= bound) if sign == "≥" else (1 / ratio, 1 / ratio <= bound)
-    return f"{found:.2f} {'reached' if reached else 'SHORT'}"
+    found, met = (ratio, ratio >= bound) if sign == "≥" else (1 / ratio, 1 / ratio <= bound)
+    return f"{found:.2f} {'met' if met else 'missed'}"
 
 
 def winners(results: Mapping[Case, Scores]) -> str:

@@ -65,8 +65,8 @@ def test_targets_are_judged_for_each_way_of_livebode() -> None:
     scores = {TEXTBOOK: Score(6, 60, 9), TUNED: Score(1, 1.7, 1), FILTER: Score(1, 1.0, 1)}
     text = table.targets(scores | {"livebode": Score(1, 3, 1), "livebode, better": Score(1, 1.0, 1)})
     assert text.splitlines()[2:] == [
-        "| livebode | 20.00 SHORT | 0.57 SHORT | 3.00 SHORT |",
-        "| livebode, better | 60.00 reached | 1.70 SHORT | 1.00 reached |",
+        "| livebode | 20.00 missed | 0.57 missed | 3.00 missed |",
+        "| livebode, better | 60.00 met | 1.70 missed | 1.00 met |",
     ]
 
 

@@ -33,7 +33,7 @@ class FmuAxis:
 
     At every tick the FMU's angle and velocity are read, the controllers updated, the torque set, and one step of a
     tick made. The FMU starts with its own start values, and the motion goes from there. There is no truth beside, and
-    stability is not judged beforehand; a value that is not finite stops the run with a DivergenceError.
+    stability is not judged beforehand; a value that is not finite stops the run with a SimulationError ("diverged").
 
     Parameters
     ----------

@@ -67,8 +67,8 @@ class SimulatedAxis:
         Raises
         ------
         UsageError
-            At once for a missing channel or a block size that is no whole number of at least 1.
-        DivergenceError
+            At once for a missing channel or a block size that is not an integer ≥ 1.
+        SimulationError
             While iterating, when the state is not finite or the cart leaves its limits.
         """
         return delivered((block for block, _ in self.pairs(block_samples)), channels, real_time, clock, sleep)
