@@ -75,7 +75,8 @@ def table(core: Core, counted: Counted) -> list[str]:
     """The rows of one core's table in Markdown."""
     head = f"{core.name}, float{core.bits}"
     rows = [
-        f"| {head}: lines, table | push | worst push | read and FRF | per sample, hop {HOP} | relative to RLS | RAM, bytes |",
+        f"| {head}: lines, table | push | worst push | read and FRF | per sample, hop {HOP} | relative to RLS "
+        "| RAM, bytes |",
         "|---|---|---|---|---|---|---|",
     ]
     for (lines, name), c in counted.kernel.items():
