@@ -88,7 +88,7 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
         raise OutputError(
             "not-written",
-            f"{str(folder)!r} could not be written: {why}; nothing was left there",
+            f"{str(folder)!r} could not be written: {why}; no file was written",
             path=str(folder),
             reason=why,
         ) from None
