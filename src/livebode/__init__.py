@@ -3,6 +3,7 @@
 The names below are the public face; everything is importable from here and loaded when it is first used.
 """
 
+import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +54,8 @@ if TYPE_CHECKING:
     from livebode.motion import MotionCorrection
     from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # quiet, but for a program that wants to hear of it
 
 _HOME = {
     "estimation": ("Settings", "Tracker", "welch"),

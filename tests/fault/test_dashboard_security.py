@@ -229,7 +229,7 @@ def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, 
 @pytest.mark.parametrize(
     ("section", "word"),
     [
-        ({"token_env": "nowhere"}, "the environment has no 'nowhere'"),
+        ({"token_env": "nowhere"}, "serve.token_env names a variable that is not set"),
         ({"token_file": "/no/such"}, "cannot be read"),
         ({"token_env": "token", "token_file": "/no/such"}, "both"),
     ],

@@ -427,21 +427,18 @@ def test_damaged_addresses_give_an_address_or_a_sentence():
 
 
 @pytest.mark.parametrize(
-    ("url", "facts"),
+    "url",
     [
-        ("http://h:1", {"value": "http://h:1"}),
-        ("udp://:5000", {"value": "udp://:5000"}),
-        ("udp://h", {"value": "udp://h"}),
-        ("udp://h:99999", {"value": "udp://h:99999"}),
-        ("tcp://h:1/path", {"value": "tcp://h:1/path"}),
-        ("mqtt://h?x=1", {"value": "mqtt://h"}),
-        ("5000", {"value": "5000"}),
-        ("udp://h:1\n", {}),
+        "http://h:1/hunter2", "udp://:5000", "udp://h", "udp://h:99999", "tcp://h:1/hunter2", "mqtt://h?x=hunter2",
+        "5000", "udp://h:1\n", "mqtt://me:hunter2", "mqtt://me:hunter2%40h/t", "mqtt://h#hunter2", "hunter2",
     ],
-)
-def test_addresses_that_are_refused(url, facts):
-    with refused(ConfigError, "value-invalid", key="source.url", **facts):
+)  # fmt: skip
+def test_addresses_that_are_refused_are_not_repeated(url):
+    with refused(ConfigError, "value-invalid", key="source.url"):
         parse_address(url)
+    with pytest.raises(ConfigError) as caught:
+        parse_address(url)
+    assert "hunter2" not in repr(caught.value.as_dict()) + str(caught.value)
 
 
 def test_a_password_in_the_url_is_refused_and_not_repeated():

@@ -56,7 +56,7 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
             f'[source]\nurl = "mqtt://127.0.0.1:{broker.port}/t"\nusername = "plc"\npassword_env = "PLC_PASSWORD"{REST}'
         )
         sender = publisher(broker.port)
-        with Running(tmp_path, text) as running:
+        with Running(tmp_path, text, "--log-level", "debug") as running:
             until(lambda: broker.logged("Sending SUBACK"), "a subscription")
             sender.publish("t", encode_layout(CHANNELS, RATE_HZ), qos=1).wait_for_publish(10)
             for batch in batches(60):
@@ -71,6 +71,8 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
         stop(sender)
     assert code == 0, err
     assert "source.url has a user or password" in err
+    for level, logger in (("INFO", "sources.live.mqtt: connected to"), ("WARNING", "session.session: ")):
+        assert f" {level} livebode.{logger}" in err
     found = b"".join(path.read_bytes() for path in running.out.rglob("*") if path.is_file())
     assert b"configuration-refused" in found
     assert SECRET.encode() not in found

@@ -59,7 +59,7 @@ def test_an_axis_that_fails_does_not_end_the_others(tmp_path: Path) -> None:
             code, out, err = running.end()
     assert code == 2
     found = json.loads(out)["axes"]
-    assert "did you mean 'y'" in found["odd"]["error"]["message"]
+    assert "did you mean 'y'" in found["odd"]["error"]["remedy"]
     assert found["x"]["counts"]["samples"] >= 1500
     assert [line.split(":")[1] for line in err.splitlines()] == [" odd"]
 

@@ -155,9 +155,9 @@ def test_axes_come_and_go(tmp_path: Path) -> None:
             running.edit(one(a) + second)
             running.tracked("y", 300)
             running.edit(SHARED + second)
-            at = numbers(running.out / "y").size
-            running.tracked("y", at + 500)
-            left = numbers(running.out / "x")  # which may be still being finished: then it begins again after that
+            until(lambda: "counts" in said(running.out / "x"), "the end of the axis that was taken out")
+            left = numbers(running.out / "x")
+            running.tracked("y", numbers(running.out / "y").size + 500)
             running.edit(one(a) + second)
             running.tracked("x", left.size + 300)
             code, out, err = running.end()

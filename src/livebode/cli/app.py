@@ -1,8 +1,8 @@
 """The command line.
 
 Commands: measure (run, demo), look at recordings and runs (inspect, query), evaluate runs (fit, margins, validate,
-learn), export. Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model fits, 130 and above stopped by a
-signal.
+learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model
+fits, 130 and above stopped by a signal.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import typer
@@ -19,11 +20,13 @@ from typer.core import TyperCommand, TyperGroup
 from livebode.cli.compare_command import compare_command
 from livebode.cli.demo_command import demo_command
 from livebode.cli.design_command import design_command
+from livebode.cli.doctor_command import doctor_command
 from livebode.cli.export_command import export_command
 from livebode.cli.failures import disk_full, failure_of, json_wanted, name_options, unparsed
 from livebode.cli.fit_command import fit_command
 from livebode.cli.inspect_command import inspect_command
 from livebode.cli.learn_command import learn_command
+from livebode.cli.log_options import File, Level, LogOptions, with_log
 from livebode.cli.margins_command import margins_command
 from livebode.cli.plc_command import plc_command
 from livebode.cli.query_command import query_command
@@ -82,31 +85,40 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("run", cls=_Command)(run_command)
-app.command("fit", cls=_Command)(fit_command)
-app.command("inspect", cls=_Command)(inspect_command)
-app.command("demo", cls=_Command)(demo_command)
-app.command("design", cls=_Command)(design_command)
-app.command("query", cls=_Command)(query_command)
-app.command("export", cls=_Command)(export_command)
-app.command("margins", cls=_Command)(margins_command)
-app.command("validate", cls=_Command)(validate_command)
-app.command("learn", cls=_Command)(learn_command)
-app.command("plc", cls=_Command)(plc_command)
-app.command("report", cls=_Command)(report_command)
-app.command("compare", cls=_Command)(compare_command)
-app.command("view", cls=_Command)(view_command)
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "run": run_command,
+    "fit": fit_command,
+    "inspect": inspect_command,
+    "demo": demo_command,
+    "design": design_command,
+    "query": query_command,
+    "export": export_command,
+    "margins": margins_command,
+    "validate": validate_command,
+    "learn": learn_command,
+    "plc": plc_command,
+    "report": report_command,
+    "compare": compare_command,
+    "view": view_command,
+    "doctor": doctor_command,
+}
+for _name, _command in _COMMANDS.items():
+    app.command(_name, cls=_Command)(with_log(_command))
 
 
 @app.callback(invoke_without_command=True)
 def _version(
+    context: typer.Context,
     version: bool = typer.Option(False, "--version", help="Print the version and exit.", is_eager=True),
+    log_level: Level = None,
+    log_file: File = None,
 ) -> None:
     if version:
         from livebode import __version__
 
         typer.echo(f"livebode {__version__}")
         raise typer.Exit
+    context.obj = LogOptions(log_level, log_file)
 
 
 def main() -> None:

@@ -71,7 +71,7 @@ def name_options(error: LivebodeError, parameters: Iterable[Any]) -> None:
     names = [error.facts.get("argument"), error.facts.get("key"), *_OPTIONS_BY_CODE.get(error.code, ())]
     options = [option for name in names if name and (option := _option(str(name), known))]
     if options:
-        error.facts.setdefault("options", options)
+        error.facts.setdefault("options", list(dict.fromkeys(options)))
 
 
 def _option(name: str, known: Mapping[str, str]) -> str | None:

@@ -24,6 +24,7 @@ BACKLOG = 4096
 """Connections that the system queues until they are accepted; a client that finds no room retries a second later."""
 _START_S = 30.0
 _END_S = 2
+_logger = logging.getLogger(__name__)
 
 
 class Dashboard:
@@ -45,7 +46,7 @@ class Dashboard:
     """
 
     def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
-        self._serving, self._tell = serving, tell
+        self._serving, self._hears = serving, tell
         self._states: list[State] = []
         self._viewed: dict[int, Viewed] = {}
         self._server: Any = None
@@ -100,7 +101,7 @@ class Dashboard:
                 extra="dashboard",
                 package=error.name,
             ) from None
-        self._socket = _listening(self._serving)
+        self._socket = listening(self._serving)
         tls = self._serving.tls or (None, None)
         config = uvicorn.Config(
             self._serve,
@@ -138,6 +139,7 @@ class Dashboard:
                     url=self.url,
                 )
             time.sleep(0.005)
+        _logger.info("listening at %s", self.url)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -146,6 +148,12 @@ class Dashboard:
         self._server.should_exit = True
         self._thread.join(_END_S + 8)
         self._socket.close()
+        _logger.info("stopped")
+
+    def _tell(self, sentence: str) -> None:
+        """Log what a person should know, and tell it; what comes here is limited in its rate."""
+        _logger.warning("%s", sentence)
+        self._hears(sentence)
 
     def _run(self) -> None:
         asyncio.run(self._work())
@@ -178,7 +186,8 @@ class Dashboard:
             self._faults.take(error)
 
 
-def _listening(serving: Serving) -> socket.socket:
+def listening(serving: Serving) -> socket.socket:
+    """A socket that listens where the dashboard is to be."""
     family = socket.AF_INET6 if ":" in serving.address else socket.AF_INET
     found = socket.socket(family, socket.SOCK_STREAM)
     try:

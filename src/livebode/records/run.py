@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -24,6 +25,7 @@ from livebode.records.segments.manifest import Manifest, Segment
 from livebode.records.summary_file import RUN, read_summary
 from livebode.records.summary_shape import what_is_wrong
 
+_logger = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of responses at once, times their lines: some 10 MB
 
 
@@ -97,6 +99,7 @@ class Run:
         """Note what was found damaged."""
         if damage not in self.damages:
             self.damages.append(damage)
+            _logger.warning("%s: %s", self.path, damage.message)
             if self.told is not None:
                 self.told(damage)
                 return

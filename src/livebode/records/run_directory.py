@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import os
 import shutil
 import tempfile
@@ -25,6 +26,8 @@ from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table_file import TableFile
 
 _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used up"}
+
+_logger = logging.getLogger(__name__)
 
 
 class RunDirectory:
@@ -64,6 +67,7 @@ class RunDirectory:
             except BaseException:
                 shutil.rmtree(self.partial, ignore_errors=True)
                 raise
+        _logger.info("%s: the record begins", self.path)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
@@ -76,6 +80,7 @@ class RunDirectory:
                     self._close()
                     self._check_free()
                     self._put_in_place()
+                _logger.info("%s: the record is complete", self.path)
         finally:
             shutil.rmtree(self.partial, ignore_errors=True)
         if isinstance(error, OSError):

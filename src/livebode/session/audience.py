@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,14 @@ from livebode.core import Block, Event, Parameters, Responses
 from livebode.records import RunDirectory
 from livebode.session.event_groups import EventGroups
 from livebode.session.overview import Overview
-from livebode.sources.live import Health
+from livebode.sources.live import KINDS, Health
 
 if TYPE_CHECKING:
     from livebode.session.segmented import SegmentedRun
+
+_URGENT = {"change", "backlog", "doubtful", "roles-doubtful", "baseline-unknown"}
+_LOGGED_ELSEWHERE = {*KINDS, "configuration-applied", "configuration-refused"}
+_logger = logging.getLogger(__name__)
 
 
 class Audience:
@@ -92,7 +97,7 @@ class Relay(Audience):
 class Outlet:
     """Where a run puts what comes of its samples: into the record first, then before the audience.
 
-    Events go through `groups`.
+    Events go through `groups`, and are logged where their source has not done so.
     """
 
     def __init__(self, record: RunDirectory | SegmentedRun, audience: Audience, groups: EventGroups) -> None:
@@ -125,6 +130,9 @@ class Outlet:
     def _report(self, events: list[Event]) -> None:
         for event in events:
             self._record.write_event(event)
+            if event.kind not in _LOGGED_ELSEWHERE:
+                level = logging.WARNING if event.kind in _URGENT else logging.INFO
+                _logger.log(level, "%s: %s", self._record.path, event.message)
             self._audience.write_event(event)
 
     def drain_events(self) -> list[Event]:

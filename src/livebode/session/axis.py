@@ -15,7 +15,7 @@ from livebode.sources.live import SourceSettings, checked_address
 
 SAME_RATE = 1e-6
 BUDGET_BYTES_MIN = 16 << 20
-_MAY_BE_SECRET = {
+MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
 }
@@ -292,7 +292,7 @@ def _first_of(error: ValidationError) -> ConfigError:
         return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":
         return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
-    secret = _MAY_BE_SECRET & {str(part) for part in first["loc"]}
+    secret = MAY_BE_SECRET & {str(part) for part in first["loc"]}
     value = "what it holds" if secret else shortened(first["input"])
     facts = {"key": place} | ({} if secret else {"value": value})
     return ConfigError(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 
+from livebode.core import LivebodeError
 from livebode.session.axis import Axis
 from livebode.session.destination import Destination
 from livebode.session.following import Outcome
@@ -11,6 +13,8 @@ from livebode.session.live import run_live
 from livebode.session.orders import Orders, StoppedError
 from livebode.session.recording import run
 from livebode.session.status import Status
+
+_logger = logging.getLogger(__name__)
 
 
 class AxisThread:
@@ -61,6 +65,8 @@ class AxisThread:
         return self.outcome
 
     def _work(self) -> None:
+        name = self.name or "axis"
+        _logger.info("%s begins", name)
         try:
             job = run_live if self.axis.source.live else run
             self.outcome = job(self.axis, self._to, self.orders)
@@ -68,4 +74,8 @@ class AxisThread:
             self.error = error
             nothing = isinstance(error, StoppedError) or self.status.directory is None
             self.ended_early = self.orders.ended and nothing
+            level = logging.INFO if self.ended_early else logging.ERROR
+            internal = not isinstance(error, (LivebodeError, StoppedError))
+            _logger.log(level, "%s: %s", name, error, exc_info=error if internal else None)
+        _logger.info("%s ends", name)
         self.status.state = "done" if self.error is None else "ended" if self.ended_early else "refused"

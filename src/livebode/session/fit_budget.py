@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ CREDIT_S_MAX = 2.0
 RELIEF_FROM_S, RELIEF_TO_S = 2.0, 8.0
 """Fits get less time when the run is further behind than the first, and none from the second on."""
 _FIRST_ROW_S = 0.02
+_logger = logging.getLogger(__name__)
 
 
 class FitBudget:
@@ -34,6 +36,7 @@ class FitBudget:
         self._clock, self._worked = clock, worked
         self._credit_s, self._then = CREDIT_S_MAX, clock()
         self._row_s = _FIRST_ROW_S
+        self._exceeded = False
 
     def rows(self, wanted: int, behind_s: float) -> int:
         """How many of `wanted` responses there is time for, when the run is `behind_s` behind."""
@@ -43,11 +46,18 @@ class FitBudget:
         share = SHARE * min(max(relief, 0.0), 1.0) / len(FitBudget._open)
         self._credit_s = min(CREDIT_S_MAX, self._credit_s + share * (now - self._then))
         self._then = now
+        rows = min(wanted, self._affordable(share))
+        if (rows < wanted) != self._exceeded:
+            self._exceeded = not self._exceeded
+            _logger.debug("fit budget %s (%.1f s behind)", "exceeded" if self._exceeded else "suffices", behind_s)
+        return rows
+
+    def _affordable(self, share: float) -> int:
         if share <= 0 or self._credit_s <= 0:
             return 0
         # With all that can be saved up one fit may be tried, however long it takes.
         least = int(self._credit_s >= CREDIT_S_MAX)
-        return min(wanted, max(least, int(self._credit_s / self._row_s)))
+        return max(least, int(self._credit_s / self._row_s))
 
     @contextmanager
     def spending(self, rows: int) -> Iterator[None]:

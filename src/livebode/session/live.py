@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 import time
 from dataclasses import replace
@@ -20,6 +21,8 @@ from livebode.session.following import Outcome, Tracking
 from livebode.session.orders import Orders
 from livebode.session.pipeline import Pipeline
 from livebode.sources.live import LiveSource, make_source
+
+_logger = logging.getLogger(__name__)
 
 
 def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
@@ -51,6 +54,7 @@ def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outco
 def _late(to: Destination, why: str) -> None:
     """Report that a machine has not sent yet; there is no run yet, so the time is that of this computer."""
     event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
+    _logger.warning("%s", event.message)
     to.tell(event)
     to.audience.write_event(event)
 
@@ -141,6 +145,7 @@ class _Succession:
                 with moments_by(self._relation.clock), leaving:
                     tracking.finish()
             except LivebodeError as error:
+                _logger.error("%s: %s", tracking.to.directory, error)
                 self._to.tell(Event("record-unfinished", *tracking.position, str(error)))
 
         thread = threading.Thread(target=finish, name="livebode finishing")

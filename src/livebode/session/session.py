@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import threading
 import time
@@ -22,6 +23,7 @@ TICK_S = 0.1
 LOOK_S = 1.0
 """How often the file is looked at."""
 _ENDING = (signal.SIGINT, signal.SIGTERM)
+_logger = logging.getLogger(__name__)
 
 
 class Session:
@@ -155,22 +157,28 @@ class Session:
             if change is not None:
                 change.tell(thread.orders)
                 thread.axis = axes[name]
-                self._tell(name, change.event)
+                self._report(name, change.event)
         for name in [name for name in self.threads if name not in axes]:
-            self._tell(name, Event("configuration-applied", 0, 0.0, "the axis was taken out, and ends"))
+            self._report(name, Event("configuration-applied", 0, 0.0, "the axis was taken out, and ends"))
             self.taken_out.append(self.threads.pop(name))
             self.taken_out[-1].end()
         for name, axis in axes.items():
             old = self.threads.get(name)
             if old is None or (not old.alive and old.axis != axis):
-                self._tell(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
+                self._report(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
                 self._add(name, axis, anew=False).start()
 
     def _say(self, kind: str, message: str, *, record: bool = True) -> None:
-        self._tell("", Event(kind, 0, 0.0, message))
+        self._report("", Event(kind, 0, 0.0, message))
         for thread in self.threads.values() if record else ():
             if thread.alive:
                 thread.orders.say(kind, message)
+
+    def _report(self, name: str, event: Event) -> None:
+        """Log what became of an edit, and tell it."""
+        level = logging.WARNING if event.kind == "configuration-refused" else logging.INFO
+        _logger.log(level, "%s%s", f"axis {name}: " if name else "", event.message)
+        self._tell(name, event)
 
     @contextmanager
     def _hearing(self) -> Iterator[None]:

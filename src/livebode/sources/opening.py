@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -15,6 +16,8 @@ from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import Clock, clock_from_time, find_time, rate_in_file
+
+_logger = logging.getLogger(__name__)
 
 
 def open_log(
@@ -61,7 +64,9 @@ def open_log(
     checked_block_samples(block_samples)
     recording = open_recording(Path(path))
     with located(recording.path):
-        return log_of(recording, rate_hz, time, channels, block_samples)
+        log = log_of(recording, rate_hz, time, channels, block_samples)
+    _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
+    return log
 
 
 def log_of(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from livebode.core import Event
@@ -10,12 +12,21 @@ from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.json_lines import to_line
 
 _HELD_MAX = 100_000
+_EXPECTED = {"record-continued", "record-closed", "record-removed"}
+_logger = logging.getLogger(__name__)
 
 
 class EventLog:
-    """Events that wait for the disk, and those that the record itself has to say."""
+    """Events that wait for the disk, and those that the record itself has to say; these are logged, too.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    run
+        The directory of the run.
+    """
+
+    def __init__(self, run: Path) -> None:
+        self._run = run
         self._waiting: list[bytes] = []
         self._said: list[Event] = []
         self._given_up = 0
@@ -33,6 +44,8 @@ class EventLog:
 
     def say_event(self, event: Event) -> Event:
         """The same with an event that is there already."""
+        level = logging.INFO if event.kind in _EXPECTED else logging.WARNING
+        _logger.log(level, "%s: %s", self._run, event.message)
         self._said.append(event)
         self.add(event)
         return event

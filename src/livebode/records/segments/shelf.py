@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import hashlib
+import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +20,7 @@ from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.table import Table
 
 FIRST_TO_GO = "samples"
+_logger = logging.getLogger(__name__)
 
 
 class Shelf:
@@ -104,6 +106,8 @@ class Shelf:
         retained = Retained.of_journal(self._run, number, read)
         self._file.append_synced(manifest.closing_line(number, segments, retained))
         self._segments += segments
+        size_bytes = sum(segment.size_bytes for segment in segments)
+        _logger.info("%s: journal %d closed: %d segments, %d bytes", self._run, number, len(segments), size_bytes)
         if retained is None:
             self.discard(journal.name_of(number))
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,6 +30,8 @@ from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import Waiting
 from livebode.records.summary_file import COPY, RUN, to_document
 from livebode.records.table import Table
+
+_logger = logging.getLogger(__name__)
 
 
 class Store:
@@ -65,7 +68,7 @@ class Store:
         self.last: Commit | None = None
         self._tables = dict(tables)
         self._waiting = Waiting(tuple(self._tables))
-        self._log = EventLog()
+        self._log = EventLog(path)
         self._pause: Event | None = None
         self._attempts = 0  # to close a segment that failed since the last one that was closed
         self._committed_s = self._synced_s = 0.0
@@ -96,6 +99,7 @@ class Store:
             self._write_summary(summary, finished=False)
             sync_directory(self.path.parent)
             self.last = commit
+        _logger.info("%s: the record begins at sample %d", self.path, sample)
 
     def renew(self, summary: dict[str, Any]) -> None:
         """Write run.json as of a run that is recorded again: what its end found is of the time before."""
@@ -177,6 +181,7 @@ class Store:
             self._write_summary(summary, finished=finished)
             if finished:
                 self._shelf.discard(journal.name_of(self._number))
+        _logger.info("%s: the record ends, %s", self.path, "finished" if finished else "to be continued")
 
     def _not_paused(self) -> None:
         if self._pause is not None:

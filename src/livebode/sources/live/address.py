@@ -59,23 +59,22 @@ def parse_address(url: str) -> Address:
             "give the URL of the machine",
             key="source.url",
         )
-    shown = url.split("?")[0].split("#")[0]  # what stands behind may be a secret
     try:
         parts = urlsplit(url)
         port, host = parts.port, parts.hostname
-    except ValueError as error:
-        raise url_error(shown, f"is not an address: {error}", "give kind://host:port") from None
+    except ValueError:
+        raise _url_error("is not an address", "give kind://host:port, with a port from 1 to 65535") from None
     if parts.scheme not in PORTS:
-        raise url_error(shown, "is of a kind that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
+        raise _url_error("is of a kind that is not supported", f"give one of {', '.join(PORTS)} or stdin:")
     port = port or PORTS[parts.scheme]
     if not host or port is None or "?" in url or "#" in url:
-        raise url_error(shown, "is not a complete address", f"give {parts.scheme}://host:port")
+        raise _url_error("is not a complete address", f"give {parts.scheme}://host:port")
     path = unquote(parts.path.removeprefix("/"))
     if path and not parts.scheme.startswith(("mqtt", "opc")):
-        raise url_error(shown, f"has a path, which {parts.scheme} does not take", f"leave out /{path}")
+        raise _url_error(f"has a path, which {parts.scheme} does not take", "leave out what is behind the port")
     return Address(parts.scheme, host, port, path)
 
 
-def url_error(shown: str, wrong: str, remedy: str) -> ConfigError:
-    """The error for a URL of which only `shown` may be repeated."""
-    return ConfigError("value-invalid", f"source.url = {shown!r} {wrong}", remedy, key="source.url", value=shown)
+def _url_error(wrong: str, remedy: str) -> ConfigError:
+    """The error for a URL, without it: any part of one that cannot be read may be a secret."""
+    return ConfigError("value-invalid", f"source.url {wrong}", remedy, key="source.url")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections import Counter
@@ -16,6 +17,16 @@ KINDS = (
 )  # fmt: skip
 """Kinds of Events of live sources; docs/live.md says what each means."""
 
+LEVELS = dict.fromkeys(KINDS, logging.WARNING) | {
+    "connected": logging.INFO,
+    "resumed": logging.INFO,
+    "computer-clock": logging.INFO,
+    "repeat": logging.DEBUG,
+    "reordered": logging.DEBUG,
+    "refused": logging.ERROR,
+}
+"""The level at which each kind is logged."""
+
 BURST = 50
 PER_SECOND = 5.0
 PENDING_MAX = 1000
@@ -27,10 +38,19 @@ class Said:
 
     Those held back are counted, and the next Event of their kind says how many in ``details["more"]``: a flood of
     rubbish fills neither memory nor disk.
+
+    Parameters
+    ----------
+    clock
+        Seconds.
+    log
+        Called with the level and the message of each Event.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, log: Callable[[int, str], None] = lambda *_: None
+    ) -> None:
+        self._clock, self._log = clock, log
         self._lock = threading.Lock()
         self._events: list[Event] = []
         self._tokens: dict[str, tuple[float, float]] = {}
@@ -55,7 +75,9 @@ class Said:
             at, time_s = self.position if sample is None else (sample, sample / rate_hz)
             if held := self._held.pop(kind, 0):
                 details["more"] = held
-            self._events.append(Event(kind, at, time_s, message[:MESSAGE_MAX], details))
+            message = message[:MESSAGE_MAX]
+            self._events.append(Event(kind, at, time_s, message, details))
+        self._log(LEVELS.get(kind, logging.WARNING), f"{message} ({held} more of this kind)" if held else message)
 
     def drain(self) -> list[Event]:
         """Events since the last call."""

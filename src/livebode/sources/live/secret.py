@@ -17,7 +17,8 @@ def password(settings: SourceSettings) -> str | None:
     Raises
     ------
     ConfigError
-        Where the variable is not set or the file cannot be read; the message names it, never what is in it.
+        Where the variable is not set or the file cannot be read; the message names the key only, for in place of a
+        name may be the password.
     """
     return secret("source", "password", settings.password_env, settings.password_file)
 
@@ -37,10 +38,9 @@ def secret(section: str, key: str, variable: str | None, path: Path | None) -> s
         if value is None:
             raise ConfigError(
                 "secret-missing",
-                f"the environment has no {variable!r}, which {section}.{key}_env names",
-                "set it",
+                f"{section}.{key}_env names a variable that is not set",
+                "set it, or correct its name",
                 key=f"{section}.{key}_env",
-                variable=variable,
             )
         return value
     return None if path is None else _in_file(path, f"{section}.{key}_file")
@@ -52,23 +52,21 @@ def _in_file(path: Path, key: str) -> str:
         if path.stat().st_size > SECRET_BYTES_MAX:
             raise ConfigError(
                 "file-unusable",
-                f"{path} is longer than {SECRET_BYTES_MAX} bytes",
-                f"check that {key} names the right file",
+                f"the file that {key} names is longer than {SECRET_BYTES_MAX} bytes",
+                "check its name",
                 key=key,
-                path=str(path),
             )
         return path.read_text(encoding="utf-8").rstrip("\r\n")
     except UnicodeDecodeError:
         raise ConfigError(
-            "file-unusable", f"{path} is not text", f"check that {key} names the right file", key=key, path=str(path)
+            "file-unusable", f"the file that {key} names is not text", "check its name", key=key
         ) from None
     except OSError as error:
         raise ConfigError(
             "file-unreadable",
-            f"{path} cannot be read: {error.strerror}",
+            f"the file that {key} names cannot be read: {error.strerror}",
             "check its name and permissions",
             key=key,
-            path=str(path),
         ) from None
 
 

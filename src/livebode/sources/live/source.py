@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import threading
 import time
@@ -52,7 +53,8 @@ class LiveSource(ABC):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
-        self._said = Said()
+        self._logger = logging.getLogger(type(self).__module__)
+        self._said = Said(log=self._log)
         self._inbox = Inbox(waits=self.waits)
         self._dropped = Dropped(self._said)
         self._sequencer = Sequencer(
@@ -162,6 +164,7 @@ class LiveSource(ABC):
         Where none comes within `timeout_s`, SourceError; with `late` a sentence is handed to it once, and the wait
         continues until the machine sends, refuses or the source is stopped.
         """
+        self._log(logging.INFO, f"opening {self.address}")
         self._thread.start()
         until = time.monotonic() + self.settings.timeout_s
         while not self.channels:
@@ -174,6 +177,7 @@ class LiveSource(ABC):
                 self._raise_failure()
                 raise self._refused or self._silence(asked)
             self._take(TICK_S)
+        self._log(logging.INFO, f"{len(self.channels)} channels at {self.rate_hz:.9g} Hz")
         return self
 
     def blocks(
@@ -272,7 +276,9 @@ class LiveSource(ABC):
                         break
                 except OSError as error:
                     self._lost_connection(str(error.strerror or error) or type(error).__name__)
-                    self._stop.wait(self._pauses.next_s())
+                    pause_s = self._pauses.next_s()
+                    self._log(logging.DEBUG, f"no connection ({self._trouble}); next attempt in {pause_s:.1f} s")
+                    self._stop.wait(pause_s)
         except BaseException as error:  # of ours, or the library's: it must not vanish with the thread
             if isinstance(error, SourceError) and error.code == "source.refused":
                 self._refused = error.at(str(self.address))
@@ -283,6 +289,12 @@ class LiveSource(ABC):
             self._connected = False
             self._dropped.finish()
             self._inbox.close()
+            self._log(logging.INFO, "reception ended")
+
+    def _log(self, level: int, message: str) -> None:
+        """Log it with the address, which has no user and no password."""
+        address = str(self.address)
+        self._logger.log(level, "%s", message if address in message else f"{address}: {message}")
 
     def _stands(self) -> None:
         """A connection stands."""

@@ -13,7 +13,8 @@ from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import TICK_S, LiveSource
 
 _DATAGRAM_BYTES_MAX = 65535
-_BUFFER_BYTES = 4 << 20
+BUFFER_BYTES = 4 << 20
+"""Asked of the system; it may grant less (`livebode doctor` reports it)."""
 
 
 class UdpSource(LiveSource):
@@ -39,7 +40,7 @@ class UdpSource(LiveSource):
         decoder, sender = FrameDecoder(), self._sender
         family = socket.AF_INET6 if ":" in self.address.host else socket.AF_INET
         with socket.socket(family, socket.SOCK_DGRAM) as port:
-            port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+            port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             port.bind((self.address.host, self.address.port))
             port.settimeout(TICK_S)
             self._stands()

@@ -1,0 +1,57 @@
+"""Which optional packages are installed, and whether their versions suffice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, metadata, requires, version
+
+from packaging.requirements import Requirement
+
+from livebode.doctor.check import Check
+
+NAME = "extras"
+
+
+def check_extras() -> Check:
+    """The extras of the installed livebode, by its own metadata."""
+    found: dict[str, list[str]] = {extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or ()}
+    required = [Requirement(text) for text in requires("livebode") or ()]
+    for extra in found:
+        own = [one for one in required if one.marker and one.marker.evaluate({"extra": extra})]
+        always = {one.name for one in required if one.marker is None or one.marker.evaluate({"extra": ""})}
+        found[extra] = [problem for one in own if one.name not in always and (problem := _problem(one))]
+    return judged(found)
+
+
+def judged(problems: dict[str, list[str]]) -> Check:
+    """The check of what is wrong with each extra; "NAME is missing" where a package is not installed."""
+    present = [extra for extra, wrong in problems.items() if not wrong]
+    missing = [extra for extra, wrong in problems.items() if any(text.endswith(" is missing") for text in wrong)]
+    old = [extra for extra in problems if extra not in present and extra not in missing]
+    facts = {"present": present, "missing": missing, "unsuitable": old}
+    parts = [f"{_listed(present) or 'none'} installed"]
+    if missing:
+        parts.append(f"{_listed(missing)} not installed")
+    if old:
+        parts.append("; ".join(text for extra in old for text in problems[extra]))
+        return Check(NAME, "warning", "; ".join(parts), f"run {_install(old)}", facts)
+    remedy = f"for what is missing and needed run {_install(missing)}" if missing else ""
+    return Check(NAME, "ok", "; ".join(parts), remedy, facts)
+
+
+def _problem(requirement: Requirement) -> str:
+    try:
+        found = version(requirement.name)
+    except PackageNotFoundError:
+        return f"{requirement.name} is missing"
+    if requirement.specifier.contains(found, prereleases=True):
+        return ""
+    return f"{requirement.name} {found} is installed, {requirement.specifier} is required"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names)
+
+
+def _install(extras: Sequence[str]) -> str:
+    return f"pip install 'livebode[{','.join(extras)}]'"

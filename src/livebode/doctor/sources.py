@@ -1,0 +1,76 @@
+"""Whether each axis's source can be used, and answers."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from livebode.core import LivebodeError
+from livebode.doctor.check import Check
+from livebode.session.axis import Axis
+from livebode.sources.live import make_source
+from livebode.sources.live.address import Address
+from livebode.sources.live.settings import SourceSettings
+
+NAME = "source"
+TIMEOUT_S = 3.0
+_AT_ONCE = 16
+
+
+def check_sources(axes: Mapping[str, Axis]) -> list[Check]:
+    """A check for each axis; a single one where there is none. At most a connection is opened, and closed again."""
+    if not axes:
+        return [Check(NAME, "not applicable", "there is no valid configuration of an axis that still runs")]
+    with ThreadPoolExecutor(_AT_ONCE, "livebode doctor") as threads:
+        return list(threads.map(_check, axes, [axis.source for axis in axes.values()]))
+
+
+def _check(axis: str, settings: SourceSettings) -> Check:
+    name = f"{NAME} of {axis}" if axis else NAME
+    try:
+        if settings.url is None:
+            assert settings.log is not None
+            return _recording(name, settings.log)
+        address = make_source(settings).address
+    except LivebodeError as error:
+        return Check.of_error(name, error)
+    if address.scheme == "stdin":
+        return Check(name, "not applicable", "samples come from standard input")
+    return _receiving(name, address) if address.scheme == "udp" else _connecting(name, address)
+
+
+def _recording(name: str, path: Path) -> Check:
+    facts = {"path": str(path)}
+    if not path.exists():
+        return Check(name, "failed", f"there is no recording {path}", "check source.log", facts)
+    if not os.access(path, os.R_OK):
+        return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
+    return Check(name, "ok", f"{path} can be read", facts=facts)
+
+
+def _receiving(name: str, address: Address) -> Check:
+    """UDP: nobody answers there, but the port must be ours to receive on."""
+    facts = {"address": str(address)}
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as port:
+            port.bind((address.host, address.port))
+    except OSError as error:
+        remedy = "end the program that receives there, perhaps a run of livebode, or check source.url"
+        return Check(name, "failed", f"{address}: {error.strerror or error}", remedy, facts)
+    return Check(name, "ok", f"{address} is free to receive on", facts=facts)
+
+
+def _connecting(name: str, address: Address) -> Check:
+    facts = {"address": str(address), "timeout_s": TIMEOUT_S}
+    try:
+        with socket.create_connection((address.host, address.port), TIMEOUT_S):
+            pass
+    except OSError as error:
+        why = f"no answer within {TIMEOUT_S:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
+        remedy = "check that it is switched on, its address in source.url, and the firewall"
+        return Check(name, "failed", f"{address}: {why}", remedy, facts)
+    return Check(name, "ok", f"{address} accepts connections", facts=facts)

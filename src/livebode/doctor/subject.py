@@ -1,0 +1,111 @@
+"""Subject: the configuration and the run that are examined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from livebode.core import LivebodeError, UsageError
+from livebode.doctor.problem import problem_of
+from livebode.records import Run
+from livebode.session.axis import Axis
+from livebode.session.configuration import axes_of
+from livebode.session.experiment import Experiment
+from livebode.session.said import said
+from livebode.session.toml_file import parse_table, read_bytes
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is examined beside the computer.
+
+    Attributes
+    ----------
+    configuration
+        The file of axes or of an experiment; None where none was given.
+    table
+        What is in it, as plain data; None where it is not TOML.
+    experiment
+        Whether it describes an experiment.
+    axes
+        The axes in it, else that of the run; empty where they cannot be used.
+    run
+        The run; None where none was given, or it cannot be read.
+    run_path
+        Its directory, where one was given.
+    problems
+        Why configuration and run cannot be used, by "configuration" and "run".
+    """
+
+    configuration: Path | None = None
+    table: Mapping[str, Any] | None = None
+    experiment: bool = False
+    axes: Mapping[str, Axis] = field(default_factory=dict)
+    run: Run | None = None
+    run_path: Path | None = None
+    problems: Mapping[str, LivebodeError] = field(default_factory=dict)
+
+    @property
+    def sourced(self) -> Mapping[str, Axis]:
+        """The axes whose sources are still needed: those of a finished run are not."""
+        ended = self.configuration is None and self.run is not None and self.run.finished
+        return {} if ended else self.axes
+
+    @classmethod
+    def of(cls, paths: Sequence[Path]) -> Subject:
+        """From a TOML file, the directory of a run, both, or neither.
+
+        Raises
+        ------
+        UsageError
+            If there are two of a kind.
+        """
+        files = [path for path in paths if path.suffix.lower() == ".toml"]
+        runs = [path for path in paths if path not in files]
+        for found, what in ((files, "configurations"), (runs, "runs")):
+            if len(found) > 1:
+                raise UsageError("too-many", f"{len(found)} {what} are given", "give one of them", argument="targets")
+        return _read(files[0] if files else None, runs[0] if runs else None)
+
+
+def _read(configuration: Path | None, run_path: Path | None) -> Subject:
+    problems: dict[str, LivebodeError] = {}
+    table: Mapping[str, Any] | None = None
+    axes: Mapping[str, Axis] = {}
+    run: Run | None = None
+    experiment = False
+    if run_path is not None:
+        try:
+            run = Run.open(run_path, told=lambda _: None)
+            if configuration is None:
+                axes = {"": Axis.of(said(run.summary), str(run_path))}
+        except LivebodeError as error:
+            problems["run"] = error
+    if configuration is not None:
+        try:
+            data = read_bytes(configuration)
+            table = parse_table(data, str(configuration))
+            experiment = "excitation" in table
+            if experiment:
+                _check_experiment(configuration)
+            else:
+                axes = axes_of(data, configuration, {})
+                _check_axes(axes, configuration)
+        except LivebodeError as error:
+            problems["configuration"] = error
+    return Subject(configuration, table, experiment, axes, run, run_path, problems)
+
+
+def _check_experiment(path: Path) -> None:
+    found = Experiment.read(path)
+    found.wish()
+    found.bearable()
+    found.signal_names()
+
+
+def _check_axes(axes: Mapping[str, Axis], path: Path) -> None:
+    for name, axis in axes.items():
+        if (error := problem_of(axis)) is not None:
+            raise error.at(f"{path}, axis {name}" if name else str(path))
