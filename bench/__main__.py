@@ -1,7 +1,7 @@
-"""`python -m bench`: the kernel beside what a user would pick instead, all in one run.
+"""`python -m bench`: the kernel compared with its alternatives, all in one run.
 
-With --long the error over 1e9 samples, with --accuracy that of the named variants, with --job the whole job, with
---record what a record in segments costs.
+With --long: the error over 1e9 samples; with --accuracy: the error of the named variants; with --job: the complete
+command; with --record: the cost of a record in segments.
 """
 
 import argparse
@@ -35,18 +35,24 @@ def speed(seconds: float, sets: list[str]) -> dict[str, Any]:
         found[name] = {"records": records, "judged": lines}
     os.environ.pop("LIVEBODE_INSTRUCTION_SET", None)
     missed = [line for run in found.values() for line in run["judged"] if line["reached"] is False]
-    print(f"\n{len(missed)} cells short of their target")
+    print(f"\n{len(missed)} cells missed their target")
     return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    parser.add_argument("--long", action="store_true", help="the error over 1e9 samples, instead of speed")
-    parser.add_argument("--samples", type=float, default=1e9, help="of the long run")
-    parser.add_argument("--accuracy", action="store_true", help="the error of the named variants, instead of speed")
-    parser.add_argument("--job", action="store_true", help="the whole job `livebode run`, instead of the kernel")
-    parser.add_argument("--record", action="store_true", help="what a record in segments costs, instead of the kernel")
-    parser.add_argument("--seconds", type=float, default=0.5, help="per contender and cell")
+    parser.add_argument("--long", action="store_true", help="measure the error over 1e9 samples, instead of speed")
+    parser.add_argument("--samples", type=float, default=1e9, help="length of the long run")
+    parser.add_argument(
+        "--accuracy", action="store_true", help="measure the error of the named variants, instead of speed"
+    )
+    parser.add_argument(
+        "--job", action="store_true", help="measure the complete command `livebode run`, instead of the kernel"
+    )
+    parser.add_argument(
+        "--record", action="store_true", help="measure the cost of a record in segments, instead of the kernel"
+    )
+    parser.add_argument("--seconds", type=float, default=0.5, help="duration per contender and cell")
     parser.add_argument("--sets", nargs="+", default=list(instruction_sets()[1:]) or list(instruction_sets()))
     options = parser.parse_args()
     result: dict[str, Any]

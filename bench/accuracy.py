@@ -1,4 +1,4 @@
-"""What renewal is for: the named variants after a long run and after a spike (float32 and float64)."""
+"""Effect of renewal: the named variants after a long run and after a spike (float32 and float64)."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ WINDOW, BINS, SAMPLES = 200, [1, 7, 21, 60, 99], 10_000_000
 
 
 def accuracy() -> dict[str, dict[str, float]]:
-    """Error relative to √N·‖x‖₂ of the window, at the end of the run; one spike of 1e6 early in it or none."""
+    """Error relative to √N·‖x‖₂ of the window at the end of the run, with or without an early spike of 1e6."""
     result: dict[str, dict[str, float]] = {}
     for dtype in ("float64", "float32"):
         for spike in (0.0, 1e6):
@@ -19,7 +19,7 @@ def accuracy() -> dict[str, dict[str, float]]:
                 dft = SlidingDFT(WINDOW, BINS, dtype=dtype, variant=variant)
                 dft.advance(x)
                 error = np.abs(dft.spectrum() - np.fft.fft(last)[BINS]).max()
-                name = f"{dtype}, {'a spike of 1e6' if spike else 'noise alone'}"
+                name = f"{dtype}, {'a spike of 1e6' if spike else 'only noise'}"
                 result.setdefault(name, {})[variant] = float(error / (np.sqrt(WINDOW) * np.linalg.norm(last)))
     for name, errors in result.items():
         print(f"  {name}: " + "  ".join(f"{variant} {error:.1e}" for variant, error in errors.items()))

@@ -1,4 +1,4 @@
-"""The simulated axis: how many times real time on one core, and its distance from solve_ivp over a stroke.
+"""The simulated axis: speed relative to real time on one core, and error relative to solve_ivp over a stroke.
 
 python -m bench.axis
 """
@@ -29,7 +29,7 @@ CASES = {
 
 
 def ratio(options: dict) -> float:
-    """Simulated over elapsed time, the best of three, Blocks, truth and all."""
+    """Simulated time over elapsed time, best of three, including Blocks and truth."""
     axis = SimulatedAxis(BeltAxis(motion=Strokes(), excitation_n_m=EXCITATION, seconds=SECONDS, **options))
     best = 0.0
     for _ in range(3):

@@ -1,7 +1,7 @@
-"""`python -m bench.bandwidth`: what a drive sends as spectra, beside the samples of the same signals.
+"""`python -m bench.bandwidth`: bandwidth of spectra from a drive, compared with samples of the same signals.
 
-Bytes on the wire: the frames of `examples.sender`, each in a datagram with 28 bytes of UDP and IPv4 headers, the
-layouts among them. Samples go out in batches of 25 ms, float32 as the spectra.
+Bytes on the wire: the frames of `examples.sender`, each in a datagram with 28 bytes of UDP and IPv4 headers, including
+the layouts. Samples are sent in batches of 25 ms, as float32 like the spectra.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ HEADERS = 28
 TARGETS = {20: 1 / 4, 2: 1 / 40}
 LINES = {"7 lines": "20:140:20", "21 lines": "20:420:20"}
 FEW = 8
-"""Quiet bins beside 21 lines that leave the bandwidth in its target; each line's noise comes from the nearest four."""
+"""Largest number of quiet bins for 21 lines within the target; the noise of a line is from the nearest four."""
 
 
 def bytes_per_s(made: list[bytes]) -> float:
@@ -24,7 +24,7 @@ def bytes_per_s(made: list[bytes]) -> float:
 
 
 def measure() -> list[tuple[str, int, float, float]]:
-    """What is sent, spectra a second, bytes a second of the samples and of the spectra."""
+    """Content, spectra per second, bytes per second of the samples and of the spectra."""
     samples = bytes_per_s(list(frames(SECONDS, 1, real_time=False)))
     found = []
     for name, text in LINES.items():
@@ -40,7 +40,7 @@ def measure() -> list[tuple[str, int, float, float]]:
 
 def main() -> None:
     print(f"{len(CHANNELS)} channels at 4 kHz; spectra of three of them, and the value of the fourth\n")
-    print(f"{'what':28} {'spectra/s':>9} {'samples B/s':>12} {'spectra B/s':>12} {'ratio':>7} {'target':>7}")
+    print(f"{'content':28} {'spectra/s':>9} {'samples B/s':>12} {'spectra B/s':>12} {'ratio':>7} {'target':>7}")
     for what, per_second, samples, spectra in measure():
         target = TARGETS[per_second]
         verdict = "" if spectra <= target * samples else "  missed"

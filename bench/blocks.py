@@ -1,4 +1,4 @@
-"""Dense blocks and blocks at a hop, against everybody."""
+"""Dense blocks and blocks at a hop, compared with all contenders."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ FAST = {
     "numba complex": numba_versions.by_numba_complex,
     "numba planar": numba_versions.by_numba_planar,
 }
-# Measured on fewer rows: some make arrays of every bin at every sample.
+# Measured on fewer rows: some create arrays of every bin at every sample.
 SLOW_ROWS = 512
 SLOW = {
     "numpy cumsum": contenders.by_cumsum,
@@ -24,7 +24,7 @@ SLOW = {
 
 
 class Ours:
-    """A stream that goes on: each call takes the next ROWS·hop samples and fills the same buffer."""
+    """A continuous stream: each call processes the next ROWS·hop samples into the same buffer."""
 
     def __init__(self, window: int, bins: list[int], hop: int, phase: str) -> None:
         self.dft, self.hop, self.phase = SlidingDFT(window, bins), hop, phase
@@ -36,7 +36,7 @@ class Ours:
 
 
 def check(window: int, bins: list[int], hop: int) -> None:
-    """All compute the same rows, or the comparison is void."""
+    """Check that all compute the same rows; otherwise the comparison is invalid."""
     x = signal(window + 40 * hop)
     truth = np.fft.fft(np.lib.stride_tricks.sliding_window_view(x, window)[::hop])[:, bins]
     rows = {name: make(x, window, bins, hop)() for name, make in (FAST | SLOW).items()}
@@ -46,11 +46,11 @@ def check(window: int, bins: list[int], hop: int) -> None:
         wanted = truth[:, [i for i, k in enumerate(bins) if k < window // 2]] if name == "sdft" else truth
         difference = np.abs(found - wanted).max() / np.abs(truth).max()
         if not difference < 1e-9:
-            raise SystemExit(f"{name} computes something else ({window=}, {len(bins)} bins, {hop=}): {difference:.1e}")
+            raise SystemExit(f"{name} computes different rows ({window=}, {len(bins)} bins, {hop=}): {difference:.1e}")
 
 
 def measure(seconds: float) -> list[dict[str, Any]]:
-    """One record a cell: seconds of each contender for the same rows."""
+    """One record per cell: seconds of each contender for the same rows."""
     records = []
     for hop, kind in ((1, "dense"), (HOP, "hop 20")):
         for window, bins in CELLS:

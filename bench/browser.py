@@ -1,4 +1,4 @@
-"""A Chromium without a window, as a person's browser would be."""
+"""A headless Chromium, as the browser of a person."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """Debian's, or whichever `chromium` is found."""
+    """Start Debian's, or any `chromium` that is found."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

@@ -1,7 +1,7 @@
-"""What a user would pick instead: each turns samples into the spectra of sliding windows, at chosen bins.
+"""Alternatives to livebode: each computes the spectra of sliding windows at chosen bins.
 
-A contender gets the samples, the window, the bins and the hop, and returns a function of no arguments, to be timed,
-that makes the spectra of x[r·hop : r·hop + window] for all whole windows r, shape (rows, bins).
+A contender gets the samples, the window, the bins and the hop, and returns a function without arguments. The timed
+function computes the spectra of x[r·hop : r·hop + window] for all complete windows r, shape (rows, bins).
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def by_fastgoertzel(x: Array, window: int, bins: list[int], hop: int) -> Task:
 
 
 def by_sdft(x: Array, window: int, bins: list[int], hop: int) -> Task:
-    """It always makes every bin below N/2, at every sample."""
+    """It always computes all bins below N/2, at every sample."""
     kept = [k for k in bins if k < window // 2]
 
     def task() -> Array:
@@ -41,7 +41,7 @@ def by_sdft(x: Array, window: int, bins: list[int], hop: int) -> Task:
 
 
 def by_cumsum(x: Array, window: int, bins: list[int], hop: int) -> Task:
-    """The modulated recursion as one NumPy cumulative sum; twiddles made beforehand."""
+    """The modulated recursion as one NumPy cumulative sum; twiddle factors are precomputed."""
     turns = np.outer(np.arange(len(x) + 1), bins) % window / window
     twiddles = np.exp(-2j * np.pi * turns)
     newest = np.arange(window - 1, len(x), hop)
@@ -56,7 +56,7 @@ def by_cumsum(x: Array, window: int, bins: list[int], hop: int) -> Task:
 
 
 def by_stft(x: Array, window: int, bins: list[int], hop: int) -> Task:
-    """SciPy's ShortTimeFFT with a rectangular window; whole windows only, each slice from its oldest sample."""
+    """SciPy's ShortTimeFFT with a rectangular window; only complete windows, each slice from its oldest sample."""
     transform = ShortTimeFFT(np.ones(window), hop, 1.0, phase_shift=None)
     rows = (len(x) - window) // hop + 1
 
@@ -68,7 +68,7 @@ def by_stft(x: Array, window: int, bins: list[int], hop: int) -> Task:
 
 
 def by_rfft(x: Array, window: int, bins: list[int], hop: int) -> Task:
-    """scipy.fft.rfft of strided views, in pieces that stay in cache."""
+    """scipy.fft.rfft of strided views, in parts that fit into the cache."""
     windows = np.lib.stride_tricks.sliding_window_view(x, window)[::hop]
     out = np.empty((len(windows), len(bins)), complex)
 

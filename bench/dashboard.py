@@ -1,10 +1,10 @@
-"""The dashboard under load: 101 lines, 30 updates a second, one browser that looks.
+"""The dashboard under load: 101 lines, 30 updates per second, one browser.
 
     python -m bench.dashboard [--seconds 20] [--lines 101] [--browsers 1]
 
-Publishes made-up responses from a thread as a tracker does, and measures what publishing costs that thread, what
-processor time the server's thread takes, and how many frames a second Chromium paints, without a window and without a
-graphics card: it draws with the processor, on the same cores. It prints what else ran.
+Publishes synthetic responses from a thread as a tracker does, and measures the cost of publishing in that thread, the
+processor time of the server's thread, and the frames per second of a headless Chromium without a graphics card, which
+draws on the same cores. It also prints the load of the computer.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _COUNT = "window.frames_ = 0; const tick = () => { window.frames_++; requestAnim
 
 
 def responses(lines: Lines, rows: int, seed: int) -> Responses:
-    """Two masses with noise, rows one after the other."""
+    """Responses of two masses with noise, row by row."""
     rng, f = np.random.default_rng(seed), lines.frequency_hz
     s = 2j * np.pi * f
     plant = (s**2 + 20 * s + 2e5) / (s * (s**2 + 25 * s + 4e5)) * 400
@@ -52,7 +52,7 @@ def responses(lines: Lines, rows: int, seed: int) -> Responses:
 
 
 def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]) -> None:
-    """At the pace of `UPDATES_PER_S`; `costs` takes the seconds that each update cost this thread."""
+    """Publish at `UPDATES_PER_S`; `costs` receives the seconds that each update cost this thread."""
     n, began = 0, time.perf_counter()
     while not stop.is_set():
         at, now_s = n % len(made), n / UPDATES_PER_S
@@ -75,7 +75,7 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
 
 
 def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
-    """Figures of one run."""
+    """Results of one run."""
     dashboard, stop, costs = Dashboard(Serving("127.0.0.1", 0)), threading.Event(), list[float]()
     hub = dashboard.hub("bench")
     found = {
@@ -125,8 +125,8 @@ def main() -> None:
     print(f"Bode plots drawn       {got['draws']:7.1f} /s")
     print(f"server's thread        {100 * cpu:7.1f} % of a core, target ≤ {100 * CPU_MAX:.0f} %: {met[cpu <= CPU_MAX]}")
     cost, p99, most = (got[name] for name in ("median_us", "p99_us", "most_us"))
-    print(f"cost to the tracker    {cost:7.1f} µs an update, p99 {p99:.0f} µs, at most {most:.0f} µs")
-    print(f"load {os.getloadavg()[0]:.1f} behind")
+    print(f"cost to the tracker    {cost:7.1f} µs per update, p99 {p99:.0f} µs, at most {most:.0f} µs")
+    print(f"load {os.getloadavg()[0]:.1f} afterwards")
 
 
 if __name__ == "__main__":

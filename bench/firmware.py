@@ -72,7 +72,7 @@ def missing() -> list[str]:
 
 
 def run(*command: object, cwd: Path | None = None) -> str:
-    """What a command prints; its failure is an error that says all it printed."""
+    """Output of a command; if it fails, the error contains the output."""
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, cwd=cwd)
     if done.returncode:
         raise RuntimeError(f"exit code {done.returncode}: {' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
@@ -80,7 +80,7 @@ def run(*command: object, cwd: Path | None = None) -> str:
 
 
 def kept(core: Core, objects: list[Path], names: tuple[str, ...], file: Path) -> Path:
-    """One object of what these functions need, and nothing else."""
+    """One object with only the code that these functions need."""
     wanted = [f"-Wl,-u,lb_sdft{core.bits}_{name}" for name in names]
     run("arm-none-eabi-gcc", *core.flags, "-nostdlib", "-r", "-Wl,--gc-sections", *wanted, *objects, "-o", file)
     return file
@@ -95,7 +95,7 @@ def flash(core: Core, objects: list[Path], names: tuple[str, ...], program: Path
 
 
 def undefined(file: Path) -> set[str]:
-    """Symbols that the code of an object leaves to others; the linker keeps the names of what it threw away."""
+    """Undefined symbols that an object uses; the linker retains the names of discarded code."""
     named = {line.split()[-1] for line in run("arm-none-eabi-nm", "-u", file).splitlines()}
     used = {line.split()[2] for line in run("arm-none-eabi-objdump", "-r", file).splitlines() if " R_ARM_" in line}
     return named & used

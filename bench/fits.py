@@ -1,4 +1,4 @@
-"""Fits: the median time of one, beside scipy.optimize.least_squares from the same start, with the same model.
+"""Fits: median time, compared with scipy.optimize.least_squares from the same start with the same model.
 
 python -m bench.fits
 """
@@ -24,7 +24,7 @@ SIGMA = 0.005  # of |G|
 
 
 def responses(seed: int = 0) -> Responses:
-    """Two masses whose stiffness wanders by 20 %, with noise at 21 lines."""
+    """Two masses whose stiffness varies by 20 %, with noise at 21 lines."""
     rng = np.random.default_rng(seed)
     values = np.repeat(TRUTH[np.newaxis], ROWS, axis=0)
     values[:, 2] *= 1 + 0.2 * np.sin(np.linspace(0, 2 * np.pi, ROWS))
@@ -39,7 +39,7 @@ def responses(seed: int = 0) -> Responses:
 
 
 def ours(batch: int) -> Callable[[], float]:
-    """Milliseconds a fit where responses come `batch` at a time: warm, after the first sixteen."""
+    """Milliseconds per fit if responses arrive `batch` at a time: warm, after the first sixteen."""
     every = responses()
 
     def run() -> float:
@@ -58,7 +58,7 @@ def ours(batch: int) -> Callable[[], float]:
 
 
 def scipys() -> float:
-    """Milliseconds a fit of scipy's Levenberg–Marquardt, each from where the last one ended, with our closed form."""
+    """Milliseconds per fit of SciPy's Levenberg–Marquardt, each from the previous result, with the same closed form."""
     every, arm = responses(), 2 * np.log(MODEL.radius_m or 1.0)
     start = np.log(TRUTH[:4]) + np.array([0.0, arm, arm, arm])
     weight = np.sqrt(2) / every.sigma
@@ -84,7 +84,7 @@ def main() -> None:
     theirs = found["scipy least_squares"]
     for name, ms in found.items():
         verdict = "" if name[0] == "s" else f"target ≤ {TARGET_MS:g} ms: {'met' if ms <= TARGET_MS else 'missed'}"
-        print(f"{name:26}{ms:8.3f} ms{theirs / ms:8.1f} × scipy's speed   {verdict}")
+        print(f"{name:26}{ms:8.3f} ms{theirs / ms:8.1f} × SciPy's speed   {verdict}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""The whole job: `livebode run` on ten minutes at 4 kHz, against the same responses by ShortTimeFFT and sliding rfft.
+"""The whole command: `livebode run` on ten minutes at 4 kHz, compared with ShortTimeFFT and a sliding rfft.
 
 Three channels in Parquet, 21 lines, window 400, hop 20: 120,000 responses. The contenders get the samples in memory
-and do nothing but the quotient S_wy/S_wu at the lines; livebode also reads the file, forms bounds and coherence, and
-leaves a run directory with pictures.
+and compute only the quotient S_wy/S_wu at the lines; livebode also reads the file, computes bounds and coherence, and
+writes a run directory with pictures.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ def signals() -> np.ndarray:
 
 
 def by_stft(data: np.ndarray) -> np.ndarray:
-    """SciPy's ShortTimeFFT with a rectangular window, whole windows only."""
+    """SciPy's ShortTimeFFT with a rectangular window, only complete windows."""
     transform = ShortTimeFFT(np.ones(WINDOW), HOP, RATE_HZ)
-    # Its slices are centred; the first that lies within the data is centred half a window in.
+    # Its slices are centred; the first complete one is centred half a window after the start.
     w, u, y = transform.stft(data, p0=WINDOW // 2 // HOP, p1=(data.shape[1] - WINDOW // 2) // HOP + 1)[:, BINS]
     return (y * w.conj() / (u * w.conj())).T
 
 
 def by_rfft(data: np.ndarray) -> np.ndarray:
-    """scipy.fft.rfft of strided views, in pieces that stay in cache."""
+    """scipy.fft.rfft of strided views, in parts that fit into the cache."""
     windows = np.lib.stride_tricks.sliding_window_view(data, WINDOW, axis=1)[:, ::HOP]
     parts = []
     for start in range(0, windows.shape[1], 1024):
@@ -68,7 +68,7 @@ def best_s(work: Callable[[], object], repeats: int) -> float:
 
 
 def run_livebode(log: Path, out: Path) -> dict[str, float]:
-    """Wall time of the whole command, of tracking alone and of everything but start and pictures; peak memory."""
+    """Wall time of the whole command, of tracking, and of all but start and pictures; peak memory."""
     options = f"--excitation w --input u --output y --lines 20:220:10 --window {WINDOW} --hop {HOP} --force --json"
     start = time.perf_counter()
     done = subprocess.run(
@@ -109,10 +109,10 @@ def report(result: dict[str, float]) -> None:
     print(f"ten minutes at 4 kHz, {len(BINS)} lines, window {WINDOW}, hop {HOP}")
     print(f"{'':36}{'seconds':>9}{'ShortTimeFFT is':>17}{'sliding rfft is':>17}")
     rows = {
-        "whole command, pictures and all": "command_s",
+        "whole command, with pictures": "command_s",
         "reading, tracking, recording": "run_s",
         "tracking alone": "tracking_s",
-        "starting alone (livebode --version)": "start_s",
+        "only the start (livebode --version)": "start_s",
     }
     for label, key in rows.items():
         ratios = [result[other] / result[key] for other in ("stft_s", "rfft_s")]

@@ -1,10 +1,10 @@
-"""`python -m bench.live`: how long a response takes from the arrival of its samples, and what the axes cost.
+"""`python -m bench.live`: latency of a response from the arrival of its samples, and processor time of the axes.
 
 Senders in another process send over UDP as drives would: 4 kHz, batches of 25 ms, numbered; the session in this process
-tracks 21 lines in a window of 400 at 20 responses a second and records them, as `livebode run` does. Latency is from a
-datagram's arrival (`LiveBlock.arrived_s`) until all that came of it was published (`Audience.followed`), of
-the Blocks that brought a response. Left out is the first second, at whose beginning a source over UDP gathers eight
-batches to put them in order.
+tracks 21 lines in a window of 400 at 20 responses per second and records them, as `livebode run` does. Latency is from
+the arrival of a datagram (`LiveBlock.arrived_s`) until all its results were published (`Audience.followed`), for Blocks
+that give a response. The first second is excluded, because a UDP source first collects eight batches to put them in
+order.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CORES = 2
 
 
 class Clock(Relay):
-    """Takes the time of each Block that brought a response, the audience's own work with it."""
+    """Measures the time of each Block that gives a response, including the audience's work."""
 
     def __init__(self, audience: Audience) -> None:
         super().__init__(audience)
@@ -66,11 +66,11 @@ class Scenario:
 SCENARIOS = (
     Scenario("one axis"),
     Scenario("one axis, the dashboard open", dashboard=True),
-    Scenario("one axis, samples kept, a segment closed every 2 s", record={"samples": True, "segment_s": 2.0}),
+    Scenario("one axis, samples recorded, a segment closed every 2 s", record={"samples": True, "segment_s": 2.0}),
     Scenario("16 axes", axes=16),
     Scenario("16 axes, the dashboard open", axes=16, dashboard=True),
     Scenario(
-        "16 axes, samples kept, a segment closed every 10 s", axes=16, record={"samples": True, "segment_s": 10.0}
+        "16 axes, samples recorded, a segment closed every 10 s", axes=16, record={"samples": True, "segment_s": 10.0}
     ),
 )
 
@@ -87,7 +87,7 @@ def axis(port: int, scenario: Scenario) -> Axis:
 
 
 def send(ports: list[int], end: Flag) -> None:
-    """What a cabinet of drives sends; the axes are spread over the 25 ms, as nothing keeps them in step."""
+    """Send the data of a cabinet of drives; the axes are spread over 25 ms, because they are not synchronous."""
     data = signals()[:, : 60 * RATE_HZ]
     links = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in ports]
     for link, port in zip(links, ports):
@@ -104,13 +104,13 @@ def send(ports: list[int], end: Flag) -> None:
         for frame in frames:
             try:
                 links[which].send(frame)
-            except ConnectionRefusedError:  # nobody listens yet
+            except ConnectionRefusedError:  # the receiver does not listen yet
                 continue
         count += 1
 
 
 def wake(end: Flag, said: Connection) -> None:
-    """How late a process wakes that does nothing else: what the machine adds to every latency meanwhile."""
+    """Wake-up delay of an idle process: the computer's own contribution to every latency."""
     late_s, due = [], time.monotonic()
     while not end.is_set():
         due += WAKE_S
@@ -121,7 +121,7 @@ def wake(end: Flag, said: Connection) -> None:
 
 
 def look_on(url: str, end: Flag) -> None:
-    """A person's browser, at the first axis."""
+    """The browser of a person, on the first axis."""
     with chromium() as browser:
         shown = browser.new_page(viewport={"width": 1440, "height": 900})
         shown.goto(url)
@@ -189,8 +189,8 @@ def _measured(scenario: Scenario, seconds: float, clocks: dict[str, Clock], url:
         "overflows": float(sum(one["counts"]["overflow"] for one in health)),
         "cores used": (cpu_then - cpu) / (ended - began),
         "seconds": ended - began,
-        "an idle process wakes late, p99, ms": 1e3 * late_s[0],
-        "the same, longest, ms": 1e3 * late_s[1],
+        "wake-up delay of an idle process, p99, ms": 1e3 * late_s[0],
+        "wake-up delay, longest, ms": 1e3 * late_s[1],
     }
 
 
@@ -218,8 +218,8 @@ def _free_ports(count: int) -> list[int]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.live", description=__doc__)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each scenario")
-    parser.add_argument("--only", default="", help="scenarios whose name begins so")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="duration of each scenario")
+    parser.add_argument("--only", default="", help="only scenarios whose name begins with this")
     options = parser.parse_args()
     for scenario in SCENARIOS:
         if scenario.name.startswith(options.only):

@@ -1,4 +1,4 @@
-"""The error against numpy.fft of the last N samples over a very long run: flat, or the kernel is wrong."""
+"""The error relative to numpy.fft of the last N samples over a very long run; it must not grow."""
 
 import time
 
@@ -18,10 +18,10 @@ def relative_error(dft: SlidingDFT, last: Array) -> float:
 
 
 def long_run(samples: int) -> dict[str, dict[str, float]]:
-    """The worst error seen in each decade, float32 and float64, on noise with an offset of 100."""
+    """The largest error in each decade, float32 and float64, on noise with an offset of 100."""
     result: dict[str, dict[str, float]] = {}
     for dtype in BOUND:
-        # A block that is not a multiple of the window comes back at ever other places of the period.
+        # A block that is not a multiple of the window ends at a different phase of the period each time.
         x = (100 + np.random.default_rng(7).standard_normal(BLOCK - 1)).astype(dtype)
         dft, worst, decade, started = SlidingDFT(WINDOW, BINS, dtype=dtype), 0.0, 10**5, time.perf_counter()
         found: dict[str, float] = {}

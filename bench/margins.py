@@ -1,4 +1,4 @@
-"""`python -m bench.margins`: margins with bounds for a row of fits, beside python-control's for one loop."""
+"""`python -m bench.margins`: margins with bounds for several fits, compared with python-control for one loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BAND_HZ = (20.0, 140.0)
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """The best of five."""
+    """Best time of five."""
     work()
     found = []
     for _ in range(5):
@@ -39,7 +39,7 @@ def main() -> None:
         belts = BELT * np.column_stack([np.ones(rows), np.ones(rows), stiffness, np.ones(rows)])
         fits = parameters(belts, np.array([np.diag((0.01 * belt) ** 2) for belt in belts]))
         each = seconds(lambda fits=fits: margins(fits, CASE.open, BAND_HZ)) / rows
-        print(f"livebode, {rows:3} fits at once, bounds: {1e3 * each:.2f} ms a fit, {alone / each:.1f} times as fast")
+        print(f"livebode, {rows:3} fits at once, bounds: {1e3 * each:.2f} ms per fit, {alone / each:.1f} times as fast")
     print(f"a proposal over 32 places: {seconds(lambda: tuning(fits, CASE.open, BAND_HZ)):.2f} s")
 
 

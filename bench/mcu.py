@@ -1,4 +1,4 @@
-"""The kernel on microcontrollers, counted in QEMU: instructions a sample beside RLS, RAM and flash.
+"""The kernel on microcontrollers, counted in QEMU: instructions per sample compared with RLS, RAM and flash.
 
 `python -m bench.mcu` prints the tables of docs/microcontroller.md. Counts are exact and the same on every machine.
 """
@@ -24,7 +24,7 @@ CLOCK_HZ, RATE_HZ, CYCLES = 168e6, 4000, 2.0
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one configuration: instructions a sample, mean and worst; of a reading with its responses; bytes of RAM."""
+    """One configuration: instructions per sample, mean and worst; per reading with responses; bytes of RAM."""
 
     push: float
     worst: int
@@ -33,13 +33,13 @@ class Cost:
 
     @property
     def sample(self) -> float:
-        """Instructions a sample with a reading every hop."""
+        """Instructions per sample with a reading every hop."""
         return self.push + self.hop / HOP
 
 
 @dataclass(frozen=True)
 class Counted:
-    """All that one core's program counted: loops of known length, the kernel by (lines, table), RLS, and flash."""
+    """Counts of one core: loops of known length, the kernel by (lines, table), RLS, and flash."""
 
     loops: dict[int, int]
     kernel: dict[tuple[int, str], Cost]
@@ -75,7 +75,8 @@ def table(core: Core, counted: Counted) -> list[str]:
     """The rows of one core's table in Markdown."""
     head = f"{core.name}, float{core.bits}"
     rows = [
-        f"| {head}: lines, table | push | worst push | read and FRF | a sample, hop {HOP} | of RLS | RAM, bytes |",
+        f"| {head}: lines, table | push | worst push | read and FRF | per sample, hop {HOP} | relative to RLS "
+        "| RAM, bytes |",
         "|---|---|---|---|---|---|---|",
     ]
     for (lines, name), c in counted.kernel.items():
@@ -102,10 +103,8 @@ def main() -> None:
     cycles = CYCLES * m4f.sample
     share = cycles * RATE_HZ / CLOCK_HZ
     verdict = "" if m4f.sample <= LIMIT else " missed"
-    print(
-        f"{M4F.name}, 21 lines, {CHANNELS} channels: {m4f.sample:.0f} of {LIMIT} instructions a sample{verdict}, about"
-    )
-    print(f"{cycles:.0f} cycles: {100 * share:.1f} % of {CLOCK_HZ / 1e6:.0f} MHz at {RATE_HZ / 1e3:.0f} kHz")
+    print(f"{M4F.name}, 21 lines, {CHANNELS} channels: {m4f.sample:.0f} of {LIMIT} instructions per sample{verdict},")
+    print(f"about {cycles:.0f} cycles: {100 * share:.1f} % of {CLOCK_HZ / 1e6:.0f} MHz at {RATE_HZ / 1e3:.0f} kHz")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""`python -m bench.overload`: a live run whose model does not fit, at 200 responses a second.
+"""`python -m bench.overload`: a live run whose model does not fit, at 200 responses per second.
 
 A sender in another process sends 4 kHz over UDP in batches of 25 ms, as a drive would. `two-mass-gain` is fitted to a
-delay, which it does not describe, at a hop of 20 samples: each fit is scanned again and fails. Printed are samples
-lost, the longest backlog, how many responses were fitted, lines and groups of events, and how long the end took.
+delay, which it does not describe, at a hop of 20 samples: each fit is scanned again and fails. The output: lost
+samples, longest backlog, number of fitted responses, lines and groups of events, and duration of the end.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Backlog(Audience):
 
 
 def send(port: int, seconds: float) -> None:
-    """What a drive sends, at its pace."""
+    """Send the data of a drive at its rate."""
     rng = np.random.default_rng(0)
     w = np.resize(multisine(LINES), PERIODS * WINDOW)
     u = w + 0.1 * rng.standard_normal(w.size)
@@ -55,14 +55,14 @@ def send(port: int, seconds: float) -> None:
         time.sleep(max(0.0, began + turn * BATCH / RATE_HZ - time.monotonic()))
         at = turn * BATCH % data.shape[1]
         batch = Batch(turn * BATCH, data[:, at : at + BATCH], CHANNELS, float(RATE_HZ), epoch=7)
-        with suppress(ConnectionRefusedError):  # nobody listens yet
+        with suppress(ConnectionRefusedError):  # the receiver does not listen yet
             if turn % 40 == 0:
                 link.send(encode_layout(CHANNELS, float(RATE_HZ), epoch=7))
             link.send(encode_samples(batch, sequence=turn))
 
 
 def measured(seconds: float, folder: Path) -> dict[str, float]:
-    """Figures of one run."""
+    """Results of one run."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.bind(("127.0.0.1", 0))
         port = link.getsockname()[1]

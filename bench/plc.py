@@ -1,4 +1,4 @@
-"""What the generated function blocks cost a PLC: LREAL operations a sample, counted while they run, and memory.
+"""Cost of the generated function blocks on a PLC: LREAL operations per sample, counted at run time, and memory.
 
 `python -m bench.plc` prints the tables of docs/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
 change of LREAL numbers.
@@ -23,7 +23,7 @@ WINDOW, RATE_HZ = 400, 4000.0
 
 
 def memory_bytes(block: Instance) -> int:
-    """Of all its numbers."""
+    """Memory of all its variables."""
     size = {"LREAL": 8, "ULINT": 8, "UDINT": 4, "BOOL": 1}
     kinds = block._unit.kinds.values()
     arrays = sum(size[k.of.name] * int(np.prod(k.lengths)) for k in kinds if isinstance(k, Array))
@@ -31,7 +31,7 @@ def memory_bytes(block: Instance) -> int:
 
 
 def spectra(bins: int, channels: int, phase: str) -> str:
-    """A row of the table of FB_SlidingDft; its outputs over ten periods beside the kernel's."""
+    """A row of the table of FB_SlidingDft; its outputs over ten periods are compared with the kernel's."""
     names = ["w", "u", "y"][:channels]
     lines = Lines(tuple(range(1, bins + 1)), WINDOW, RATE_HZ)
     block = Machine(sliding_dft(lines, names, phase=phase)).instance("FB_SlidingDft")
@@ -49,7 +49,7 @@ def spectra(bins: int, channels: int, phase: str) -> str:
 
 
 def longer_registers(bins: int) -> str:
-    """How far the recursion in long double lies from the kernel, in units of √N·‖x‖₂, at most over ten windows."""
+    """Largest difference of the recursion in long double from the kernel over ten windows, in units of √N·‖x‖₂."""
     x = np.random.default_rng(0).standard_normal(10 * WINDOW)
     places = list(range(1, bins + 1))
     longer = TwinDFT(WINDOW, places, dtype=np.longdouble).process(x[None], phase="fixed")[0]
@@ -59,7 +59,7 @@ def longer_registers(bins: int) -> str:
 
 
 def sum_of_lines(lines: Lines, amplitude: float) -> str:
-    """The other way to make a multisine: from cos and sin of each line, out of a table of one turn."""
+    """The alternative multisine: sum of cos and sin of each line, from a table of one turn."""
     window, phases = lines.window, schroeder_phases(len(lines))
     start = "".join(
         f"bins[{i}] := {k};\nb[{i}] := {amplitude * np.cos(p):.17f};\na[{i}] := {amplitude * np.sin(p):.17f};\n"
@@ -88,7 +88,7 @@ END_FUNCTION_BLOCK
 
 
 def excitation(count: int) -> str:
-    """A row of the table of FB_Multisine: one period in a table beside the sum of its lines."""
+    """A row of the table of FB_Multisine: one period in a table, compared with the sum of its lines."""
     window = 100
     lines = Lines(tuple(range(1, count + 1)), window, RATE_HZ)
     period = multisine_period(lines, 0.1)
@@ -113,15 +113,15 @@ def main() -> None:
     """Print the tables."""
     argparse.ArgumentParser(prog="python -m bench.plc", description=__doc__).parse_args()
     print(f"FB_SlidingDft, N = {WINDOW}\n")
-    print("| K | channels | phase | mean | most | while the table fills | bytes | difference to the kernel |")
+    print("| K | channels | phase | mean | max | while the table fills | bytes | difference from the kernel |")
     print("|---|---|---|---|---|---|---|---|")
     for bins in (7, 21):
         for channels, phase in ((2, "fixed"), (3, "fixed"), (2, "window")):
             print(spectra(bins, channels, phase))
     print(f"\nDifference of sums with a mantissa of {np.finfo(np.longdouble).nmant + 1} bits, over sqrt(N)*|x|")
     print(", ".join(longer_registers(bins) for bins in (7, 21)))
-    print("\nFB_Multisine beside a sum of its lines\n")
-    print("| K | table | in a ramp | difference to the period | sum of lines | difference to the period |")
+    print("\nFB_Multisine compared with a sum of its lines\n")
+    print("| K | table | in a ramp | difference from the period | sum of lines | difference from the period |")
     print("|---|---|---|---|---|---|")
     for count in (7, 21):
         print(excitation(count))

@@ -1,4 +1,4 @@
-"""One sample from Python, against a call that does nothing. Driven by map, so that no loop hides the difference."""
+"""One sample from Python, compared with an empty call; driven by map, so that no loop hides the difference."""
 
 from collections import deque
 from collections.abc import Callable

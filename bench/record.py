@@ -1,7 +1,7 @@
-"""What a record in segments costs beside the tracker that feeds it: 16 axes at once, and the snapshots that it stores.
+"""Cost of a record in segments compared with its tracker: 16 axes at the same time, and the stored snapshots.
 
-Each axis has 21 lines in a window of 400 at 4 kHz, 20 responses a second, in blocks of a quarter of a second as they
-come from a machine. One axis is measured; its processor time counts 16 times.
+Each axis has 21 lines in a window of 400 at 4 kHz, 20 responses per second, in blocks of 0.25 s as from a machine. One
+axis is measured; its processor time counts 16 times.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def tracker_at(hop: int) -> Tracker:
 
 
 def measure() -> dict[str, float]:
-    """Cost of the record by what it is, and of snapshots at three hops."""
+    """Cost of the record by content, and of snapshots at three hops."""
     data, found = signals()[:, : SECONDS * RATE_HZ], {}
     for hop in (1, 20, 200):
         tracker = tracker_at(hop)
@@ -41,15 +41,15 @@ def measure() -> dict[str, float]:
         recording_s, tracking_s, pause_s, left = record(data, samples)
         found |= {
             f"{label}: share of one core for {AXES} axes": AXES * recording_s / SECONDS,
-            f"{label}: the same of the tracker": AXES * tracking_s / SECONDS,
+            f"{label}: share of the tracker": AXES * tracking_s / SECONDS,
             f"{label}: longest pause of one axis, ms": 1e3 * pause_s,
-            f"{label}: kB/s left on the disk by one axis": left / SECONDS / 1e3,
+            f"{label}: kB/s written to the disk by one axis": left / SECONDS / 1e3,
         }
     return found
 
 
 def record(data: np.ndarray, samples: bool) -> tuple[float, float, float, int]:
-    """Processor seconds of the record and of the tracker, the record's longest pause, and the bytes that it left."""
+    """Processor seconds of the record and of the tracker, the record's longest pause, and the bytes written."""
     tracker, tally = tracker_at(HOP), Tally(ChannelCheck(NAMES, "w"), time.perf_counter())
     recording_s = tracking_s = pause_s = 0.0
     with tempfile.TemporaryDirectory() as folder:
@@ -76,7 +76,7 @@ def record(data: np.ndarray, samples: bool) -> tuple[float, float, float, int]:
 
 
 def report(result: dict[str, float]) -> None:
-    print(f"a record in segments, {len(LINES)} lines, window {WINDOW}, {RATE_HZ // HOP} responses a second")
+    print(f"a record in segments, {len(LINES)} lines, window {WINDOW}, {RATE_HZ // HOP} responses per second")
     for label, value in result.items():
         print(f"{label:60}{value:12.4g}")
     for label in ("responses", "with samples"):

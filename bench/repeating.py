@@ -1,4 +1,4 @@
-"""What watching for errors that repeat costs a Tracker, for each period of the excitation.
+"""Cost of the detection of repeating errors in a Tracker, per period of the excitation.
 
 `python -m bench.repeating` tracks the same samples with and without it, side by side, and prints the difference.
 """
@@ -44,7 +44,7 @@ def main() -> None:
         taken = [min(turn) for turn in zip(*[[_processor_s(work) for work in both] for _ in range(TURNS)])]
         cost = (taken[0] - taken[1]) / PERIODS
         share = cost * lines.rate_hz / lines.window
-        print(f"N = {lines.window}, {len(lines)} lines: {cost * 1e6:.0f} µs a period, {share:.2%} of a core")
+        print(f"N = {lines.window}, {len(lines)} lines: {cost * 1e6:.0f} µs per period, {share:.2%} of a core")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a command waits for where a run has very many segments: 5,000 of them, of one second each.
+"""Delay of a command on a run with very many segments: 5,000 of one second each.
 
 `python -m bench.segments` records such a run, opens it as `query`, `view` and a command that continues it do, and
 compares each with reading the same rows from one Parquet file.
@@ -45,7 +45,7 @@ def opened(path: Path) -> SegmentedRun:
 
 
 def recorded(path: Path, segments: int) -> None:
-    """A run with so many segments, that was killed."""
+    """Create a run with this number of segments that was killed."""
     data = np.random.default_rng(0).standard_normal((len(NAMES), round(RATE_HZ)))
     tracker = tracker_at(HOP)
     with opened(path) as run:

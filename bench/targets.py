@@ -1,4 +1,4 @@
-"""What must be reached, and the table that says whether it was."""
+"""Targets, and the table of results met or missed."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +15,7 @@ NONE = float("nan")
 TARGETS: list[tuple[str, str, str, str, dict[str, Callable[[int], float]], bool]] = [
     (
         "dense",
-        f"dense{note} against {theirs}",
+        f"dense{note} compared with {theirs}",
         ours,
         theirs,
         bounds,
@@ -29,7 +29,7 @@ TARGETS: list[tuple[str, str, str, str, dict[str, Callable[[int], float]], bool]
 ] + [
     (
         "hop 20",
-        "hop 20 against fastgoertzel step=20",
+        "hop 20 compared with fastgoertzel step=20",
         "livebode",
         "fastgoertzel",
         {"avx512": _by_bins(15, 15, 15), "avx2": _by_bins(10, 10, 10)},
@@ -37,7 +37,7 @@ TARGETS: list[tuple[str, str, str, str, dict[str, Callable[[int], float]], bool]
     ),
     (
         "push",
-        "push against an empty call",
+        "push compared with an empty call",
         "livebode",
         "empty call",
         {"avx512": _by_bins(1.35, 1.6, 2.3), "avx2": _by_bins(1.5, 1.9, 3)},
@@ -45,7 +45,7 @@ TARGETS: list[tuple[str, str, str, str, dict[str, Callable[[int], float]], bool]
     ),
     (
         "two channels, FRF every 20",
-        "two channels + FRF every 20 against RLS",
+        "two channels + FRF every 20 compared with RLS",
         "livebode",
         "rls",
         {"avx512": _by_bins(0.5, 0.75, NONE), "avx2": _by_bins(0.6, 1, NONE)},
@@ -55,7 +55,7 @@ TARGETS: list[tuple[str, str, str, str, dict[str, Callable[[int], float]], bool]
 
 
 def judge(records: list[Record], instruction_set: str) -> list[Record]:
-    """One line a cell and question: the ratio, its bound and whether it is reached."""
+    """One line per cell and question: the ratio, its bound and whether it is reached."""
     lines = []
     for kind, question, ours, theirs, bounds, more in TARGETS:
         for record in (r for r in records if r["kind"] == kind):

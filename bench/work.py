@@ -1,4 +1,4 @@
-"""The work that every contender does, and how it is timed."""
+"""The work of every contender, and its timing."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 ROWS = 4096
 HOP = 20
-# (N, bins): 51 is all that a window of 100 has.
+# (N, bins): a window of 100 has only 51 bins.
 CELLS = [
     (window, list(range(1, count + 1) if count < window // 2 else range(count)))
     for window in (100, 200, 1000)
@@ -23,7 +23,7 @@ def signal(samples: int) -> Array:
 
 
 def side_by_side(tasks: Mapping[str, Callable[[], object]], seconds: float) -> dict[str, float]:
-    """Best time of each, in seconds.
+    """Measure the best time of each, in seconds.
 
     They take turns, so that a busy neighbour hits all alike. A turn is a few calls in a row of which the first is not
     counted: each works on its own reused buffers, as in a loop that does nothing else.

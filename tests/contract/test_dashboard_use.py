@@ -112,7 +112,7 @@ def test_a_new_run_with_other_lines_lets_the_reference_go(browser: Browser, tmp_
         tab.until("bode.curves.reference?.frame.quantity === 'open loop'")
         begin(hub, tmp_path, Lines(LINES.bins[:6], LINES.window, RATE_HZ))
         tab.until("bode.curves.measured?.frame.columns === 6")
-        tab.page.locator("#notice", has_text="the frozen reference was let go").wait_for()
+        tab.page.locator("#notice", has_text="the frozen reference was released").wait_for()
         assert tab.page.locator("#freeze").inner_text() == "Freeze"
         assert not tab.page.locator("#legend [data-name=reference]").is_visible()
         tab.page.wait_for_timeout(300)
@@ -305,7 +305,7 @@ def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) 
         rows = list(csv.DictReader(io.StringIO(get(tab, "this response as CSV").read_text())))
         assert [float(r["re [rad/s/(N m)]"]) for r in rows] == newest.value.real.tolist()
         assert [float(r["sigma [rad/s/(N m)]"]) for r in rows] == newest.sigma.tolist()
-        mat = loadmat(get(tab, "every response in the tracking's span as .mat"), simplify_cells=True)["livebode"]
+        mat = loadmat(get(tab, "all responses in the time span as .mat"), simplify_cells=True)["livebode"]
         within = (run.time_s >= tab.js("tracking.fromS")) & (run.time_s <= tab.js("tracking.toS"))
         assert np.array_equal(mat["H"].squeeze().T, run.value[within], equal_nan=True)
         assert mat["time_s"].tolist() == run.time_s[within].tolist()
@@ -391,7 +391,7 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
         button = tab.page.locator('#quantities [data-value="sensitivity"]')
         assert button.get_attribute("aria-disabled") == "true"
         tab.page.keyboard.press("4")
-        tab.page.locator("#notice", has_text="does not say what feeds back").wait_for()
+        tab.page.locator("#notice", has_text="configuration contains no controllers").wait_for()
         assert tab.js("page.quantity") == "plant"
         tab.page.locator("#tab-margins").click()
         tab.page.locator("#pane-margins", has_text="describe its controllers").wait_for()

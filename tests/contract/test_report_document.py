@@ -130,13 +130,13 @@ def test_long_logs_are_grouped_and_long_runs_thinned_and_both_said(moving: Path)
     grouped, in_full = (p for p in events.parts if isinstance(p, Table))
     assert {row[0]: row[1] for row in grouped.rows} == {"change": "60", "gap": "3,000"}
     assert len(in_full.rows) == 40
-    assert "20 events between them left out" in in_full.note
+    assert "20 events between them not shown" in in_full.note
     pictures = {p.what: p for s in document.sections for p in s.parts if isinstance(p, Picture)}
     assert len(pictures["bode"].data["responses"]) <= 2048
     drawn = len(pictures["tracking"].data["responses"])
     assert 250 < drawn <= 500
-    assert f"{drawn} of 5,000 responses are drawn" in pictures["tracking"].caption
-    assert "of 5,000 responses are drawn" in pictures["bode"].caption
+    assert f"{drawn} of 5,000 responses)" in pictures["tracking"].caption
+    assert "of 5,000 responses)" in pictures["bode"].caption
 
 
 def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_a_viewer_may_only_look(watched: Watched) -> None:
     assert ask(watched, "/api/past?axis=0&from=0&to=1", Cookie=mine)[0] == 200
     headers = {"Origin": origin(watched), "Cookie": mine, "Content_Type": "application/json"}
     status, _, body = ask(watched, "/api/acknowledge", "POST", {"axis": 0, "event": "x"}, **headers)
-    assert (status, json.loads(body)["error"]) == (403, "this session may only look")
+    assert (status, json.loads(body)["error"]) == (403, "this session is read-only")
     with connect(
         f"ws://127.0.0.1:{port_of(watched)}/live", origin=origin(watched), additional_headers={"Cookie": mine}
     ) as live:
@@ -161,7 +161,7 @@ def test_wrong_tokens_are_refused_slower_and_slower_and_said_once() -> None:
     assert access.login(TOKEN, "10.0.0.6"), "others do not wait"
     now[0] += 300
     assert access.login(TOKEN, "10.0.0.5")
-    assert told == ["a wrong token came to the dashboard from 10.0.0.5; it was refused"]
+    assert told == ["the dashboard rejected a wrong token from 10.0.0.5"]
     for i in range(5000):
         access.login("wrong", f"2001:db8:{i:x}::1")
     assert len(access._wrong) <= 1024
@@ -304,7 +304,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
     with chromium() as browser, Tab(browser, watched.url, wait=False) as tab:
         tab.page.fill("#token", "wrong" * 10)
         tab.page.keyboard.press("Enter")
-        tab.page.locator("#wrong", has_text="not right").wait_for()
+        tab.page.locator("#wrong", has_text="token is wrong").wait_for()
         tab.page.fill("#token", TOKEN)
         tab.page.keyboard.press("Enter")
         tab.until("window.livebode?.bode.curves.measured")
@@ -314,7 +314,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         assert not any(TOKEN in text for text in tab.wrong)
         watched.hub.write_event(Event("change", 1, 0.1, "changed", {}))
     watched.go(11_000)
-    assert any("wrong token came" in line for line in watched.told)
+    assert any("wrong token from" in line for line in watched.told)
     assert len([line for line in watched.told if "127.0.0.1" in line]) == 1
     for file in watched.directory.rglob("*"):
         if file.is_file():

@@ -85,7 +85,7 @@ def test_another_way_or_speed_is_said(tmp_path: Path) -> None:
     assert any("no place in common" in w for w in elsewhere.warnings)
     assert not elsewhere.places
     standing = compare(usual, Run.open(write_run(tmp_path / "e", measured(300, 5))))
-    assert any("Only one of the runs moved" in w for w in standing.warnings)
+    assert any("Only one of the runs has a changing schedule" in w for w in standing.warnings)
 
 
 def test_parameters_and_their_change(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
     fewer = write_run(tmp_path / "e", _first_lines(some, 3))
     done = livebode("compare", usual, fewer, "--json")
     assert [line["frequency_hz"] for line in json.loads(done.out)["lines"]] == [20, 40, 60]
-    assert "share 3 of 7 and 3 lines" in " ".join(json.loads(done.out)["warnings"])
+    assert "3 of 7 and 3 lines in common" in " ".join(json.loads(done.out)["warnings"])
 
 
 def _first_lines(of: Responses, n: int) -> Responses:

@@ -126,7 +126,7 @@ def test_what_cannot_be_shown_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
     )
     result = livebode("run", tmp_path / "axis.toml", "--serve")
     assert result.code == 2
-    assert "needs a token" in result.err
+    assert "requires a token" in result.err
     assert "secrets.token_urlsafe" in result.err
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     log = write_parquet(tmp_path / "log.parquet", signals(2000))

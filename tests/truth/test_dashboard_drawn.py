@@ -167,7 +167,7 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
             float(tab.page.locator("#pane-margins [data-name=phase_margin] td").nth(1).inner_text().split()[0]),
             rel=0.01,
         )
-        assert "no model" in tab.page.locator("#pane-margins [data-name=at_lines]").inner_text()
+        assert "without a model" in tab.page.locator("#pane-margins [data-name=at_lines]").inner_text()
 
         tab.page.locator("#tab-parameters").click()
         tab.until("parameters.items.get('two-mass\\0Keff').made")

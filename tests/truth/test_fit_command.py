@@ -96,7 +96,7 @@ def test_a_model_that_finds_nothing_says_why(machine: Path) -> None:
     out, _ = run(machine, "nothing", "")
     result = livebode("fit", out, "--model", "rigid")
     assert result.code == 3
-    assert "no numbers (" in result.out
+    assert "no parameters (" in result.out
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def test_learn_and_tell(tmp_path: Path) -> None:
 
     learned = livebode("learn", tmp_path / "one", "--out", tmp_path / "healthy.json")
     assert learned.code == 0, learned.err
-    assert "good for changes from: stiffness 0.5 %" in learned.out
+    assert "Smallest changes that it detects: stiffness 0.5 %" in learned.out
 
     found = run(faulty, tmp_path / "two", *MOVING, "--baseline", tmp_path / "healthy.json")
     assert found.code == 0, found.err
@@ -112,7 +112,7 @@ def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
     assert [(e["kind"], e["sample"], e["details"]) for e in live] == [
         (e["kind"], e["sample"], e["details"]) for e in changes_told
     ]
-    assert "Lines and fitted parameters are watched" in learned.out
+    assert "Lines and fitted parameters are monitored" in learned.out
     _not_fitted(toml, base, tmp_path)
 
 

@@ -93,7 +93,7 @@ def test_a_loop_that_is_described_beside_the_run_is_judged_and_tuned(run: Path) 
     assert done.code == 0, done.err
     assert "suggested: Ms is up to" in done.out
     assert "notch at 59" in done.out
-    assert "4000 times a second" in done.out
+    assert "at 4000 Hz:" in done.out
     assert "EXTRAPOLATED" in done.out
     assert "lines alone" in done.out
     assert livebode("margins", run, "--ms", 1.0).code == 2

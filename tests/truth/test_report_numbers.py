@@ -156,7 +156,7 @@ def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) 
     differing = LINES.frequency_hz[comparison.found.overall.differs]
     np.testing.assert_array_equal(marked, np.tile(differing, 2))
     assert 60 in differing
-    (places,) = parts(document, Picture, "Place by place")
+    (places,) = parts(document, Picture, "By place")
     dots = sum(len(a.get_xdata()) for axes in drawn(places).axes for a in artists(axes, "differs"))
     assert dots == sum(int(p.difference.differs.sum()) for p in comparison.found.places)
     done = livebode("compare", *paths, "--out", tmp_path / "both")

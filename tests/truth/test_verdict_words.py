@@ -65,7 +65,7 @@ def test_a_comparison_is_headed_by_the_alarm_of_a_run_though_no_line_differs(tmp
     assert f"After: {SOFTER}" in [f.text for f in rest if f.tone == "alarm"]
     (lines,) = [f for f in rest if f.text.startswith("No line differs")]
     assert document.tones[lines.tone] == "no difference shown"
-    assert "% would have been seen" in lines.text
+    assert "detectable: ≥ " in lines.text
 
 
 def test_only_changes_that_have_not_cleared_are_alarms_each_by_its_newest_amount(tmp_path: Path) -> None:

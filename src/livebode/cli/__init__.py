@@ -2,7 +2,7 @@
 
 import os
 
-# Before NumPy is loaded: products as small as ours only make BLAS's threads wait for each other, on a busy machine for
+# Before NumPy is loaded: the matrices here are so small that BLAS threads only wait for each other, on a busy machine
 # ten times as long as the product takes.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

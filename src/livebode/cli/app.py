@@ -1,8 +1,8 @@
 """The command line.
 
-It measures (run, demo), looks into recordings and runs (inspect, query), draws conclusions from runs (fit, margins,
-validate, learn), hands them on (export), and examines itself (doctor). Exit codes: 0 done, 1 our mistake, 2 the
-user's, 3 no model fits, 130 and above stopped from outside.
+Commands: measure (run, demo), look at recordings and runs (inspect, query), evaluate runs (fit, margins, validate,
+learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 usage error, 3 no model
+fits, 130 and above stopped by a signal.
 """
 
 from __future__ import annotations
@@ -42,24 +42,24 @@ _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(si
 
 
 class _Group(TyperGroup):
-    """With a help in colours."""
+    """The group of commands, with help in colour."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """As Typer does, on the terminal itself: the texts are the program's own."""
+        """Format the help; escape codes pass unchecked because the texts belong to the program."""
         with unchecked_output():
             super().format_help(ctx, formatter)
 
 
 class _Command(TyperCommand):
-    """The same for one command."""
+    """One command, with help in colour and errors that name its options."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """As Typer does, on the terminal itself."""
+        """Format the help; escape codes pass unchecked because the texts belong to the program."""
         with unchecked_output():
             super().format_help(ctx, formatter)
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        """As Typer does; with --json an option that cannot be used is an error with a code."""
+        """Make the context; with --json, an invalid option is an error with a code."""
         try:
             return super().make_context(info_name, args, parent, **extra)
         except typer.Exit:
@@ -70,7 +70,7 @@ class _Command(TyperCommand):
             raise unparsed(error, info_name) from None
 
     def invoke(self, ctx: Any) -> Any:
-        """As Typer does; an error names the options of this command that it is about."""
+        """Run the command; an error names the options that it concerns."""
         try:
             return super().invoke(ctx)
         except LivebodeError as error:
@@ -127,12 +127,12 @@ def main() -> None:
     try:
         try:
             app()
-        finally:  # it ends by SystemExit, and what is still to be written may fail
+        finally:  # app() ends by SystemExit, and writing the buffered output may fail
             sys.stdout.flush()
     except KeyboardInterrupt:
-        _stop("livebode: stopped; nothing was left", 130)
+        _stop("livebode: stopped; nothing was written", 130)
     except BrokenPipeError:
-        # Who read our output has gone; what was to be done is done.
+        # The reader of the output has closed the pipe; the command itself succeeded.
         _discard_output()
     except Exception as error:
         _fail(error)
@@ -161,12 +161,12 @@ def _warn(message: Warning | str, category: type[Warning], filename: str, lineno
 
 
 def _end(number: int, _frame: object) -> None:
-    # As an exception, so that what is half written is removed on the way out.
+    # As an exception, so that partially written files are removed.
     raise SystemExit(128 + number)
 
 
 def _discard_output() -> None:
-    # Python would complain once more when it flushes at exit.
+    # Otherwise Python reports the error again when it flushes at exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -1,4 +1,4 @@
-"""What the terminal shows of axes that run: a live table, or plain lines where it is none."""
+"""Terminal output of a session: a live table, or plain lines if the output is not a terminal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LOOKS_A_REDRAW = 5
 
 
 class AxesTerminal:
-    """Shows how the axes of a session are doing on standard error, and what they say; `quiet` says only what failed."""
+    """Shows state and events of the axes of a session on standard error; with `quiet` only events and failures."""
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
@@ -33,11 +33,11 @@ class AxesTerminal:
         self._looks = 0
 
     def tell(self, name: str, event: Event) -> None:
-        """Print what an axis has to say."""
+        """Print an event of an axis."""
         self._print(f"livebode: {name}: {event.message}" if name else f"livebode: {event.message}")
 
     def run(self, session: Session) -> None:
-        """Run the session, and show it."""
+        """Run the session and show its state."""
         table = self._console.is_terminal and not self._quiet
         if table:
             self._live.start()
@@ -48,7 +48,7 @@ class AxesTerminal:
             self._live.stop()
 
     def leave(self, number: int, left: Mapping[str, Event]) -> None:
-        """End the process at once: what was recorded is safe, and the rest is not waited for."""
+        """End the process immediately: recorded data are safe, and nothing else is waited for."""
         for name, event in left.items():
             self.tell(name, event)
         sys.stdout.flush()
@@ -85,7 +85,7 @@ def table_of(threads: list[AxisThread]) -> Table:
 
 
 def said(error: Exception | None) -> str:
-    """A sentence, or the traceback of an internal error."""
+    """The message of an error, or the traceback of an internal error."""
     if isinstance(error, (LivebodeError, StoppedError)) or error is None:
         return str(error)
     return failure_of(error).text
@@ -114,7 +114,7 @@ def _at(thread: AxisThread) -> str:
 
 
 def plain(session: Session) -> dict[str, Any]:
-    """Every axis's summary, or why it has none."""
+    """The summary of each axis, or its error."""
     return {thread.name: _plain(thread) for thread in session.all}
 
 

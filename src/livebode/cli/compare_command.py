@@ -1,4 +1,4 @@
-"""`livebode compare`: a machine before and after."""
+"""`livebode compare`: differences between two runs of a machine."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from livebode.records import to_json
 
 
 def compare_command(
-    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Directory that a run left.")],
-    after: Annotated[Path, typer.Argument(metavar="AFTER", help="Directory of a later run of the same signals.")],
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Run directory.")],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", help="Directory of a later run with the same signals.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write FILE.html and FILE.pdf.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Say which lines, parameters and margins differ between two runs, by how much, with bounds.
+    """Find the lines, parameters and margins that differ between two runs, with amounts and bounds.
 
-    Runs that moved along a schedule are compared place by place and way by way, and over the places together.
+    Runs with a schedule, such as a position, are compared by place and direction, and over all places.
     """
     from livebode.session.reporting.compare_report import Comparison
 

@@ -1,4 +1,4 @@
-"""`livebode demo`: the main job for a newcomer, without hardware."""
+"""`livebode demo`: track a simulated axis, without hardware."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _SHOWN = 4
 
 
 def demo_command(
-    seconds: Annotated[float, typer.Option(help="How long the machine works.")] = 22.0,
-    fast: Annotated[bool, typer.Option("--fast", help="As fast as it can, not at the machine's pace.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the noise; the same seed gives the same run.")] = 1,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; an earlier demo there is replaced.")] = Path(
+    seconds: Annotated[float, typer.Option(help="Duration of the simulation.")] = 22.0,
+    fast: Annotated[bool, typer.Option("--fast", help="As fast as possible, not in real time.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise; the same seed gives the same run.")] = 1,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Run directory; a previous demo there is replaced.")] = Path(
         "runs/demo"
     ),
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
 ) -> None:
-    """Track a simulated belt axis on its strokes, live; halfway its belt loses 10 % of its stiffness."""
+    """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
     from livebode.session.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
@@ -41,7 +41,7 @@ def demo_command(
     check_seconds(seconds)
     console = terminal.console(stderr=True)
     if not as_json:
-        print("A simulated tooth-belt axis goes back and forth. Halfway its belt loses 10 % of its stiffness.")
+        print("A simulated tooth-belt axis moves back and forth. Halfway, the belt loses 10 % of its stiffness.")
     with (
         console.status(f"Learning the healthy axis from {LEARNED_S:g} s of its strokes")
         if not as_json
@@ -49,7 +49,7 @@ def demo_command(
     ):
         baseline = demo_baseline(seed + 1)
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
-    # Whoever tries it is shown the page while the machine works; the port that others expect is left to them.
+    # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
     with served(shown, ServeSection() if serve else ServeSection(port=0), port, ["demo"], stays=serve) as audience_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
@@ -81,9 +81,9 @@ def demo_command(
 
 
 def _numbers(responses: Responses) -> str:
-    """The newest response in a line: where the cart is, and the magnitude at some of the lines."""
+    """The newest response in a line: position of the cart and magnitude at some of the lines."""
     if not len(responses) or not responses.valid[-1].any():
-        return "waiting for the first whole window"
+        return "waiting for the first complete window"
     newest = responses[-1]
     f = newest.lines.frequency_hz
     some = slice(None, None, max(1, len(f) // _SHOWN))

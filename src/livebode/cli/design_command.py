@@ -23,23 +23,29 @@ _LINES_SHOWN = 25
 
 
 def design_command(
-    experiment: Annotated[Path, typer.Argument(metavar="EXPERIMENT.toml", help="The machine, its limits, the wish.")],
+    experiment: Annotated[
+        Path, typer.Argument(metavar="EXPERIMENT.toml", help="Machine, limits and required accuracy.")
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory for the excitation and axis.toml.")] = Path(
         "design"
     ),
     to: Annotated[
-        list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h, st; all unless said.")
+        list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h or st. \\[default: all]")
     ] = None,
-    name: Annotated[str, typer.Option(help="Of the excitation, in the files and theirs.")] = "excitation",
-    band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Hz, over the file's.")] = None,
-    resolution: Annotated[float | None, typer.Option(metavar="HZ", help="Distance of the lines.")] = None,
-    amplitude: Annotated[float | None, typer.Option(metavar="NM", help="Of each line; chosen unless said.")] = None,
-    accuracy: Annotated[float | None, typer.Option(help="Wanted 95 % bound as a share of |G|.")] = None,
-    seed: Annotated[int | None, typer.Option(help="The same seed, the same excitation.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what an earlier design left.")] = False,
+    name: Annotated[str, typer.Option(help="Name of the excitation; also of its files.")] = "excitation",
+    band: Annotated[
+        str | None, typer.Option(metavar="LOW:HIGH", help="Frequency band in Hz; replaces that of the file.")
+    ] = None,
+    resolution: Annotated[float | None, typer.Option(metavar="HZ", help="Distance between lines.")] = None,
+    amplitude: Annotated[
+        float | None, typer.Option(metavar="N·m", help="Amplitude of each line. \\[default: chosen]")
+    ] = None,
+    accuracy: Annotated[float | None, typer.Option(help="Required 95 % bound, relative to |G|.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Random seed; the same seed gives the same excitation.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the files of a previous design.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Choose lines, window, amplitude and hop for a machine, say why, and write the excitation and axis.toml."""
+    """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
     from livebode.session.designing import design_experiment  # with the simulation
     from livebode.session.experiment import Experiment
 
@@ -60,7 +66,7 @@ def design_command(
 
 
 def _working() -> AbstractContextManager[object]:
-    """On a terminal a sign of life: thousands of lines take their time."""
+    """A spinner on a terminal: thousands of lines take time."""
 
     return terminal.console(stderr=True).status("choosing")
 
@@ -108,7 +114,7 @@ def _table() -> Table:
 
 
 def _show_lines(console: Console, design: Design) -> None:
-    """What each line tells; of many lines some, the weakest among them."""
+    """A table of the lines; of many lines a selection that contains the weakest."""
     from livebode.design.encoder import COUNTS_MIN
 
     relative, windows = design.accuracy.relative, design.windows

@@ -1,4 +1,4 @@
-"""What `livebode report` and `livebode compare` write: one HTML file, and a PDF where ReportLab is there."""
+"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if ReportLab is installed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or p
 
 
 def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:
-    """Write `out` with .html and, if it can be, .pdf; each whole or not at all. The files, and what was not possible.
+    """Write `out` with .html and, if possible, .pdf, each completely or not at all; return the files and a remark.
 
     Raises
     ------
     OutputError
-        If a file is there and not to be replaced, or cannot be written.
+        If a file exists and must not be replaced, or cannot be written.
     """
     from livebode.export import save
     from livebode.report.html import to_html

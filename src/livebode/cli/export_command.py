@@ -1,4 +1,4 @@
-"""`livebode export`: a run for other programs."""
+"""`livebode export`: write a run in a format of other programs."""
 
 from __future__ import annotations
 
@@ -19,22 +19,20 @@ _IN_PYTHON = {
 
 
 def export_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, netcdf or uff.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="Format: csv, mat, netcdf or uff.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="File to write; RUN with the format's ending unless said.")
+        Path | None, typer.Option(metavar="FILE", help="File to write. \\[default: RUN with the format's suffix]")
     ] = None,
-    at: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Only the response nearest to this moment.")
-    ] = None,
+    at: Annotated[float | None, typer.Option(metavar="SECONDS", help="Only the response nearest to this time.")] = None,
     mean: Annotated[bool, typer.Option("--mean", help="Only the mean of the valid responses.")] = False,
     parameters: Annotated[
-        bool, typer.Option("--parameters", help="The fitted parameters instead of the responses; csv or mat.")
+        bool, typer.Option("--parameters", help="Fitted parameters instead of responses; csv or mat.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write what a run measured in a format that other programs read."""
+    """Write the responses or the fitted parameters of a run in a format of other programs."""
     from livebode import export
 
     _check(to, at, mean, parameters, tuple(export.TABLES if parameters else export.FORMATS))
@@ -83,7 +81,7 @@ def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tup
             value=to,
             allowed=list(formats),
         )
-    given = [name for name, said in (("--at", at is not None), ("--mean", mean), ("--parameters", parameters)) if said]
+    given = [name for name, used in (("--at", at is not None), ("--mean", mean), ("--parameters", parameters)) if used]
     if len(given) > 1:
         raise UsageError(
             "conflict", f"{given[0]} and {given[1]} exclude each other", "give one of them", options=given[:2]

@@ -1,4 +1,4 @@
-"""How a command that fails reports it: as a sentence, or with --json as an object."""
+"""Reports of failed commands: a sentence, or an object with --json."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 
 @dataclass(frozen=True)
 class Failure:
-    """What a person reads, what a program reads, and the exit code of the process."""
+    """Report of an error: text for a person, object for a program, exit code of the process."""
 
     text: str
     error: dict[str, Any]
@@ -26,17 +26,17 @@ class Failure:
 
 
 def disk_full(error: Exception) -> bool:
-    """Whether there is no more room for the output."""
+    """Whether the error is a full disk."""
     return isinstance(error, OSError) and error.errno in _FULL_DISK
 
 
 def json_wanted() -> bool:
-    """Whether the command line has --json, also where it cannot be parsed."""
+    """Whether the command line contains --json, even if it cannot be parsed."""
     return "--json" in sys.argv[1:]
 
 
 def failure_of(error: Exception) -> Failure:
-    """How to report what stopped a command."""
+    """The report of the error that stopped a command."""
     known = _known(error)
     if known is None:
         lines = "".join(traceback.format_exception(error))
@@ -82,7 +82,7 @@ def _option(name: str, known: Mapping[str, str]) -> str | None:
 
 
 def unparsed(error: Exception, command: str | None) -> UsageError:
-    """What Typer reports about the options, as an error with a code."""
+    """An error of Typer about the options, as an error with a code."""
     message = getattr(error, "format_message", error.__str__)()
     return UsageError("options", message.rstrip("."), f"see livebode {command} --help", command=command)
 

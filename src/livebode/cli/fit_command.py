@@ -1,4 +1,4 @@
-"""`livebode fit`: a model fitted to a run that was made."""
+"""`livebode fit`: fit a model to a finished run."""
 
 from __future__ import annotations
 
@@ -15,28 +15,37 @@ from livebode.session import Axis
 
 
 def fit_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
     model: Annotated[
         str | None,
-        typer.Option(help="rigid, two-mass, three-mass, two-mass-gain; auto: two-mass for a torque in N m."),
+        typer.Option(
+            help="rigid, two-mass, three-mass, two-mass-gain or auto (two-mass if the input is a torque in N m)."
+        ),
     ] = None,
     output: Annotated[
-        str | None, typer.Option(help="What y is: velocity or position; auto: by its unit, else by trial.")
+        str | None,
+        typer.Option(help="Quantity of y: velocity, position or auto (by its unit; without one, the better fit)."),
     ] = None,
-    side: Annotated[str | None, typer.Option(help="motor or load, where y is measured; motor unless said.")] = None,
+    side: Annotated[str | None, typer.Option(help="Where y is measured: motor or load. \\[default: motor]")] = None,
     radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves along.")
+        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
     ] = None,
-    ratio: Annotated[float | None, typer.Option(help="Load's inertia over the motor's, where it is known.")] = None,
-    fix: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a parameter.")] = None,
-    free: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Fit one that is held: delay, B, BL.")] = None,
-    band: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Use lines from LOW to HIGH Hz.")] = None,
-    hold: Annotated[str | None, typer.Option(help="zero-order: the input stands between samples; or none.")] = None,
+    ratio: Annotated[float | None, typer.Option(help="Ratio of the load's inertia to the motor's, if known.")] = None,
+    fix: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a parameter at this value.")] = None,
+    free: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Fit a parameter that is fixed by default: delay, B, BL.")
+    ] = None,
+    band: Annotated[
+        str | None, typer.Option(metavar="LOW:HIGH", help="Use only the lines from LOW to HIGH Hz.")
+    ] = None,
+    hold: Annotated[
+        str | None, typer.Option(help="zero-order (the input is constant between samples) or none.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Fit a model to the response of a run, and print its parameters with bounds.
 
-    What is not said is as in the run's own \\[fit]. Exit code 3 where no model fits.
+    Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
     from livebode.session.fits import fit_run, plain_fit
     from livebode.session.said import said

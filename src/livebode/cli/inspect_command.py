@@ -1,4 +1,4 @@
-"""`livebode inspect`: what a recording holds."""
+"""`livebode inspect`: the contents of a recording."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ def inspect_command(
     ] = None,
     lines: Annotated[
         str | None,
-        typer.Option(
-            metavar="HZ", help="Lines to measure later, as in run: look for hum where there is no excitation."
-        ),
+        typer.Option(metavar="HZ", help="Lines that you plan to measure, as in run: search for mains hum near them."),
     ] = None,
-    window: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Their window.", min=1)] = None,
+    window: Annotated[
+        int | None, typer.Option(metavar="SAMPLES", help="Window that you plan for these lines.", min=1)
+    ] = None,
     rate: Rate = None,
     time: Time = None,
     as_json: Json = False,
 ) -> None:
-    """List channels, rate, gaps and samples that are not finite; for an excitation its period, lines and SNR.
+    """List channels, rate, gaps and samples that are not finite; with --excitation also period, lines and SNR.
 
-    With lines, hum of the mains in a recording without excitation, or in its longest pause.
+    With --lines, search for mains hum in a recording without excitation, or in its longest pause.
     """
     from livebode.session.inspection import inspect  # with its statistics half a second to import
 
@@ -52,7 +52,7 @@ def inspect_command(
     if as_json:
         print(to_json(found.plain()))
         return
-    console = terminal.console(markup=False)  # names and units may hold brackets
+    console = terminal.console(markup=False)  # names and units may contain brackets
     _show_recording(found, console)
     if found.quiet is not None:
         _show_hum(found.quiet, console)
@@ -118,7 +118,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
         table.add_row(channel.name, channel.unit, *extent, str(channel.not_finite or ""))
     console.print(table)
     for skipped in log.skipped:
-        console.print(f"  no channel: {skipped.name} ({skipped.reason})", style="dim")
+        console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
 
 
 def _show_hum(quiet: Quiet, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""`livebode learn`: the healthy machine, from finished runs."""
+"""`livebode learn`: a baseline from runs of the healthy machine."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from livebode.records import to_json
 if TYPE_CHECKING:
     from livebode.monitoring import Baseline, Machine
 
-_LATE_SAMPLES = 0.05  # less is not worth a sentence
+_LATE_SAMPLES = 0.05  # less is not reported
 _MACHINE = ("stiffness", "load", "damping", "inertia")
 
 
 def learn_command(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN…", help="Run directories of the healthy machine.")],
-    out: Annotated[Path, typer.Option(metavar="BASELINE", help="File to write, JSON.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace a baseline there.")] = False,
+    out: Annotated[Path, typer.Option(metavar="BASELINE", help="JSON file to write.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Learn what the healthy machine is like, for `livebode run --baseline`."""
+    """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
 
     from livebode.session.learning import learn  # with the simulation
 
@@ -82,28 +82,28 @@ def _sentences(found: dict[str, Any]) -> str:
     if (model := found["model"]) is None:
         least, most = min(found["lines_from_percent"]), max(found["lines_from_percent"])
         sizes = f"{least:g} %" if least == most else f"{least:g} to {most:g} %, line by line"
-        watched = "Lines and fitted parameters" if found["parameters"] else "Lines alone"
+        watched = "Lines and fitted parameters" if found["parameters"] else "Only lines"
         return (
-            f"{text} No model of the moving machine: {found['remark']}. {watched} are watched, "
-            f"lines for changes of at least {sizes}.{_coarse(found)}"
+            f"{text} No model of the moving machine: {found['remark']}. {watched} are monitored; "
+            f"the smallest change that a line detects is {sizes}.{_coarse(found)}"
         )
     changes = ", ".join(f"{name} {percent:g} %" for name, percent in model["changes_from_percent"].items())
     way, speeds = _between(model["from"], model["to"]), _between(model["slowest"], model["fastest"])
     return (
-        f"{text}\nThe model of the machine knows the way {way} at speeds {speeds} a second, and is good for changes "
-        f"from: {changes}.{_ripple(model)}{_dependence(model)}"
+        f"{text}\nThe model of the machine covers positions {way} at speeds {speeds} per second. Smallest changes that "
+        f"it detects: {changes}.{_ripple(model)}{_dependence(model)}"
     )
 
 
 def _ripple(model: dict[str, Any]) -> str:
-    """What the model has beyond two masses, where there is any."""
+    """Torque ripple and delay of the model, if any."""
     text, late = "", model["delay_samples"]
     if model["ripple_n_m"]:
         pairs = zip(model["ripple_cycles_per_m"], model["ripple_n_m"])
         orders = ", ".join(f"{torque:.2g} N m at {order:.4g} cycles" for order, torque in pairs)
-        text += f"\nTorque ripple over the position: {orders} a metre. It is allowed for."
+        text += f"\nTorque ripple over the position: {orders} per metre. The model contains it."
     if abs(late) >= _LATE_SAMPLES:
-        text += f"\nThe output is {late:.2f} samples late behind the torque. The model has this delay."
+        text += f"\nThe output is {late:.2f} samples late relative to the torque. The model contains this delay."
     return text
 
 
@@ -117,7 +117,7 @@ def _covariates(machine: Machine) -> list[dict[str, Any]]:
 
 
 def _between_runs(machine: Machine) -> dict[str, float]:
-    """What healthy runs differ by (standard deviation); empty where they do not differ."""
+    """Standard deviation between healthy runs, in percent; empty if they do not differ."""
     if (between := machine.between) is None:
         return {}
     seen = between.dominant(machine.held.smallest)
@@ -126,18 +126,18 @@ def _between_runs(machine: Machine) -> dict[str, float]:
 
 
 def _dependence(model: dict[str, Any]) -> str:
-    """What the model depends on, and what differs between the runs without a known reason."""
+    """Covariates of the model, and differences between the runs without a known reason."""
     text = ""
     for c in model["covariates"]:
         slopes = ", ".join(f"{what} {percent:+.3g} %" for what, percent in c["percent_per_unit"].items())
         way = _between(c["from"], c["to"])
-        text += f"\nPer unit of {c['name']} (learned {way}): {slopes}. Other values are not judged."
+        text += f"\nPer unit of {c['name']} (learned {way}): {slopes}. Windows outside this range are not judged."
     if differ := model["between_runs_percent"]:
         sizes = ", ".join(f"{what} by {percent:g} %" for what, percent in differ.items())
         text += (
-            f"\nThe runs differ from each other: {sizes} (standard deviation). A change like that is detected when it "
-            "happens within a run; one that is there from the start only beyond three times that. If a temperature "
-            "explains it, name its channel in [monitoring] covariates of the runs."
+            f"\nThe runs differ from each other: {sizes} (standard deviation). A change of this kind is detected if it "
+            "occurs within a run; one that is present from the start is detected only beyond three times this size. "
+            "If a temperature explains the difference, add its channel to [monitoring] covariates of the runs."
         )
     return text
 
@@ -146,9 +146,9 @@ def _coarse(found: dict[str, Any]) -> str:
     if (most := found["hop_at_most"]) is None:
         return ""
     return (
-        f"\nA hop of {found['hop']} samples shows too little of what motion does to the responses: judge a machine "
-        "that stands, or recordings that begin at the same place of the excitation's period; else learn with a hop "
-        f"of {most} or less."
+        f"\nA hop of {found['hop']} samples is too coarse for the effect of motion on the responses: learn with a hop "
+        f"of {most} or less, or use this baseline only at standstill or for recordings that begin at the same phase "
+        "of the excitation's period."
     )
 
 

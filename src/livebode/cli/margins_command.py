@@ -1,4 +1,4 @@
-"""`livebode margins`: the margins of the loop in a run that was made, and what would widen them."""
+"""`livebode margins`: stability margins of the loop of a finished run, and filters that improve them."""
 
 from __future__ import annotations
 
@@ -20,18 +20,21 @@ if TYPE_CHECKING:
 
 
 def margins_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
     axis: Annotated[
-        Path | None, typer.Option(metavar="AXIS.toml", help="Takes \\[loop] and \\[fit] from there instead of the run.")
+        Path | None,
+        typer.Option(metavar="AXIS.toml", help="Read \\[loop] and \\[fit] from this file instead of the run."),
     ] = None,
-    model: Annotated[str | None, typer.Option(help="rigid, two-mass, …; as in the run's \\[fit] unless said.")] = None,
-    radius: Annotated[float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves.")] = None,
-    ms: Annotated[float, typer.Option(help="The largest peak sensitivity that is wished for.")] = 2.0,
+    model: Annotated[str | None, typer.Option(help="rigid, two-mass, … \\[default: the run's \\[fit]]")] = None,
+    radius: Annotated[
+        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
+    ] = None,
+    ms: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
 ) -> None:
-    """Gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; a filter where they are too small.
+    """Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.
 
-    Leaves margins.png in the run's directory.
+    Writes margins.png to the run directory.
     """
     from livebode.report import save_loop_picture
     from livebode.session.axis import FitSection
@@ -49,7 +52,7 @@ def margins_command(
 
 
 def show_loop(found: LoopReport) -> None:
-    """Margins with bounds and marks, and the proposal."""
+    """Print the margins with bounds and marks, and the proposals."""
     low, high = found.fit.band_hz
     print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
     if not found.margins.ok[0]:
@@ -61,9 +64,7 @@ def show_loop(found: LoopReport) -> None:
     size, bound, at_hz = found.at_lines
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
     if len(found.places) > 1:
-        print(
-            f"worst of {len(found.places)} fits, at a dozen places and of the whole: {_in_short(found.tuning.before)}"
-        )
+        print(f"worst of {len(found.places)} fits, at 12 places and of the whole run: {_in_short(found.tuning.before)}")
     _show_tuning(found.tuning)
 
 
@@ -77,7 +78,7 @@ def _show_margins(margins: Margins) -> None:
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
         known = "" if bound[i] < abs(value) else ", not known"
         print(f"  {WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
-    print("  ± is by the fit's covariance, 1.96 sigma; where EXTRAPOLATED, no line checks the model")
+    print("  ± is 1.96 sigma from the covariance of the fit; no line checks the model where it is EXTRAPOLATED")
 
 
 def _show_tuning(found: Tuning) -> None:
@@ -93,7 +94,7 @@ def _show_proposal(proposal: Proposal) -> None:
         words += f"half of that from {about['from_hz']:.4g} to {about['to_hz']:.4g} Hz"
     else:
         words = f"low-pass of second order at {about['frequency_hz']:.4g} Hz"
-    print(f"  {words}; behind the controller, {proposal.biquad.rate_hz:g} times a second:")
+    print(f"  {words}; behind the controller, at {proposal.biquad.rate_hz:g} Hz:")
     b, a = proposal.biquad.b, proposal.biquad.a
     print("    b = " + ", ".join(f"{x:.12g}" for x in b) + "   a = 1, " + ", ".join(f"{x:.12g}" for x in a))
     print(f"    would give: {_in_short(proposal.after)}")

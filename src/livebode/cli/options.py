@@ -8,19 +8,17 @@ import typer
 
 Excitation = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w.")]
 Output = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the measured output y.")]
-Rate = Annotated[
-    float | None, typer.Option(metavar="HZ", help="Samples per second, where the recording does not say it.")
-]
+Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]
 Time = Annotated[
     str | None,
     typer.Option(
         metavar="COLUMN",
-        help="Time column where its name does not tell, with its unit in brackets behind it; none ignores it.",
+        help="Time column, if it is not detected by its name; unit in brackets behind the name. none: no time column.",
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and an error too.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result, or the error, as JSON.")]
 Port = Annotated[
     int | None,
-    typer.Option(metavar="PORT", min=0, max=65535, help="Of the dashboard; 8765 unless said, 0 for a free one."),
+    typer.Option(metavar="PORT", min=0, max=65535, help="Port of the dashboard; 0: any free port. \\[default: 8765]"),
 ]
-Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it goes on.")]
+Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it is recorded.")]

@@ -1,4 +1,4 @@
-"""What every run draws and prints at its end."""
+"""Pictures and printed results at the end of a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ONE_AT_A_TIME = threading.Lock()  # Matplotlib's settings belong to the whole p
 
 
 def drawing(title: str, names: tuple[str, str]) -> Draw:
-    """Draws bode.png and tracking.png."""
+    """A function that draws bode.png and tracking.png."""
 
     def draw(responses: Responses, into: Path, schedule: str, fitted: Model | None) -> None:
         from livebode.report import save_pictures  # with Matplotlib half a second to import
@@ -33,7 +33,7 @@ def drawing(title: str, names: tuple[str, str]) -> Draw:
 
 
 def show(outcome: Outcome) -> None:
-    """The Bode plot in the terminal, and what the run came to."""
+    """Print the Bode plot and the results of a run."""
     from livebode.report import terminal_bode
 
     size = get_terminal_size((100, 30))
@@ -71,7 +71,7 @@ _REASONS = {
 
 
 def _judged(found: dict[str, Any]) -> list[str]:
-    """Where the noise came from if not from the scatter between periods, and lines with a reason against them."""
+    """The source of the noise if it is not the scatter between periods, and the invalid lines with reasons."""
     lines = []
     judged = found.get("judged", {})
     if moved := judged.get("noise_from_detection_lines"):
@@ -83,7 +83,7 @@ def _judged(found: dict[str, Any]) -> list[str]:
 
 
 def counted(summary: dict[str, Any]) -> str:
-    """How much was tracked, in a line."""
+    """One line with the amount of data tracked."""
     counts, speed, found = (summary[part] for part in ("counts", "speed", "found"))
     invalid = f", {counts['invalid_responses']} of them not valid" if counts["invalid_responses"] else ""
     gaps = f", {_many(counts['gaps'], 'gap')}" if counts["gaps"] else ""
@@ -96,17 +96,17 @@ def counted(summary: dict[str, Any]) -> str:
 
 
 def _show_moving(model: dict[str, Any]) -> None:
-    """The model of the newest chunk of an axis in motion."""
+    """Print the model of the newest chunk of an axis in motion."""
     at, stiffness, damping = model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"]
     print(
-        f"\nin motion, newest chunk: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg, "
+        f"\naxis in motion, newest chunk: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg, "
         f"Keff {stiffness[0]:.4g} … {stiffness[-1]:.4g} N/m and bs {damping[0]:.4g} … {damping[-1]:.4g} N s/m "
         f"from {at[0]:.4g} to {at[-1]:.4g} m"
     )
 
 
 def _show_loop(found: dict[str, Any]) -> None:
-    """The margins in a line; `livebode margins` says more."""
+    """Print the worst margins in one line."""
     if not (worst := found["worst_over_places"]):
         print(f"no margins: {found['message']}")
         return
@@ -114,7 +114,7 @@ def _show_loop(found: dict[str, Any]) -> None:
 
 
 def margins_in_short(worst: dict[str, float]) -> str:
-    """The worst of each margin, as `margins.worst` gives them."""
+    """The worst value of each margin, as `margins.worst` returns them, in one line."""
     return (
         f"gain {worst['gain_margin']:.3g} dB, phase {worst['phase_margin']:.3g}°, delay "
         f"{worst['delay_margin']:.3g} ms, Ms {worst['peak_sensitivity']:.3g}, bandwidth {worst['bandwidth']:.3g} Hz"
@@ -130,26 +130,26 @@ def _show_monitoring(found: dict[str, Any]) -> None:
 
 
 def _show_statuses(summary: dict[str, Any]) -> None:
-    """How many fits hold, and why the others do not."""
-    why = "".join(f"; {count} not: {word}" for word, count in summary["statuses"].items() if word != "ok")
-    print(f"\n{_many(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model hold{why}")
+    """Print the numbers of valid and rejected fits, with reasons."""
+    why = "".join(f"; {count} rejected: {word}" for word, count in summary["statuses"].items() if word != "ok")
+    print(f"\n{_many(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
 
 
 def show_fit(found: Fit, of: str) -> None:
-    """What was fitted, with its bounds."""
+    """Print the fitted parameters with bounds."""
     low, high = found.band_hz
     print(f"{found.model.name} model, {of}; {_many(found.lines, 'line')}, {low:g} … {high:g} Hz")
     if found.status != "ok":
-        print(f"  no numbers ({found.status}): {found.sentence}")
+        print(f"  no parameters ({found.status}): {found.sentence}")
         return
     for name, value, bound, unit in found.rows():
         if (limit := found.at_most(name)) is not None:
             print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
             continue
         print(f"  {name:22}{value:>12.5g} ± {bound:<10.2g}{unit}")
-    chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} by sigma alone"
+    chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} from sigma alone"
     print(f"  {found.about_bounds}")
-    print(f"  the fitted model lacks ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+    print(f"  model error ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
 
 
 def _many(number: int, noun: str) -> str:

@@ -1,4 +1,4 @@
-"""`livebode plc`: an axis's excitation, sliding DFT and ring as Structured Text."""
+"""`livebode plc`: excitation, sliding DFT and ring buffer of an axis as Structured Text."""
 
 from __future__ import annotations
 
@@ -18,24 +18,26 @@ _DISK = {errno.ENOSPC: "the disk is full", errno.EDQUOT: "the disk quota is used
 
 def plc_command(
     axis: Annotated[Path, typer.Argument(metavar="AXIS.toml", help="Configuration with lines, window and signals.")],
-    limit: Annotated[float, typer.Option(metavar="SIZE", help="What the excitation never exceeds.")],
+    limit: Annotated[float, typer.Option(metavar="SIZE", help="Limit that the excitation never exceeds.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Directory to write to.")],
     amplitude: Annotated[
-        float | None, typer.Option(metavar="SIZE", help="A multisine: of each line, in the excitation's unit.")
+        float | None,
+        typer.Option(metavar="SIZE", help="Amplitude of each line of a multisine, in the excitation's unit."),
     ] = None,
     excitation: Annotated[
-        Path | None, typer.Option(metavar="FILE.npz", help="Instead: what livebode design left, with its ramp.")
+        Path | None,
+        typer.Option(metavar="FILE.npz", help="Instead of --amplitude: a file of livebode design, with its ramp."),
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Cycles of the task per second; that of design or source unless said."),
+        typer.Option(metavar="HZ", help="Rate of the PLC task. \\[default: from the design or \\[source]]"),
     ] = None,
-    ring: Annotated[int, typer.Option(metavar="SAMPLES", help="Samples that the ring keeps.")] = 8192,
-    twincat: Annotated[bool, typer.Option("--twincat", help="As .TcPOU and .TcDUT instead of .st.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that stand there.")] = False,
+    ring: Annotated[int, typer.Option(metavar="SAMPLES", help="Length of the ring buffer.")] = 8192,
+    twincat: Annotated[bool, typer.Option("--twincat", help="Write .TcPOU and .TcDUT instead of .st.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write function blocks for the axis's PLC: excitation, sliding DFT, and the ring that livebode reads."""
+    """Write function blocks for the PLC of an axis: excitation, sliding DFT and the ring buffer that livebode reads."""
     from livebode import structured_text
     from livebode.records import to_json
     from livebode.session.axis import Axis
@@ -61,11 +63,11 @@ def plc_command(
     for name in files:
         print(out / name)
     columns = ", ".join(f'"{name}"' for name in project.columns)
-    print(f'livebode reads it with, in [source]: symbol = "MAIN.livebode", channels = [{columns}]')
+    print(f'Settings of [source] that read it: symbol = "MAIN.livebode", channels = [{columns}]')
 
 
 def _write(folder: Path, files: dict[str, str], force: bool) -> None:
-    """All files, or none where one cannot be written."""
+    """Write all files, or none if one cannot be written."""
     for name in files:
         path = folder / name
         if path.is_dir() or (not force and (path.exists() or path.is_symlink())):
@@ -86,7 +88,7 @@ def _write(folder: Path, files: dict[str, str], force: bool) -> None:
         why = _DISK.get(error.errno or 0, os.strerror(error.errno) if error.errno else str(error))
         raise OutputError(
             "not-written",
-            f"{str(folder)!r} could not be written: {why}; nothing was left there",
+            f"{str(folder)!r} could not be written: {why}; no file was written",
             path=str(folder),
             reason=why,
         ) from None

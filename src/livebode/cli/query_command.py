@@ -1,4 +1,4 @@
-"""`livebode query`: SQL on a run."""
+"""`livebode query`: run an SQL query on the tables of a run."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from livebode.records import Run, to_json
 
 
 def query_command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run, also one that is being written.")],
-    sql: Annotated[str, typer.Argument(help="SQL on the tables responses, parameters, samples and events.")],
-    rows: Annotated[int, typer.Option(min=1, max=10_000_000, help="Most rows to print.")] = 1000,
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory; also of a run that is still recording.")],
+    sql: Annotated[str, typer.Argument(help="SQL query on the tables responses, parameters, samples and events.")],
+    rows: Annotated[int, typer.Option(min=1, max=10_000_000, help="Maximum number of rows to print.")] = 1000,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the result as CSV.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Ask a run, by DuckDB's SQL.
+    """Query the tables of a run with SQL (DuckDB).
 
-    The query sees the tables of the run and no file. DuckDB, pandas or Polars read them without us as well.
+    A query has no access to files. DuckDB, pandas and Polars can also read the Parquet files directly.
     """
     from livebode.records.query import query  # with Arrow's data sets
 
@@ -55,7 +55,7 @@ def _show(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
         table.add_column(column, overflow="fold")
     for row in rows:
         table.add_row(*(f"{value:.9g}" if isinstance(value, float) else str(value) for value in row))
-    # A file or a pipe has no width to keep to.
+    # A file or a pipe does not limit the width.
     terminal.console(width=None if terminal.is_terminal() else 1 << 14, markup=False).print(table)
 
 

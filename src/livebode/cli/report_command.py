@@ -1,4 +1,4 @@
-"""`livebode report`: a run as one HTML file and a PDF."""
+"""`livebode report`: write a report of a run as one HTML file and a PDF."""
 
 from __future__ import annotations
 
@@ -13,18 +13,22 @@ from livebode.cli.options import Json
 
 
 def report_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left, finished or not.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory; the run need not be finished.")],
     on: Annotated[
         Path | None,
-        typer.Option("--on", metavar="LOG", help="A recording that the run was not made of, to judge its model by."),
+        typer.Option(
+            "--on", metavar="LOG", help="Validate the model on this recording, which the run does not contain."
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Without an ending; RUN/report unless said.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing report elsewhere than in RUN.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File name without suffix. \\[default: RUN/report]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing report at --out.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write what a run measured, how, and what it comes to: report.html and report.pdf.
+    """Write the measurement, its settings and its results as report.html and report.pdf.
 
-    A report in the run's own directory is replaced. The PDF needs the extra `pdf`.
+    An existing report in the run directory is replaced. The PDF needs the extra `pdf`.
     """
     from livebode.core.clock import RunClock, moments_by
     from livebode.records import Run, to_json

@@ -1,4 +1,4 @@
-"""`livebode run`: the online job on a recording."""
+"""`livebode run`: track a recording or live sources."""
 
 from __future__ import annotations
 
@@ -35,63 +35,74 @@ def run_command(
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
     schedule: Annotated[
-        str | None, typer.Option(metavar="CHANNEL", help="Channel to show the responses over, such as position.")
+        str | None, typer.Option(metavar="CHANNEL", help="Channel that the responses depend on, such as the position.")
     ] = None,
     rate: Rate = None,
     time: Time = None,
     lines: Annotated[
         str | None,
-        typer.Option(metavar="HZ", help="Lines as start:stop:step or single ones, joined by commas; or auto."),
+        typer.Option(
+            metavar="HZ", help="Lines as start:stop:step or single frequencies, separated by commas; or auto."
+        ),
     ] = None,
     window: Annotated[str | None, typer.Option(metavar="SAMPLES", help="Window in samples, or auto.")] = None,
     hop: Annotated[int | None, typer.Option(metavar="SAMPLES", help="Samples between responses.")] = None,
-    estimator: Annotated[str | None, typer.Option(help="direct, joint or indirect; joint unless said.")] = None,
+    estimator: Annotated[str | None, typer.Option(help="direct, joint or indirect. \\[default: joint]")] = None,
     quantity: Annotated[
-        str | None, typer.Option(help="plant, 'open loop', 'closed loop' or sensitivity; plant unless said.")
+        str | None, typer.Option(help="plant, 'open loop', 'closed loop' or sensitivity. \\[default: plant]")
     ] = None,
-    average: Annotated[bool | None, typer.Option(help="Average over the periods before.")] = None,
+    average: Annotated[bool | None, typer.Option(help="Average over the previous periods.")] = None,
     forgetting: Annotated[
-        float | None, typer.Option(help="Weight of a period against the one after it, 0 … 1; 0.8 unless said.")
+        float | None, typer.Option(help="Weight of a period relative to the next one, 0 … 1. \\[default: 0.8]")
     ] = None,
-    noise: Annotated[str | None, typer.Option(help="Bounds from the scatter between periods, or quiet bins.")] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Noise of the bounds: auto, periods (scatter between periods) or quiet (bins). \\[default: auto]"
+        ),
+    ] = None,
     difference: Annotated[
-        list[str] | None, typer.Option(metavar="CHANNEL", help="Difference this channel first: a position that drifts.")
+        list[str] | None,
+        typer.Option(metavar="CHANNEL", help="Use differences of this channel, such as a position that drifts."),
     ] = None,
     spikes: Annotated[
-        list[str] | None, typer.Option(metavar="CHANNEL", help="Leave out windows in which this channel has a spike.")
+        list[str] | None, typer.Option(metavar="CHANNEL", help="Exclude windows in which this channel has a spike.")
     ] = None,
-    hann: Annotated[bool | None, typer.Option(help="Hann window from three bins, for an axis in motion.")] = None,
+    hann: Annotated[
+        bool | None, typer.Option(help="Use a Hann window, from three bins; for an axis in motion.")
+    ] = None,
     baseline: Annotated[
-        Path | None, typer.Option(metavar="BASELINE", help="Tell changes against what `livebode learn` wrote.")
+        Path | None,
+        typer.Option(metavar="BASELINE", help="Detect changes from this baseline, a file of `livebode learn`."),
     ] = None,
     false_alarms: Annotated[
         str | None,
-        typer.Option(metavar="WORDS", help="How often one may come, such as 'one in 30 days of motion' (unless said)."),
+        typer.Option(metavar="WORDS", help="Permitted rate of false alarms. \\[default: one in 30 days of motion]"),
     ] = None,
     covariate: Annotated[
         list[str] | None,
         typer.Option(metavar="CHANNEL", help="Channel that a baseline may depend on, such as a temperature."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory; runs/<name> unless said.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an earlier run in that directory.")] = False,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Run directory. \\[default: runs/<name>]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing run in that directory.")] = False,
     accept_roles: Annotated[
         bool,
-        typer.Option("--accept-roles", help="Keep these roles, whatever the recording shows."),
+        typer.Option("--accept-roles", help="Use the channels as specified, even if the recording contradicts."),
     ] = False,
     all_periods: Annotated[
-        bool, typer.Option("--all-periods", help="Keep a transient at the beginning of a recording.")
+        bool, typer.Option("--all-periods", help="Use all periods, also a transient at the beginning.")
     ] = False,
     go_on: Annotated[
         bool,
-        typer.Option("--continue", help="Record in segments that outlast a kill, and go on with a run in --out."),
+        typer.Option("--continue", help="Record in segments that survive a kill; continue an existing run in --out."),
     ] = False,
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
 ) -> None:
-    """Track the frequency response of a machine through a recording, or live until it ends or Ctrl-C.
+    """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
-    Leaves a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
+    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png.
     """
     given: dict[str, dict[str, Any]] = {
         "source": {"rate_hz": rate, "time": time},
@@ -126,7 +137,7 @@ def run_command(
 
 
 def _serving(axes: Axes) -> ServeSection:
-    """What all of them say of the dashboard; ConfigError where they do not agree."""
+    """The dashboard section, which all axes share; ConfigError if they differ."""
     name, first = next(iter(axes.items()))
     for other, axis in axes.items():
         if axis.serve != first.serve:
@@ -168,7 +179,7 @@ def _window(text: str | None) -> int | str | None:
 
 
 def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
-    """One recording, with a bar."""
+    """Track one recording, with a progress bar."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = terminal.console(stderr=True)
@@ -193,7 +204,7 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audien
 def _run_axes(
     axes: Axes, directory: Path, force: bool, as_json: bool, file: ConfigurationFile | None, audience_of: AudienceOf
 ) -> None:
-    """Machines that send, or several axes, until all have ended."""
+    """Track live sources or several axes until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
 
     def to(name: str, axis: Axis) -> Destination:

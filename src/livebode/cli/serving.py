@@ -1,4 +1,4 @@
-"""The dashboard beside a command."""
+"""The dashboard of a command."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ AudienceOf = Callable[[str], Audience]
 
 
 def tell(sentence: str) -> None:
-    """Say it beside what the command prints."""
+    """Print a message on standard error."""
     print(f"livebode: {sentence}", file=sys.stderr, flush=True)
 
 
 def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
-    """The dashboard as the configuration wants it; `port` goes over it."""
+    """The dashboard of a configuration; `port` overrides its port."""
     from livebode.dashboard import Dashboard, Serving
 
     if port is not None:
@@ -36,9 +36,9 @@ def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
 def served(
     wanted: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
 ) -> Iterator[AudienceOf]:
-    """What gives each axis its audience, by name: the dashboard that shows it while it goes on, or nobody.
+    """A function that returns the audience of an axis by its name: the dashboard, or nobody.
 
-    `names` are the axes from the beginning; `stays` keeps the page after the run, until Ctrl-C.
+    `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C.
     """
     if not wanted:
         yield lambda _: Audience()
@@ -50,16 +50,16 @@ def served(
         tell(f"the dashboard is at {dashboard.url}")
         yield dashboard.hub
         if stays:
-            tell(f"the run is done; {dashboard.url} shows it until Ctrl-C")
+            tell(f"the run is finished; {dashboard.url} shows it until Ctrl-C")
             wait_for_the_end()
 
 
 def wait_for_the_end() -> None:
-    """Until Ctrl-C or SIGTERM."""
+    """Wait for Ctrl-C or SIGTERM."""
     ended = threading.Event()
     before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        while not ended.wait(0.2):  # a wait without end would not let the signal through everywhere
+        while not ended.wait(0.2):  # a wait without a timeout blocks the signal on some platforms
             pass
     finally:
         for number, handler in before.items():

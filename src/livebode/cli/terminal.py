@@ -1,7 +1,6 @@
-"""The one way to a terminal: what comes from files, senders and users cannot command it.
+"""Output to the terminal: text from files, sources and users cannot control it.
 
-Every text that is printed has its control characters made visible; colours and movements of the cursor are Rich's and
-the plot's alone.
+Control characters in printed text are made visible. Only Rich and the plot write colours and cursor movements.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-# Also what turns the direction of writing, which shows a text as another one.
+# Also characters that change the direction of writing: they can disguise a text.
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 _COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
 
 
 def visible(text: str) -> str:
-    r"""The text with control characters, but for new lines and tabs, as escapes that JSON knows, too.
+    r"""Replace control characters, except new lines and tabs, by JSON escapes.
 
     >>> visible("belt\x1b[2J\u202e ok")
     'belt\\u001b[2J\\u202e ok'
@@ -32,9 +31,9 @@ def visible(text: str) -> str:
 
 
 class VisibleText(io.TextIOWrapper):
-    """A text stream that prints control characters as their escapes. It has no colours, so it claims no terminal.
+    """A text stream that prints control characters as escapes. It has no colours, so it is not a terminal.
 
-    `unchecked` is the stream that was there before.
+    `unchecked` is the stream that it replaces.
     """
 
     def __init__(self, unchecked: io.TextIOWrapper) -> None:
@@ -45,44 +44,44 @@ class VisibleText(io.TextIOWrapper):
         self.unchecked = unchecked
 
     def write(self, text: str) -> int:
-        """Write text, made visible."""
+        """Write text with its control characters made visible."""
         super().write(visible(text))
         return len(text)
 
     def isatty(self) -> bool:
-        """Never: who asks would write what is for terminals only."""
+        """False: a caller that asks would write escape codes."""
         return False
 
 
 class SafeConsole(Console):
-    """Rich on a terminal: what it renders is made visible, what it commands is not touched."""
+    """A Rich console that makes control characters in text visible and passes its own control codes."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """As Rich does."""
+        """Render with control characters made visible."""
         return _made_visible(super().render(renderable, options))
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """As Rich does; made visible before it is measured, so that columns are wide enough."""
+        """Render a string; made visible before Rich measures it, so that columns are wide enough."""
         return super().render_str(visible(text), **options)
 
     def on_broken_pipe(self) -> None:
-        """Leave it to the entry point, which knows what to do; Rich would end with 1."""
+        """Raise, so that `main` handles it; Rich would exit with 1."""
         raise BrokenPipeError
 
 
 def protect() -> None:
-    """Make standard output and standard error print control characters as their escapes from here on."""
+    """Make standard output and standard error print control characters as escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if isinstance(stream, io.TextIOWrapper) and not isinstance(stream, VisibleText):
-            # A terminal that lacks a letter shows another one, rather than nothing and an error.
+            # A character that the encoding lacks is replaced; it must not raise an error.
             stream.reconfigure(errors="replace")
             setattr(sys, name, VisibleText(stream))
 
 
 @contextmanager
 def unchecked_output() -> Iterator[None]:
-    """Within, what is printed may command the terminal: for texts of the program alone, such as its help."""
+    """Within this context, printed text may control the terminal: only for texts of the program, such as its help."""
     before = sys.stdout
     before.flush()
     sys.stdout = _unchecked()
@@ -94,7 +93,7 @@ def unchecked_output() -> Iterator[None]:
 
 
 def console(*, stderr: bool = False, **options: Any) -> Console:
-    """Rich on standard output or standard error."""
+    """A Rich console on standard output or standard error."""
     return SafeConsole(file=_unchecked(stderr=stderr), highlight=False, **options)
 
 
@@ -104,7 +103,7 @@ def is_terminal() -> bool:
 
 
 def print_drawn(text: str) -> None:
-    """Print a drawing of ours that may have colours."""
+    """Print a drawing of livebode that may have colours."""
     sys.stdout.flush()
     parts = _COLOUR.split(text)  # every second one is a colour
     parts[::2] = map(visible, parts[::2])

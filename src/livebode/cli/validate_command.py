@@ -1,4 +1,4 @@
-"""`livebode validate`: a run's fitted model judged on fresh data."""
+"""`livebode validate`: test the fitted model of a run on independent data."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ if TYPE_CHECKING:
 
 
 def validate_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Directory that a run left.")],
-    on: Annotated[Path, typer.Option("--on", metavar="LOG", help="A recording that the run was not made of.")],
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    on: Annotated[Path, typer.Option("--on", metavar="LOG", help="A recording that the run does not contain.")],
     model: Annotated[
-        list[str] | None, typer.Option(help="rigid, two-mass, …, each judged; that of the run's \\[fit] unless said.")
+        list[str] | None, typer.Option(help="rigid, two-mass, …; repeat to compare. \\[default: the run's \\[fit]]")
     ] = None,
-    radius: Annotated[float | None, typer.Option(metavar="M", help="Pulley's radius, for a load that moves.")] = None,
-    lags: Annotated[int, typer.Option(min=1, help="Of the correlations, in samples to both sides.")] = 40,
-    samples: Annotated[int | None, typer.Option(min=1, help="Take the last ones only; all unless said.")] = None,
+    radius: Annotated[
+        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
+    ] = None,
+    lags: Annotated[int, typer.Option(min=1, help="Largest lag of the correlations, in samples.")] = 40,
+    samples: Annotated[int | None, typer.Option(min=1, help="Use only the last ones. \\[default: all]")] = None,
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
     excitation: Excitation = None,
     as_json: Json = False,
 ) -> None:
-    """Drive the fitted model by another recording and say whether what is left still follows the signals.
+    """Simulate the fitted model with another recording and test whether the residual correlates with the signals.
 
-    Leaves validation.png in the run's directory. The model's parameters are constants: the mean over the run. A
-    machine that moves along a changing plant is judged by that mean. Channels are the run's, unless named here.
+    Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
+    machine whose plant changes with position. The channels default to those of the run.
     """
     from livebode.report import save_validation_picture
     from livebode.session.axis import FitSection
@@ -55,7 +57,7 @@ def validate_command(
 
 
 def show_validation(found: Validation) -> None:
-    """The verdict and what it rests on."""
+    """Print the verdict and the tests behind it."""
     print(found.sentence)
     white = "white" if found.whiteness >= 0.03 else "not white"
     of_it = f"rms {found.residual_sigma:.3g}"

@@ -1,4 +1,4 @@
-"""`livebode view`: a run in the browser."""
+"""`livebode view`: show runs in the browser."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from livebode.session.axis import ServeSection
 
 
 def view_command(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Directories that runs left, or are leaving.")],
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Run directories; also of runs that are still recording.")
+    ],
     port: Port = None,
     axis: Annotated[
-        Path | None, typer.Option(metavar="AXIS.toml", help="Takes \\[serve] from there: address, tokens, TLS.")
+        Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[serve] from this file: address, tokens, TLS.")
     ] = None,
 ) -> None:
-    """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; one that is being recorded is followed."""
+    """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording."""
     dashboard = dashboard_of(ServeSection() if axis is None else Axis.read(axis).serve, port)
     for run in runs:
         dashboard.view(run)

@@ -1,4 +1,4 @@
-"""Access: who may look, who may acknowledge, and what happens to those who guess."""
+"""Access control: tokens, sessions, roles, and a growing delay after wrong tokens."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ _PAUSE_S_MAX = 300.0
 
 
 class Access:
-    """Checks tokens, remembers who logged in, and makes those who guess wait longer each time.
+    """Checks tokens, stores sessions, and delays clients that send wrong tokens, longer each time.
 
     Parameters
     ----------
     serving
-        Tokens and whether everybody only looks.
+        Tokens, and whether the dashboard is read-only.
     tell
-        Is told once of each address that sends a wrong token.
+        Called with a message once for each address that sends a wrong token.
     clock
-        Seconds, monotonic.
+        Monotonic time in seconds.
     """
 
     def __init__(
@@ -55,16 +55,16 @@ class Access:
 
     @property
     def open(self) -> bool:
-        """Whether no token is asked for."""
+        """Whether no token is required."""
         return not self._hashes
 
     def login(self, token: str, address: str) -> str | None:
-        """A new session's secret for a right token, None for a wrong one.
+        """The secret of a new session for a correct token, None for a wrong one.
 
         Raises
         ------
         ServerError
-            Where this address must wait.
+            If this address must wait.
         """
         role = self._check(token, address)
         if role is None:
@@ -76,23 +76,23 @@ class Access:
         return session
 
     def logout(self, cookie: str) -> None:
-        """Forget the session that a Cookie header names."""
+        """Remove the session of a Cookie header."""
         self._sessions.pop(_hash(_session(cookie)), None)
 
     def role(self, cookie: str, authorization: str, address: str) -> Role | None:
-        """What somebody may do, by the headers Cookie and Authorization; None for nothing.
+        """The role of a client from the headers Cookie and Authorization; None without access.
 
         Raises
         ------
         ServerError
-            Where this address sent wrong tokens and must wait.
+            If this address sent wrong tokens and must wait.
         """
         if self.open:
             return self._limited("operator")
         if authorization:
             scheme, _, token = authorization.partition(" ")
             return self._check(token.strip() if scheme.lower() == "bearer" else "", address)
-        # Looked up by its hash: how long that takes says nothing about the secret.
+        # The lookup uses the hash, so its duration reveals nothing about the secret.
         role, until = self._sessions.get(_hash(_session(cookie)), (None, 0.0))
         return self._limited(role) if role is not None and self._clock() < until else None
 
@@ -104,7 +104,7 @@ class Access:
                 "too-many-tries", "too many wrong tokens", f"try again in {ceil(left)} s", retry_after_s=ceil(left)
             )
         given, found = _hash(token), None
-        for role, known in self._hashes:  # all of them, whichever is right
+        for role, known in self._hashes:  # always all of them: the duration must not depend on the match
             if hmac.compare_digest(given, known):
                 found = role
         if found is not None:
@@ -121,7 +121,7 @@ class Access:
 
     def _tell_once(self, address: str) -> None:
         if address not in self._told:
-            self._tell(f"a wrong token came to the dashboard from {address}; it was refused")
+            self._tell(f"the dashboard rejected a wrong token from {address}")
             self._told[address] = None
             if len(self._told) > _ADDRESSES_MAX:
                 self._told.popitem(last=False)
@@ -143,7 +143,7 @@ def _session(cookie: str) -> str:
 
 
 def network(address: str) -> str:
-    """The address, or the network of 64 bits that one customer of IPv6 has."""
+    """The address; for IPv6 its /64 network, which belongs to one customer."""
     try:
         known = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:

@@ -1,4 +1,4 @@
-"""The paths of the dashboard. None of them changes anything by GET."""
+"""The routes of the dashboard. GET requests change nothing."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def application(board: Board, serving: Serving) -> Guard:
 
 
 class _Pages:
-    """What the paths answer."""
+    """The handlers of the routes."""
 
     def __init__(self, board: Board, serving: Serving) -> None:
         self._board, self._secure = board, serving.tls is not None
@@ -71,7 +71,7 @@ class _Pages:
             raise ServerError("request-malformed", "the login has no token", "send an object with the text token")
         session = self._board.access.login(token, _address(request))
         if session is None:
-            return JSONResponse({"error": "this token is not right"}, 401)
+            return JSONResponse({"error": "this token is wrong"}, 401)
         answer = JSONResponse({})
         answer.set_cookie(
             COOKIE, session, max_age=int(SESSION_S), httponly=True, samesite="strict", secure=self._secure
@@ -96,7 +96,7 @@ class _Pages:
         return Response(frame("history", span.axis, _as(state, found, span)), media_type="application/octet-stream")
 
     async def moment(self, request: Request) -> Response:
-        """The response nearest to a moment, and what is drawn over it."""
+        """The response nearest to a time, with its overlays."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span = asked.span(request.query_params, len(self._board.states))
@@ -105,7 +105,7 @@ class _Pages:
         return Response(data, media_type="application/octet-stream")
 
     async def export(self, request: Request) -> Response:
-        """Responses of a span of time as a file; of a moment where the span has no length."""
+        """Responses of a span of time as a file; a single response if the span has no length."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span, past = asked.span(request.query_params, len(self._board.states)), Past.of(state)
@@ -132,13 +132,13 @@ class _Pages:
         if role is None:
             return _unknown()
         if role != "operator":
-            return JSONResponse({"error": "this session may only look"}, 403)
+            return JSONResponse({"error": "this session is read-only"}, 403)
         data = await body(request)
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError(
                 "request-malformed",
-                "the acknowledgement is not a short object of JSON",
-                "send one of type application/json",
+                "the acknowledgement is not a short JSON object",
+                "send it with the type application/json",
             )
         axis, event = asked.acknowledged(data, len(self._board.states))
         self._board.acknowledge(axis, event)
@@ -174,7 +174,7 @@ class _Pages:
         return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), _address(request))
 
     def _asked_state(self, request: Request) -> State | None:
-        """The axis of a query that has begun; None where nobody may see it."""
+        """The state of the axis of a query, if its run has started; None without access."""
         if self._role(request) is None:
             return None
         state = self._board.states[asked.span(request.query_params, len(self._board.states)).axis]
@@ -185,7 +185,7 @@ class _Pages:
 
 
 def _files() -> dict[str, tuple[bytes, str]]:
-    """Content and type of what the page consists of. In memory: a file takes a thread for each who asks unasked."""
+    """Content and type of the static files, in memory: reading a file would take a thread for each request."""
     found = {}
     for folder, prefix in ((_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")):
         for path in folder.iterdir():

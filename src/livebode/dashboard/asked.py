@@ -1,4 +1,4 @@
-"""What a browser asks: queries and web-socket messages, checked into plain values."""
+"""Requests of a browser: queries and web-socket messages, validated to plain values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TIME_S_MAX = 1e12
 
 @dataclass(frozen=True)
 class Span:
-    """A query for the past: axis, quantity, from when to when, how many rows at most, and for downloads a format."""
+    """A query for the past: axis, quantity, span of time, largest number of rows, and the format of a download."""
 
     axis: int
     quantity: Quantity
@@ -33,8 +33,8 @@ class Span:
 class Wish:
     """A message on the web socket.
 
-    `watch` chooses axis and quantity (the run's own unless said), `pause` stops and `resume` goes on with what is new,
-    `freeze` keeps the newest response, or the one at `time_s`, as a reference, `unfreeze` forgets it.
+    `watch` selects axis and quantity (default: the quantity of the run), `pause` stops and `resume` continues updates,
+    `freeze` makes the newest response, or the one at `time_s`, the reference, `unfreeze` removes it.
     """
 
     kind: str
@@ -44,7 +44,7 @@ class Wish:
 
 
 def span(query: Mapping[str, str], axes: int) -> Span:
-    """From the query of a request; LivebodeError where it cannot be.
+    """Parse the query of a request; LivebodeError if it is invalid.
 
     >>> span({"axis": "0", "quantity": "plant", "from": "0", "to": "2.5"}, axes=1).to_s
     2.5
@@ -75,7 +75,7 @@ def span(query: Mapping[str, str], axes: int) -> Span:
 
 
 def wish(text: str, axes: int) -> Wish:
-    """From a message; LivebodeError where it cannot be.
+    """Parse a message; LivebodeError if it is invalid.
 
     >>> wish('{"kind": "watch", "axis": 0, "quantity": "open loop"}', axes=1).quantity
     'open loop'
@@ -116,7 +116,7 @@ def wish(text: str, axes: int) -> Wish:
 
 
 def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
-    """Axis and event of an acknowledgement; LivebodeError where it cannot be."""
+    """Axis and event of an acknowledgement; LivebodeError if it is invalid."""
     said = plain(data)
     axis, event = said.get("axis"), said.get("event")
     if isinstance(axis, bool) or not isinstance(axis, int) or not isinstance(event, str) or len(event) > 64:
@@ -125,7 +125,7 @@ def acknowledged(data: bytes, axes: int) -> tuple[int, str]:
 
 
 def plain(data: bytes | str, what: str = "body") -> dict[str, Any]:
-    """An object of JSON; ServerError where it is not."""
+    """Parse a JSON object; ServerError if it is invalid."""
     try:
         said = json.loads(data)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Board: the states of all axes in the server's thread, and what requests want of them."""
+"""Board: the states of all axes in the server's thread, and the operations of requests on them."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ T = TypeVar("T")
 
 
 class Board:
-    """What the server's thread holds: a State for each axis, the browsers, and the pace of both.
+    """Data of the server's thread: a State for each axis, the browsers, and their update rate.
 
     Parameters
     ----------
     states
         One for each axis.
     viewed
-        The record that each state without a hub is read from.
+        The record of each state without a hub.
     access
-        Who may what.
+        The access control.
     """
 
     def __init__(self, states: list[State], viewed: dict[int, Viewed], access: Access) -> None:
@@ -46,11 +46,11 @@ class Board:
 
     @property
     def names(self) -> list[str]:
-        """Of the axes, in order."""
+        """Names of the axes, in order."""
         return [state.name for state in self.states]
 
     async def run(self) -> None:
-        """Take what is new and wake the browsers, at most 30 times a second; seldom where nobody looks."""
+        """Update the states and wake the browsers, at most 30 times per second; less often without browsers."""
         looked = 0.0
         clock = asyncio.get_running_loop().time
         while True:
@@ -69,15 +69,15 @@ class Board:
                 continue
 
     def pulse_now(self) -> None:
-        """Do not wait for the next beat: a person pressed something."""
+        """Update immediately, because a person acted."""
         self._hurry.set()
 
     def health(self, state: State) -> dict[str, Any]:
-        """Of an axis, and of the dashboard itself."""
+        """Health of an axis and of the dashboard."""
         return state.health() | {"browsers": len(self.places), "refused": self.access.refused}
 
     async def elsewhere(self, job: Callable[..., T], *arguments: Any) -> T:
-        """The result of a long job, which runs in another thread; ServerError where too many wait."""
+        """Run a long job in another thread; ServerError if too many are waiting."""
         if self._jobs >= _JOBS_MAX:
             raise ServerError("busy", "too much of the record is being read", "try again in a moment")
         self._jobs += 1
@@ -87,7 +87,7 @@ class Board:
             self._jobs -= 1
 
     def acknowledge(self, axis: int, key: str) -> None:
-        """Have it recorded that a person has seen an event, and all of the same cause before; ServerError if not."""
+        """Record that a person has seen an event and all earlier ones of the same cause; ServerError if impossible."""
         state = self.states[axis]
         found = state.notices.of(key)
         if found is None:
@@ -108,11 +108,11 @@ class Board:
             raise ServerError("busy", "too many acknowledgements wait to be recorded", "try again in a moment")
 
     def close(self) -> None:
-        """Let the reading thread go."""
+        """Stop the reading thread."""
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     async def _follow(self) -> None:
-        """What another process recorded since."""
+        """Read what another process has recorded since the last call."""
         for axis, viewed in list(self._viewed.items()):
             state = self.states[axis]
             if viewed.finished:

@@ -1,4 +1,4 @@
-"""One browser's web socket: what is new goes to it at its pace, what it wishes comes from it."""
+"""The web socket of a browser: updates at its own rate, and its requests."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ HEALTH_EVERY_S = 0.5
 ROWS_EVERY_S = 0.1
 TRENDS_EVERY_S = 0.25
 SLOW_S = 20.0
-"""A browser that takes nothing for so long is let go."""
+"""A browser that reads nothing for this time is disconnected."""
 DISPLACED = 4000
-"""Code of a web socket that is closed for another browser; the page comes back later."""
+"""Code of a web socket that is closed for another browser; the page reconnects later."""
 _ROWS_AT_ONCE = 400
 _WISHES_PER_S = 20
 
 
 class Client:
-    """Sends the newest of what one browser watches; what it is too slow for is skipped, never queued."""
+    """Sends the newest data that a browser watches; data for which it is too slow are skipped, never queued."""
 
     def __init__(self, board: Board, socket: WebSocket, role: str) -> None:
         self._board, self._socket, self._role = board, socket, role
@@ -42,7 +42,7 @@ class Client:
         self._sent: dict[str, Any] = {}
 
     async def run(self) -> None:
-        """Until the browser goes or breaks a limit."""
+        """Serve until the browser disconnects or exceeds a limit."""
         await self._socket.accept()
         hearing = asyncio.create_task(self._hear())
         saying = asyncio.create_task(self._say())
@@ -62,7 +62,7 @@ class Client:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     def displace(self) -> None:
-        """Ask it to go: another browser has its place."""
+        """Disconnect it: another browser has its place."""
         self._displaced.set()
 
     async def _hear(self) -> None:
@@ -131,7 +131,7 @@ class Client:
             await self._board.pulse.wait_next()
 
     async def _update(self, state: State) -> None:
-        """Everything that changed, in at most two messages."""
+        """Send all changes, in at most two messages."""
         news: dict[str, Any] = {}
         if state.notices.version != self._sent["notices"]:
             news["notices"] = state.notices.since(self._sent["notices"])
@@ -154,7 +154,7 @@ class Client:
             self._sent["newest"] = state.version
             found += state.newest_frames(quantity)
         if self._reference is not None and not state.quantities.fit(self._reference):
-            self._reference = None  # of a run before this one
+            self._reference = None  # it belongs to a previous run
         if self._reference is not None and "reference" not in self._sent:
             self._sent["reference"] = True
             found += frame("reference", state.axis, state.quantities.of_responses(self._reference, quantity))
@@ -177,16 +177,16 @@ class Client:
 
 
 class Pulse:
-    """Wakes everybody that waits for the next update."""
+    """Wakes all that wait for the next update."""
 
     def __init__(self) -> None:
         self._next = asyncio.Event()
 
     async def wait_next(self) -> None:
-        """Until the next beat."""
+        """Wait for the next update."""
         await self._next.wait()
 
     def beat(self) -> None:
-        """Wake those that wait now."""
+        """Wake all that wait now."""
         before, self._next = self._next, asyncio.Event()
         before.set()

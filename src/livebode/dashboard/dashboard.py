@@ -21,7 +21,7 @@ from livebode.dashboard.viewed import Viewed
 
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096
-"""Connections that the system holds until they are taken in; one that finds no room tries again a second later."""
+"""Connections that the system queues until they are accepted; a client that finds no room retries a second later."""
 _START_S = 30.0
 _END_S = 2
 _logger = logging.getLogger(__name__)
@@ -33,16 +33,16 @@ class Dashboard:
     Parameters
     ----------
     serving
-        Where, and who may.
+        Address, tokens and TLS.
     tell
-        Hears what a person should know of the server: that somebody sent a wrong token.
+        Called with messages about the server, such as a wrong token.
 
     Raises
     ------
     ServerError
-        On entering, where the address cannot be listened on.
+        On entering, if the server cannot listen on the address.
     ExtraError
-        On entering, where the packages of the extra `dashboard` are missing.
+        On entering, if the packages of the extra `dashboard` are missing.
     """
 
     def __init__(self, serving: Serving, tell: Callable[[str], None] = lambda _: None) -> None:
@@ -56,7 +56,7 @@ class Dashboard:
     def hub(self, name: str) -> Hub:
         """The audience for the runs of the axis of this name.
 
-        A page that is open does not know of an axis that comes later, until it is loaded again.
+        An open page shows an axis that is added later only after it is reloaded.
         """
         for state in self._states:
             if state.name == name and state.hub is not None:
@@ -66,7 +66,7 @@ class Dashboard:
         return hub
 
     def view(self, directory: Path) -> None:
-        """Show a run that was recorded, or that another process records; LivebodeError where it cannot be read."""
+        """Show a run that was recorded, or that another process records; LivebodeError if it cannot be read."""
         state, viewed = State(directory.resolve().name, len(self._states)), Viewed(directory)
         viewed.fill(state)
         self._viewed[len(self._states)] = viewed
@@ -74,7 +74,7 @@ class Dashboard:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """The address of the page."""
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
         host = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, host)
@@ -82,7 +82,7 @@ class Dashboard:
 
     @property
     def cpu_s(self) -> float:
-        """Processor time that the server's thread has taken, s."""
+        """Processor time of the server's thread, s."""
         assert self._thread is not None
         assert self._thread.ident is not None
         return time.clock_gettime(time.pthread_getcpuclockid(self._thread.ident))
@@ -123,7 +123,7 @@ class Dashboard:
             ssl_certfile=tls[0],
             ssl_keyfile=tls[1],
         )
-        # What strangers send is no news; a fault of ours is told by Faults, without a traceback for each.
+        # Requests of strangers are not logged; Faults reports internal errors without a traceback for each.
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
         logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
         self._server = Server(config, self._socket, self._tell)

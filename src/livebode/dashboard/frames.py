@@ -1,4 +1,4 @@
-"""Frames: curves for the page as bytes that a browser lays typed arrays over.
+"""Frames: curves for the page as bytes that a browser reads as typed arrays.
 
 | byte | type | what |
 |---|---|---|
@@ -13,8 +13,8 @@
 | then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, coherence |
 | end | | zeros up to a multiple of 8 bytes, where the next frame may begin |
 
-Numbers are little endian, rows one behind the other. `reach` is 3σ/|value|: the edges of the ±3σ band are
-magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), none where reach ≥ 1. NaN is what is not known.
+Numbers are little endian, in row order. `reach` is 3σ/|value|: the edges of the ±3σ band are
+magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. Unknown values are NaN.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ KINDS = ("newest", "moment", "reference", "baseline", "model", "rows", "history"
 SIGMAS = 3.0
 _HEADER = struct.Struct("<4sBBBBII")
 _MAGIC, _VERSION = b"LBCV", 1
-_WHOLE_PHASE_ROWS = 8  # up to so many rows the phase is unwrapped over frequency
+_WHOLE_PHASE_ROWS = 8  # up to this many rows the phase is unwrapped over frequency
 
 
 def frame(kind: str, axis: int, responses: Responses) -> bytes:
-    """Responses, already as the quantity that is to be shown."""
+    """A frame of responses, already converted to the displayed quantity."""
     rows, columns = responses.value.shape
     use = responses.valid & np.isfinite(responses.value) & (responses.value != 0)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -53,7 +53,7 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
 
 
 def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.ndarray[Any, Any]) -> bytes:
-    """One curve without bounds on another grid: a fitted model, shape (points,)."""
+    """A frame of one curve without bounds on another grid: a fitted model, shape (points,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         magnitude = 20 * np.log10(np.abs(value))
     phase = unwrapped(np.degrees(np.angle(value)), np.zeros(len(value), dtype=bool))

@@ -1,4 +1,4 @@
-"""Guard: what every request must be before anything looks at it, and what every answer says to the browser."""
+"""Guard: checks of every request before it is processed, and security headers of every answer."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _SAID = {
 
 
 class Guard:
-    """Refuses other hosts' names and other origins, long queries and bodies; sets the headers of every answer.
+    """Rejects other host names and origins, long queries and bodies; sets the headers of every answer.
 
-    A page of another origin may send requests here with the browser's cookie, and one whose name was bound anew to
-    this address may even read the answers: the first has the wrong Origin, the second the wrong Host.
+    A page of another origin can send requests with the browser's cookie; it has the wrong Origin. After DNS rebinding
+    to this address it can even read the answers; it has the wrong Host.
     """
 
     def __init__(self, app: ASGIApp, names: tuple[str, ...] = (), tls: bool = False) -> None:
@@ -61,20 +61,20 @@ class Guard:
         changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
         origin = headers.get("origin")
         if origin is None:
-            # A browser names the origin wherever it matters; a program with a token of its own carries no cookie.
+            # A browser sends the origin with every change; a program that sends a token has no cookie.
             allowed = not changes or headers.get("authorization", "") != ""
         else:
             allowed = origin == f"{self._scheme}://{host}"
         if not allowed or headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             if changes or origin is not None:
                 return 403, "requests from other origins are refused"
-            # A link from another page leads here; the page itself asks for everything else.
+            # Links from other pages are allowed; all other requests must come from the page itself.
             if headers.get("sec-fetch-mode") != "navigate":
                 return 403, "requests from other origins are refused"
         return None
 
     def _known(self, host: str) -> bool:
-        """Whether a browser may mean us by this: a number cannot be bound anew, a name can."""
+        """Whether the host is this server: DNS rebinding can change a name, but not a numeric address."""
         try:
             name = urlsplit(f"//{host}").hostname or ""
             _ = urlsplit(f"//{host}").port
@@ -112,7 +112,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: 
 
 
 async def body(request: Any) -> bytes | None:
-    """The body of a request; None where it is longer than any that the page sends, or did not come whole."""
+    """The body of a request; None if it is too long or incomplete."""
     data = b""
     try:
         async for part in request.stream():

@@ -17,7 +17,7 @@ from livebode.sources.live import Health, LiveBlock
 Item = Responses | tuple[Parameters, ...] | Event
 
 VALUES_MAX = 1 << 20
-"""Most values (responses times lines) that wait for the dashboard: some 40 MB; older ones are given up."""
+"""Largest number of values (responses × lines) that wait for the dashboard, about 40 MB; older ones are dropped."""
 EVENTS_MAX = 4096
 _SAYINGS_MAX = 64
 _DELAYS = 1024
@@ -25,10 +25,10 @@ _INTERVALS = 16
 
 
 class Hub(Audience):
-    """Keeps what one axis publishes until the dashboard takes it, at its own pace.
+    """Buffers the data that an axis publishes until the dashboard takes them at its own rate.
 
-    Every method of an Audience only appends to a list, under a lock that nobody holds for longer than that. What the
-    dashboard does not take in time is given up, oldest first, so that memory stays bounded.
+    Every method of an Audience only appends to a list, under a lock that is held no longer than that. Data that the
+    dashboard does not take in time are dropped, oldest first, so that memory is bounded.
     """
 
     def __init__(self, name: str) -> None:
@@ -41,9 +41,9 @@ class Hub(Audience):
         self.samples = self.gaps = self.given_up = 0
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self.followed_s = 0.0
-        """`time.monotonic()` of the newest samples, or of the run's beginning."""
+        """`time.monotonic()` of the newest samples, or of the start of the run."""
         self.clock: Sequence[tuple[float, float]] = ()
-        """Which time of day the run's seconds are, as `RunClock` keeps it."""
+        """Time of day of the run's seconds, as in `RunClock`."""
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
         self._lock = threading.Lock()
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
@@ -55,7 +55,7 @@ class Hub(Audience):
         self.overview = overview
 
     def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
-        with self._lock:  # what waits is of a run before, whose lines may be others
+        with self._lock:  # buffered data belong to a previous run, whose lines may differ
             self._rows, self._values = deque(), 0
         self.directory, self.health, self.ended = directory, health, None
         self.followed_s, self.clock = time.monotonic(), ()
@@ -97,7 +97,7 @@ class Hub(Audience):
         self.ended = summary
 
     def say(self, event: Event) -> bool:
-        """Have an event recorded; False where the run has ended or too many wait."""
+        """Record an event; False if the run has ended or too many are waiting."""
         with self._lock:
             taken = self.ended is None and len(self._sayings) < _SAYINGS_MAX
             if taken:
@@ -105,7 +105,7 @@ class Hub(Audience):
         return taken
 
     def take(self) -> list[Item]:
-        """What came since the last call, events behind the rest."""
+        """Data since the last call, events last."""
         with self._lock:
             rows, self._rows, self._values = self._rows, deque(), 0
             events, self._events = self._events, deque(maxlen=EVENTS_MAX)

@@ -1,4 +1,4 @@
-"""Listener: takes connections in, never so many that the record lacks descriptors or the owner a connection."""
+"""Listener: accepts connections, and limits them so that the record has descriptors and the owner a connection."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from livebode.dashboard.patience import PatientProtocol, Waiting
 
 CONNECTIONS_MAX = 128
 HANDSHAKE_S = 10.0
-"""For the first byte, and for TLS to be agreed on."""
-_DESCRIPTORS_PER_CONNECTION = 4  # itself and a file that it is sent; as many are kept back for the record
+"""Limit for the first byte and the TLS handshake."""
+_DESCRIPTORS_PER_CONNECTION = 4  # the connection and a file that it receives; as many are reserved for the record
 _SWEEP_S = 1.0
 _SENTENCE_S = 60.0
 _REST_S = 0.2
 
 
 def connections_max() -> int:
-    """How many connections the dashboard holds at once, by the process's limit of descriptors (RLIMIT_NOFILE)."""
+    """Largest number of connections, from the process's limit of descriptors (RLIMIT_NOFILE)."""
     if sys.platform == "win32":
         return CONNECTIONS_MAX
     import resource
@@ -35,11 +35,11 @@ def connections_max() -> int:
 
 
 class _Connection:
-    """One that was taken in. Its socket is closed by the transport that has it."""
+    """An accepted connection. Its transport closes the socket."""
 
     def __init__(self, taken: socket.socket, address: str, since_s: float) -> None:
         self.socket, self.address, self._since_s = taken, address, since_s
-        self.protocol: PatientProtocol | None = None  # known once TLS is agreed on
+        self.protocol: PatientProtocol | None = None  # known after the TLS handshake
         self.serving: asyncio.Task[None] | None = None
 
     @property
@@ -60,20 +60,20 @@ class _Connection:
 class Listener:
     """Accepts connections and hands them to the server's protocol.
 
-    At most `connections_max` are held, half of them from one address. Where there is no room, the connection that has
-    waited longest without a whole request is closed for the new one: who holds many shuts out nobody, not even the
-    owner behind the same address. One that owes its request for too long is closed anyway.
+    At most `connections_max` are open, half of them from one address. If there is no room, the connection that has
+    waited longest without a complete request is closed for the new one: a client with many connections cannot exclude
+    others, not even the owner behind the same address. A connection without a request is closed after a time limit.
 
     Parameters
     ----------
     listening
-        Not blocking.
+        Non-blocking socket.
     tls
         None for plain HTTP.
     protocol
-        Makes one for each connection.
+        Creates the protocol of a connection.
     tell
-        Is called, at most once a minute, with how many connections were closed for others.
+        Called at most once a minute with the number of connections that were closed for others.
     """
 
     def __init__(
@@ -90,14 +90,14 @@ class Listener:
         self._told_s = float("-inf")
 
     async def run(self) -> None:
-        """Until it is cancelled."""
+        """Accept connections until it is cancelled."""
         loop = asyncio.get_running_loop()
         sweeping = loop.create_task(self._sweep())
         try:
             while True:
                 try:
                     taken, address = await loop.sock_accept(self._socket)
-                except OSError:  # gone again, or somebody else used up the descriptors
+                except OSError:  # the client has gone, or another part used up the descriptors
                     await asyncio.sleep(_REST_S)
                     continue
                 self._take(taken, network(str(address[0])), loop.time())
@@ -115,7 +115,7 @@ class Listener:
         connection.serving = asyncio.get_running_loop().create_task(self._serve(connection))
 
     def _room(self, address: str) -> bool:
-        """Whether there is room for one more from this address; made by closing another if need be."""
+        """Whether there is room for a connection from this address; closes another one if necessary."""
         self._connections = [connection for connection in self._connections if connection.open]
         crowd = [connection for connection in self._connections if connection.address == address]
         if len(crowd) < self._most // 2:
@@ -135,7 +135,7 @@ class Listener:
     async def _serve(self, connection: _Connection) -> None:
         loop, limit_s = asyncio.get_running_loop(), None if self._tls is None else HANDSHAKE_S
         try:
-            # Silence is worth no protocol; with TLS that is a quarter of a megabyte.
+            # No protocol before the first byte; with TLS it takes a quarter of a megabyte.
             if not await _spoken(connection.socket):
                 connection.socket.close()
                 return
@@ -146,14 +146,14 @@ class Listener:
                 ssl_handshake_timeout=limit_s,
                 ssl_shutdown_timeout=limit_s,
             )
-        except OSError:  # it is gone, or TLS was not agreed on
+        except OSError:  # the client has gone, or the TLS handshake failed
             connection.socket.close()
         except asyncio.CancelledError:
             connection.socket.close()
             raise
 
     async def _sweep(self) -> None:
-        """Close those that wait too long; say that some were closed for others."""
+        """Close connections that wait too long; report those that were closed for others."""
         clock = asyncio.get_running_loop().time
         while True:
             await asyncio.sleep(_SWEEP_S)
@@ -168,15 +168,15 @@ class Listener:
             return
         (address, _), count = self._closed.most_common(1)[0], self._closed.total()
         self._told_s, self._closed = now_s, Counter()
-        with contextlib.suppress(OSError):  # the terminal is gone
+        with contextlib.suppress(OSError):  # the terminal is closed
             self._tell(
-                f"the dashboard closed {count} connections, most of them from {address}: it holds at most "
-                f"{self._most}, and {self._most // 2} from one address; the run continues"
+                f"the dashboard closed {count} connections, most of them from {address}: the limit is "
+                f"{self._most}, or {self._most // 2} from one address; the run continues"
             )
 
 
 async def _spoken(taken: socket.socket) -> bool:
-    """Wait for the first byte; False where the other side has gone without one."""
+    """Wait for the first byte; False if the client has gone without one."""
     loop, came = asyncio.get_running_loop(), asyncio.Event()
     loop.add_reader(taken, came.set)
     try:

@@ -1,4 +1,4 @@
-"""Notices: a run's events as the page shows them, one for each cause, and how many of them somebody has seen."""
+"""Notices: the events of a run as the page shows them, one for each cause, with the number acknowledged."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Notice:
     Attributes
     ----------
     cause
-        What they have in common.
+        Identifier of the common cause.
     id, kind, message
-        Of the newest.
+        Of the newest event.
     first_s, last_s
-        Time of the first and of the newest.
+        Times of the first and of the newest event.
     count, seen
-        How many there were, and how many of them somebody acknowledged.
+        Number of events, and of acknowledged events.
     changed
-        The version at which it changed last.
+        Version of the last change.
     """
 
     cause: str
@@ -49,7 +49,7 @@ class Notice:
     _before: int = 0
 
     def take(self, event: Event) -> None:
-        """One more, or as many as the event says that there were."""
+        """Add an event, or as many as a grouped event counts."""
         if self.seen >= self.count:
             self.kinds = set()
         self.kinds |= event_counts(event).keys()
@@ -63,7 +63,7 @@ class Notice:
         self.last_s = max(self.last_s, event.time_s)
 
     def plain(self) -> dict[str, Any]:
-        """For the page."""
+        """Plain data for the page."""
         names = ("cause", "id", "kind", "message", "first_s", "last_s", "count", "seen")
         return {name: getattr(self, name) for name in names} | {"kinds": sorted(self.kinds)}
 
@@ -75,12 +75,12 @@ class Notices:
         self.version = 0
         self.counts: dict[str, int] = {}
         self.changed: set[str] = set()
-        """What is not as learned now."""
+        """Names of the active differences from the baseline."""
         self._shown: OrderedDict[str, Notice] = OrderedDict()
         self._known: OrderedDict[str, tuple[str, int]] = OrderedDict()  # cause, and which of its events
 
     def take(self, event: Event) -> None:
-        """An event, or that others were acknowledged."""
+        """Take an event or an acknowledgement."""
         self.version += 1
         if event.kind == ACKNOWLEDGED:
             self._acknowledged(event)
@@ -110,29 +110,29 @@ class Notices:
                 held.popitem(last=False)
 
     def of(self, key: str) -> tuple[Notice, int] | None:
-        """That of an event, and which of its events this is."""
+        """The notice of an event, and the number of the event in it."""
         cause, number = self._known.get(key, ("", 0))
         notice = self._shown.get(cause)
         return None if notice is None else (notice, number)
 
     def since(self, version: int) -> list[dict[str, Any]]:
-        """Those that came or changed after `version`, oldest first."""
+        """Notices that are new or changed after `version`, oldest first."""
         return [notice.plain() for notice in self._shown.values() if notice.changed > version]
 
     def _acknowledged(self, event: Event) -> None:
         found = self.of(str(event.details.get("event")))
-        # Earlier versions named the events of a group otherwise.
+        # Earlier versions used other names for the events of a group.
         known = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
         if known is None:
             return
         notice, count = known, event.details.get("count")
-        # In runs recorded before causes were grouped each event was acknowledged alone.
+        # Runs from before the grouping of causes acknowledge each event individually.
         seen = max(notice.seen, count) if isinstance(count, int) else notice.seen + 1
         notice.seen, notice.changed = min(seen, notice.count), self.version
 
 
 def cause_of(event: Event) -> str:
-    """What events have in common that are shown as one: the group that the run put them in, or kind and subject.
+    """The common cause of events that are shown as one: their group in the run, or kind and subject.
 
     >>> cause_of(Event("gap", 7, 1.0, "a gap", {"group": "loss@7", "count": 1}))
     'loss'
@@ -146,14 +146,14 @@ def cause_of(event: Event) -> str:
 
 
 def event_id(event: Event) -> str:
-    """A name for an event that is the same whenever the record is read; of a group's, for it and all before."""
+    """A name of an event that is the same whenever the record is read; in a group, of it and all earlier ones."""
     group = group_of(event)
     text = f"{event.kind}\0{event.sample}\0{event.time_s!r}\0{event.message}" if group is None else f"{group}"
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def acknowledgement(notice: Notice, key: str, count: int, sample: int, time_s: float) -> Event:
-    """The event that records that a person has seen `count` events of a cause, of which `key` is the last."""
+    """The event that records the acknowledgement of `count` events of a cause, of which `key` is the last."""
     details = {"event": key, "kind": notice.kind, "time_s": notice.last_s, "cause": notice.cause, "count": count}
     often = f" ({count} events of this cause)" if count > 1 else ""
     return Event(ACKNOWLEDGED, sample, time_s, f"acknowledged: {notice.message}{often}", details)

@@ -1,4 +1,4 @@
-"""What is drawn over the measured curve: the fitted model and the healthy machine."""
+"""Overlays of the measured curve: the fitted model and the healthy machine."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _GRID_POINTS = 240
 
 
 def grid_hz(lines: Lines) -> Floats:
-    """The lines and points between them, where a model is drawn."""
+    """The frequencies at which a model is drawn: the lines and points between them."""
     f = lines.frequency_hz
     return np.asarray(np.union1d(np.geomspace(f[0], f[-1], _GRID_POINTS), f))
 
 
 class Fitted:
-    """The fitted model of a run as a curve, from the parameters that it published."""
+    """The fitted model of a run as a curve, from its published parameters."""
 
     def __init__(self, quantities: Quantities, section: FitSection) -> None:
         self._quantities = quantities
@@ -43,14 +43,14 @@ class Fitted:
 
     @classmethod
     def of(cls, summary: Mapping[str, Any], quantities: Quantities) -> Fitted | None:
-        """As the configuration asks for it; None where it does not, or for what is no plant."""
+        """Build it from the configuration; None without [fit], or if no plant is available."""
         words = said(dict(summary)).get("fit")
         if words is None or quantities.own != "plant":
             return None
         return cls(quantities, FitSection.model_validate(words))
 
     def curve(self, trends: Trends, quantity: Quantity, time_s: float | None) -> tuple[float, Any] | None:
-        """Time and values on the grid of the newest fit that holds, or of the one nearest to a moment."""
+        """Time and values on the grid of the newest valid fit, or of the valid fit nearest to a time."""
         found = self._parameters(trends, time_s)
         if found is None:
             return None
@@ -66,7 +66,7 @@ class Fitted:
         return self._quantities.loop.feedback_at(self._grid.frequency_hz)
 
     def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
-        """Time and values of one fit that holds."""
+        """Time and values of one valid fit."""
         found = [trends.by_name.get((self.model.name, name)) for name in self.model.names]
         rows = [t.newest if time_s is None else t.rows() for t in found if t is not None and t.newest is not None]
         if len(rows) < len(found) or any(len(r) != len(rows[0]) for r in rows if r is not None):
@@ -83,14 +83,14 @@ class Fitted:
 
 
 class Healthy:
-    """The baseline that a run is held against, where the machine now is."""
+    """The baseline of a run, at the current position of the machine."""
 
     def __init__(self, table: Table) -> None:
         self._table = table
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
-        """As the configuration names it; None where it names none. LivebodeError where the file cannot be read."""
+        """Read the baseline of the configuration; None if there is none. LivebodeError if the file cannot be read."""
         path = said(dict(summary)).get("monitoring", {}).get("baseline")
         if path is None:
             return None
@@ -100,10 +100,9 @@ class Healthy:
         return cls(tables[0]) if tables else None
 
     def response(self, beside: Responses, before: float) -> Responses | None:
-        """What the healthy machine shows where `beside` (one row) was measured, as a response with sigma.
+        """The response of the healthy machine, with sigma, at the position of the response `beside` (one row).
 
-        `before` is the schedule a moment earlier, which tells the way that the machine goes. None where nothing was
-        learned there.
+        `before` is the previous value of the schedule, which gives the direction. None if nothing was learned there.
         """
         t = self._table
         place = 0.0 if t.step == 0 else (float(beside.schedule[0]) - t.low) / t.step
@@ -134,7 +133,7 @@ def _way(step: float, still: float) -> int:
 
 
 def overlays_of(summary: Mapping[str, Any], quantities: Quantities) -> tuple[Fitted | None, Healthy | None, str]:
-    """Both, and why one of them is missing that was asked for."""
+    """Both overlays, and the reasons why a requested one is missing."""
     remarks = []
     fitted: Fitted | None = None
     healthy: Healthy | None = None

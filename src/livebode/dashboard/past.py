@@ -1,4 +1,4 @@
-"""The past of a run: responses of a span of time or at a moment, from its record or from what is in memory."""
+"""The past of a run: responses of a span of time or at a time, from the record or from memory."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from livebode.records import Run
 from livebode.session.overview import Overview
 
 ROWS_MAX = 2000
-_WHOLE = 0.95  # of the run: from then on the thinned copy in memory says the same
+_WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent
 
 
 @dataclass(frozen=True)
 class Past:
-    """A copy of what the server's thread knows, to be asked in another thread.
+    """A copy of the data of the server's thread, for queries in another thread.
 
     Attributes
     ----------
     directory
-        Of the run.
+        Run directory.
     recent, overview
         The newest responses, and every n-th of the whole run; None before the first.
     first_s, last_s
-        When the run began, and its newest response.
+        Times of the start of the run and of its newest response.
     shown
         The newest responses that were sent to browsers.
     readable
-        Whether the record can be read: not that of a run in one piece while it goes on.
+        Whether the record can be read: a run in one piece can be read only after its end.
     """
 
     directory: Path
@@ -45,7 +45,7 @@ class Past:
 
     @classmethod
     def of(cls, state: State) -> Past:
-        """Of an axis; in the server's thread."""
+        """Copy the data of an axis; called in the server's thread."""
         assert state.directory is not None
         overview = None if state.newest is None else state.overview.responses()
         return cls(
@@ -78,7 +78,7 @@ class Past:
         return _thinned(recorded if len(recorded) else within, rows)
 
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
-        """Every response of a span, in parts: from the record where it can be read, else those that are in memory."""
+        """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""
         if self.readable:
             yield from Run.open(self.directory).between(from_s, to_s)
         elif self.recent is None or self.overview is None:
@@ -87,7 +87,7 @@ class Past:
             yield (self.recent if from_s >= self.recent.time_s[0] else self.overview).between(from_s, to_s)
 
     def at(self, time_s: float) -> Responses:
-        """The response with a valid line nearest to a moment, one row, as exactly as it is known."""
+        """The response with a valid line nearest to a time, one row, from the most exact source."""
         found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
         if self.readable and self.overview is not None:
             reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz

@@ -1,4 +1,4 @@
-"""Places: which browsers are served at once, and which one makes room for another."""
+"""Places: which browsers are served at the same time, and which one is displaced by another."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from livebode.dashboard.access import Role, network
 
 PLACES = 16
-"""Browsers at once."""
+"""Largest number of browsers at the same time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One browser's: what it may do, where it comes from, and what ends it."""
+    """The place of a browser: its role, its address, and the function that ends it."""
 
     role: Role
     address: str
@@ -22,16 +22,15 @@ class Place:
 
 
 class Places:
-    """Gives places, and takes them from those who have less right to one.
+    """Assigns places, and displaces browsers with lower priority.
 
-    An operator's token displaces the oldest viewer. Where no token is asked for, nobody can show that the page is
-    theirs: a new browser displaces the oldest one of the address that holds the most places, so that held web sockets
-    shut out nobody.
+    An operator displaces the oldest viewer. Without tokens all browsers are equal: a new browser displaces the oldest
+    one of the address with the most places, so that open web sockets exclude nobody.
 
     Parameters
     ----------
     open
-        Whether no token is asked for.
+        Whether no token is required.
     """
 
     def __init__(self, open: bool) -> None:
@@ -42,7 +41,7 @@ class Places:
         return len(self._taken)
 
     def take(self, place: Place) -> bool:
-        """Whether there is a place, which is to be given back by `leave`; another browser may be asked to go."""
+        """Whether there is a place, which `leave` must return; another browser may be displaced."""
         if len(self._taken) >= PLACES:
             oldest = self._displaceable(place)
             if oldest is None:
@@ -53,7 +52,7 @@ class Places:
         return True
 
     def leave(self, place: Place) -> None:
-        """Give a place back."""
+        """Return a place."""
         if place in self._taken:
             self._taken.remove(place)
 

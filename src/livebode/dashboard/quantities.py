@@ -1,4 +1,4 @@
-"""What the page can show of a run: plant, open loop, closed loop or sensitivity, where the loop is known."""
+"""Quantities that the page can show: plant, open loop, closed loop or sensitivity, if the loop is known."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from livebode.session.said import said
 Complex = NDArray[np.complex128]
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-_UNKNOWN, _REMEDY = "the run does not say what feeds back", "describe its controllers under [loop]"
+_UNKNOWN, _REMEDY = "the run's configuration contains no controllers", "describe its controllers under [loop]"
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,13 @@ class Quantities:
     Parameters
     ----------
     own
-        What the run measured.
+        The measured quantity of the run.
     unit
-        Of it.
+        Its unit.
     lines
-        Where.
+        The lines of the run.
     loop
-        As its configuration describes it; None where it cannot be built.
+        The loop of the configuration; None if it cannot be built.
     """
 
     own: Quantity
@@ -45,36 +45,36 @@ class Quantities:
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
-        """From run.json."""
+        """Build it from run.json."""
         found = summary["found"]
         lines = lines_in(found)
         try:
             loop = LoopSection.model_validate(said(dict(summary)).get("loop", {})).build(lines.rate_hz)
-        except ValueError:  # ours, or pydantic's
+        except ValueError:  # of livebode or of pydantic
             loop = None
         return cls(found["quantity"], found["unit"], lines, loop)
 
     def why_not(self, quantity: Quantity) -> str:
-        """Why the page cannot show it; empty where it can."""
+        """The reason why the page cannot show a quantity; empty if it can."""
         shown = quantity == self.own or (self.loop is not None and self.loop.feedback is not None)
         return "" if shown else f"{_UNKNOWN}; {_REMEDY}"
 
     def check(self, quantity: Quantity) -> None:
-        """ServerError where the page cannot show it."""
+        """Raise ServerError if the page cannot show a quantity."""
         if self.why_not(quantity):
             raise ServerError("quantity-unavailable", _UNKNOWN, _REMEDY, quantity=quantity)
 
     def unit_of(self, quantity: Quantity) -> str:
-        """Of the quantity; without one where it has none or nobody says it."""
+        """The unit of a quantity; empty if it has none or is unknown."""
         return self.unit if quantity == self.own else ""
 
     def fit(self, responses: Responses) -> bool:
-        """Whether responses are of this run's quantity at its frequencies, as those of a run before may not be."""
+        """Whether responses have this run's quantity and frequencies; those of a previous run may differ."""
         at_hz = responses.lines.frequency_hz
         return responses.quantity == self.own and np.array_equal(at_hz, self.lines.frequency_hz)
 
     def of_responses(self, responses: Responses, quantity: Quantity) -> Responses:
-        """The same responses as another quantity; sigma to first order. ServerError where it cannot be."""
+        """The responses as another quantity, sigma to first order; ServerError if impossible."""
         if quantity == responses.quantity:
             return responses
         self.check(quantity)

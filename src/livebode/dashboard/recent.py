@@ -1,4 +1,4 @@
-"""Recent: the newest responses in bounded memory, not denser than a person can see."""
+"""Recent: the newest responses in bounded memory, no denser than a person can see."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from livebode.core import Responses
 
 ROWS_MAX = 2400
 EVERY_S = 0.05
-"""At most one response is kept in so many seconds of the machine: 2,400 are two minutes."""
+"""At most one response is retained per interval of this many seconds: 2,400 are two minutes."""
 _VALUES_MAX = 1 << 21
 _PARTS_MAX = 64
 
 
 class Recent:
-    """The newest responses of a stream, one for each `EVERY_S` of the machine's time."""
+    """The newest responses of a stream, one per `EVERY_S` of the machine's time."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -23,7 +23,7 @@ class Recent:
         self._slot: int | None = None
 
     def add(self, responses: Responses) -> None:
-        """Take in what follows; of each slot of time the first response stays."""
+        """Add responses; the first of each interval is retained."""
         time_s = np.where(np.isfinite(responses.time_s), responses.time_s, 0.0)
         slot = np.floor(time_s / EVERY_S).astype(np.int64)
         first = np.ones(len(slot), dtype=bool)
@@ -38,12 +38,12 @@ class Recent:
         self._kept += len(kept)
         self.count += len(kept)
         if len(self._parts) > _PARTS_MAX or self._kept > 2 * self._most(responses):
-            # The rows of a part take a third of what its arrays do when it has one row. Joined again, they are a copy.
+            # A one-row part takes three times the memory of its data, for its array objects. Joined rows are a copy.
             self._parts = [Responses.join([Responses.join(self._parts)[-self._most(responses) :]])]
             self._kept = len(self._parts[0])
 
     def newest(self, rows: int) -> Responses | None:
-        """The last so many, or all that there are."""
+        """The last rows, up to this number."""
         if not self._parts or rows <= 0:
             return None
         at = len(self._parts)
@@ -55,7 +55,7 @@ class Recent:
         return Responses.join([first, *self._parts[at + 1 :]])
 
     def all(self) -> Responses | None:
-        """What is kept."""
+        """All retained responses."""
         return self.newest(self._most(self._parts[-1])) if self._parts else None
 
     def _most(self, responses: Responses) -> int:

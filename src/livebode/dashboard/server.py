@@ -1,4 +1,4 @@
-"""The server: uvicorn behind a Listener of ours, and what becomes of a fault in it."""
+"""The server: uvicorn behind a Listener, and the report of its internal errors."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _FAULT_EVERY_S = 60.0
 
 
 class Server(uvicorn.Server):
-    """uvicorn's, with connections that a Listener takes in.
+    """A uvicorn server whose connections a Listener accepts.
 
     Parameters
     ----------
     config
-        Of uvicorn.
+        Configuration of uvicorn.
     listening
-        Not blocking.
+        Non-blocking socket.
     tell
-        Hears of connections that were closed.
+        Called with messages about closed connections.
     """
 
     def __init__(self, config: uvicorn.Config, listening: socket.socket, tell: Callable[[str], None]) -> None:
@@ -50,9 +50,9 @@ class Server(uvicorn.Server):
 
 
 class Faults:
-    """Says what went wrong in the server itself, in one sentence, at most once a minute.
+    """Reports internal errors of the server in one sentence, at most once a minute.
 
-    A traceback for each would let anybody who finds a fault fill the disk.
+    A traceback for each would let an attacker fill the disk.
     """
 
     def __init__(self, tell: Callable[[str], None]) -> None:
@@ -60,7 +60,7 @@ class Faults:
         self._count, self._told_s = 0, float("-inf")
 
     def take(self, error: BaseException | None, what: str = "") -> None:
-        """A fault."""
+        """Report an error."""
         self._count += 1
         now_s = time.monotonic()
         if now_s - self._told_s < _FAULT_EVERY_S:
@@ -72,6 +72,6 @@ class Faults:
         self._tell(f"internal error in the dashboard{often}: {what or repr(error)}{place}; the run continues")
 
     def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """For `loop.set_exception_handler`."""
+        """Handler for `loop.set_exception_handler`."""
         error = context.get("exception")
         self.take(error, f"{context.get('message', '')} ({error!r})")

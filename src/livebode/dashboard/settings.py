@@ -1,4 +1,4 @@
-"""Where the dashboard listens, and who may look and acknowledge: checked before anything starts."""
+"""Address, tokens and TLS of the dashboard, checked before it starts."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _MAKE = 'umask 077; python -c "import secrets; print(secrets.token_urlsafe(32))"
 
 @dataclass(frozen=True, repr=False)
 class Serving:
-    """A ServeSection whose secrets were read.
+    """A ServeSection with the secrets read from their files.
 
     Attributes
     ----------
     address, port
-        Where to listen; port 0 takes a free one.
+        Where to listen; port 0 selects a free one.
     names
-        Host names, besides numbers and localhost, by which a browser may call the page.
+        Host names, in addition to numeric addresses and localhost, by which a browser may open the page.
     token, viewer_token
-        Who has the first may acknowledge, who has the second may look; None where there is none.
+        Tokens of operators, who may acknowledge, and of viewers; None if there is none.
     tls
-        With certificate and key; None for plain HTTP.
+        Context with certificate and key; None for plain HTTP.
     read_only
         Whether nobody may acknowledge.
     """
@@ -46,20 +46,20 @@ class Serving:
 
     @classmethod
     def of(cls, section: ServeSection) -> Serving:
-        """From the configuration.
+        """Build it from the configuration.
 
         Raises
         ------
         ConfigError
-            Where a secret or file is missing, a token is short, or another address than the loopback is to be served
-            without token and TLS.
+            If a secret or file is missing, a token is too short, or an address other than the loopback lacks a token
+            or TLS.
         """
         token = _token("token", section.token_env, section.token_file)
         viewer = _token("viewer_token", section.viewer_token_env, section.viewer_token_file)
         if viewer is not None and viewer == token:
             raise ConfigError(
                 "tokens-equal",
-                "serve.token and serve.viewer_token are the same, which would make a viewer an operator",
+                "serve.token and serve.viewer_token are equal, so viewers would be operators",
                 "make another token for viewers",
                 key="serve.viewer_token",
             )
@@ -68,7 +68,7 @@ class Serving:
             if token is None and viewer is None:
                 raise ConfigError(
                     "open-without-token",
-                    f"serve.address = {section.address!r} is open to others, which needs a token",
+                    f"serve.address = {section.address!r} is reachable from the network, which requires a token",
                     f"make one with `{_MAKE}`, put it in a file or the environment, and name "
                     "that as serve.token_file or token_env",
                     key="serve.address",
@@ -77,7 +77,7 @@ class Serving:
             if tls is None:
                 raise ConfigError(
                     "open-without-tls",
-                    f"serve.address = {section.address!r} is open to others, which needs TLS",
+                    f"serve.address = {section.address!r} is reachable from the network, which requires TLS",
                     "give serve.certificate_file and serve.key_file",
                     key="serve.address",
                     value=section.address,
@@ -94,7 +94,7 @@ def _loopback(address: str) -> bool:
         raise ConfigError(
             "value-invalid",
             f"serve.address = {address!r} is not an IP address",
-            "write for example 127.0.0.1, which is this computer alone",
+            "write for example 127.0.0.1, which is only this computer",
             key="serve.address",
             value=address,
         ) from None
@@ -118,7 +118,7 @@ def _token(key: str, variable: str | None, path: Path | None) -> str | None:
 
 
 def _check_rights(key: str, path: Path) -> None:
-    """ConfigError where other users may read or change the file. Its group may read it: so services share secrets."""
+    """ConfigError if other users may read or change the file. Its group may read it, as services share secrets."""
     mode = stat.S_IMODE(path.stat().st_mode)
     if os.name == "posix" and mode & (stat.S_IROTH | stat.S_IWOTH | stat.S_IWGRP):
         raise ConfigError(

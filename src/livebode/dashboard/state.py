@@ -1,4 +1,4 @@
-"""State: what the server knows of one axis, live or from its record."""
+"""State: the data of one axis in the server, live or from its record."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from livebode.session.said import said
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
 _SILENT_S = 2.0
-_SINCE_1970_S = 1e8  # what is later is a date: a run's own clock does not reach three years
+_SINCE_1970_S = 1e8  # later times are dates: a run's own clock does not reach three years
 _GROWS_S = 10.0
-_SENT = 90  # three seconds of what browsers were sent: what a person freezes is among them
+_SENT = 90  # responses that were sent in three seconds: one that a person freezes is among them
 
 
 class State:
-    """Newest, recent and thinned responses of an axis, its parameters and events, and how its source is doing.
+    """Newest, recent and thinned responses of an axis, its parameters and events, and the health of its source.
 
-    Belongs to the server's thread; what it is told comes from a Hub (`refresh`) or from a record (`take`).
+    Used only in the server's thread; data come from a Hub (`refresh`) or from a record (`take`).
     """
 
     def __init__(self, name: str, axis: int, hub: Hub | None = None) -> None:
@@ -70,32 +70,32 @@ class State:
 
     @property
     def live(self) -> bool:
-        """Whether a run in this process goes on."""
+        """Whether a run in this process is active."""
         return self.hub is not None and not self.finished
 
     @property
     def growing(self) -> bool:
-        """Whether another process records it: something came just now."""
+        """Whether another process is recording it: data arrived recently."""
         return self.hub is None and not self.finished and time.monotonic() - self._grew < _GROWS_S
 
     def read(self) -> None:
-        """All that came until now was there before."""
+        """Mark all data so far as old."""
         self._grew = float("-inf")
 
     @property
     def readable(self) -> bool:
-        """Whether the record can be read: in segments at any time, in one piece when the run is done."""
+        """Whether the record can be read: in segments at any time, in one piece after the end of the run."""
         return not self.live or "record" in self._summary
 
     def begin(self, directory: Path, summary: Mapping[str, Any]) -> None:
-        """Where it is recorded, and run.json; `runs` counts how often an axis began."""
+        """Start a run with its directory and run.json; `runs` counts the runs of the axis."""
         self.runs += 1
         self.directory, self._summary = directory, json.loads(to_json(dict(summary)))  # as it is read back
         self.quantities = Quantities.of(self._summary)
         self._fitted, self._healthy, self._remark = overlays_of(self._summary, self.quantities)
 
     def refresh(self) -> None:
-        """Take what the hub has."""
+        """Take new data from the hub."""
         hub = self.hub
         if hub is None:
             return
@@ -110,18 +110,18 @@ class State:
             self.finished, self._summary = True, json.loads(to_json(dict(ended)))
 
     def _before(self) -> None:
-        """The events of a run that is gone on with."""
+        """Take the earlier events of a continued run."""
         if "record" not in self._summary or self.directory is None:
             return
-        with suppress(LivebodeError):  # it has just begun
+        with suppress(LivebodeError):  # it has just started
             self.take(list(Run.open(self.directory).events()))
 
     def renewed(self, summary: Mapping[str, Any], finished: bool) -> None:
-        """run.json as it is now."""
+        """Take the current run.json."""
         self._summary, self.finished = summary, finished
 
     def take(self, items: list[Item]) -> None:
-        """Responses, parameters and events in the order in which they came."""
+        """Take responses, parameters and events in the order of arrival."""
         for item in items:
             if isinstance(item, Responses):
                 self._take_responses(item)
@@ -147,13 +147,13 @@ class State:
         self.last_s = float(responses.time_s[-1])
 
     def shown(self, quantity: Quantity | None) -> Quantity:
-        """The quantity that is wished for where the run permits it, else its own."""
+        """The requested quantity if the run permits it, otherwise its own."""
         if self.quantities is None:
             return quantity or "plant"
         return quantity if quantity and not self.quantities.why_not(quantity) else self.quantities.own
 
     def newest_frames(self, quantity: Quantity) -> bytes:
-        """The newest response, and the model and the healthy machine beside it."""
+        """Frames of the newest response, the model and the healthy machine."""
         assert self.quantities is not None
         if self.newest is None:
             return b""
@@ -162,7 +162,7 @@ class State:
         return self.frames_of("newest", self.newest, quantity, newest=True)
 
     def frames_of(self, kind: str, one: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
-        """One response as `kind`, and what is drawn over it at that moment; the newest is kept for other browsers."""
+        """Frames of one response as `kind` and of its overlays; the newest is cached for other browsers."""
         key = (kind, quantity, float(self.version))
         if newest and key in self._made:
             return self._made[key]
@@ -181,7 +181,7 @@ class State:
         return made
 
     def rows(self, after: int, most: int) -> Responses | None:
-        """Of the recent responses those behind the first `after`, the newest `most`."""
+        """The recent responses after the first `after`, at most the newest `most`."""
         return self.recent.newest(min(self.recent.count - after, most))
 
     def _schedule_before(self, one: Responses) -> float:
@@ -193,7 +193,7 @@ class State:
         return float(recent.schedule[before[-1]]) if before.size else float("nan")
 
     def facts(self) -> dict[str, Any]:
-        """What the page must know before it draws."""
+        """Facts that the page needs before it draws."""
         facts: dict[str, Any] = {"axis": self.axis, "name": self.name, "live": self.live, "begun": False}
         q = self.quantities
         if q is None:
@@ -221,7 +221,7 @@ class State:
         }
 
     def span(self) -> dict[str, Any]:
-        """From when to when there is something to see, and by which clock."""
+        """Span of time with data, and its clock."""
         return {
             "first_s": self.first_s,
             "last_s": self.last_s,
@@ -232,16 +232,16 @@ class State:
 
     @property
     def clock(self) -> list[tuple[float, float]]:
-        """Which time of day the run's seconds are, as `RunClock` keeps it; empty where they are of no clock.
+        """Time of day of the run's seconds, as in `RunClock`; empty if the run has no clock.
 
-        What happens before a run begins is dated.
+        Events before the start of a run have a date.
         """
         if self.quantities is None or self.last_s > _SINCE_1970_S:
             return [(0.0, 0.0)]
         return list(self.hub.clock) if self.hub is not None else RunClock.of(dict(self._summary)).pieces
 
     def health(self) -> dict[str, Any]:
-        """How source and tracking are doing."""
+        """Health of source and tracking."""
         now = time.monotonic()
         self._pace.append((now, self._seen))
         while len(self._pace) > 2 and self._pace[0][0] < now - _PACE_S:
@@ -268,7 +268,7 @@ class State:
         return found
 
     def _largest_sensitivity(self) -> dict[str, float] | None:
-        """|S| where it is largest at a line, without any model."""
+        """The largest |S| at a line, without a model."""
         q = self.quantities
         if q is None or self.newest is None or q.why_not("sensitivity") or q.loop is None or q.loop.feedback is None:
             return None

@@ -18,7 +18,7 @@ TRENDS_MAX = 256
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """One parameter at some moments, arrays of one length."""
+    """One parameter over time, arrays of equal length."""
 
     time_s: Floats
     schedule: Floats
@@ -34,7 +34,7 @@ class Rows:
 
 
 class Trend:
-    """Every n-th row of one parameter, n doubled whenever there are too many, and the newest row."""
+    """Every n-th row of one parameter, with n doubled whenever there are too many, and the newest row."""
 
     def __init__(self, model: str, name: str, unit: str) -> None:
         self.model, self.name, self.unit = model, name, unit
@@ -43,7 +43,7 @@ class Trend:
         self._seen, self._stride, self._kept = 0, 1, 0
 
     def add(self, rows: Rows) -> None:
-        """Rows behind those before."""
+        """Append rows."""
         if not len(rows):
             return
         self.newest = rows[-1:]
@@ -56,13 +56,13 @@ class Trend:
             self._stride *= 2
 
     def rows(self) -> Rows:
-        """What was kept."""
+        """The retained rows."""
         if len(self._rows) > 1:
             self._rows = [Rows(*(np.concatenate([getattr(r, n) for r in self._rows]) for n in Rows.__annotations__))]
         return self._rows[0]
 
     def plain(self, *, whole: bool) -> dict[str, Any]:
-        """For the page: all that was kept, or only the newest row."""
+        """Plain data for the page: all retained rows, or only the newest."""
         rows = self.rows() if whole else self.newest
         assert rows is not None
         found = {"model": self.model, "name": self.name, "unit": self.unit}
@@ -75,14 +75,14 @@ class Trend:
 
 
 class Trends:
-    """Those of one run, by model and name."""
+    """The trends of one run, by model and name."""
 
     def __init__(self) -> None:
         self.by_name: dict[tuple[str, str], Trend] = {}
         self.version = 0
 
     def take(self, parts: tuple[Parameters, ...]) -> None:
-        """What a run published."""
+        """Take the published parameters of a run."""
         for part in parts:
             sigma = part.sigma
             for i, (name, unit) in enumerate(zip(part.names, part.units)):
@@ -90,7 +90,7 @@ class Trends:
                 self.add(part.model, name, unit, rows)
 
     def add(self, model: str, name: str, unit: str, rows: Rows) -> None:
-        """Rows of one parameter."""
+        """Take rows of one parameter."""
         key = (model, name)
         if key not in self.by_name:
             if len(self.by_name) >= TRENDS_MAX:
@@ -100,5 +100,5 @@ class Trends:
         self.version += 1
 
     def plain(self, *, whole: bool) -> list[dict[str, Any]]:
-        """For the page; see `Trend.plain`."""
+        """Plain data for the page; see `Trend.plain`."""
         return [trend.plain(whole=whole) for trend in self.by_name.values() if trend.newest is not None]

@@ -19,7 +19,7 @@ from livebode.records.grouped_events import still_waiting
 
 
 class Viewed:
-    """Hands the responses, parameters and events of a run's directory to a State."""
+    """Passes the responses, parameters and events of a run directory to a State."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -31,20 +31,20 @@ class Viewed:
 
     @property
     def finished(self) -> bool:
-        """Whether there is nothing more to come."""
+        """Whether no more data will follow."""
         return self._run.finished
 
     def fill(self, state: State) -> None:
-        """All that there is."""
+        """Pass all data to the state."""
         state.begin(self.directory, self._run.summary)
         for part in self._run.batches():
             self._responses(state, part)
         self._rest(state)
 
     def more(self) -> tuple[list[Item], list[tuple[str, str, str, Rows]], dict[str, Any], bool]:
-        """What came since: responses and events, rows of parameters, run.json, and whether the run has ended."""
+        """Pass new data: responses and events, rows of parameters, run.json, and whether the run has ended."""
         self._run = Run.open(self.directory)
-        behind_s = self._last_s, inf  # segments before that are not read again
+        behind_s = self._last_s, inf  # earlier segments are not read again
         items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
         rows = list(self._parameters(behind_s))
         items += self._new_events()

@@ -1,4 +1,4 @@
-"""The Bode plot of a run: magnitude, phase and coherence over frequency, with what the run spanned and the bounds."""
+"""The Bode plot of a run: magnitude, phase and coherence over frequency, with the range over the run and the bounds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 _LEFT = 0.085
 _FIT_POINTS = 600
-# A bound that reaches below this is drawn to the lower edge: the response cannot be told from zero.
+# A bound that reaches below this is drawn to the lower edge: the response cannot be distinguished from zero.
 _FLOOR_DB = -1000.0
 
 
@@ -34,27 +34,27 @@ def bode_figure(
     mean: Response | None = None,
     dark: bool = False,
 ) -> Figure:
-    """Magnitude (dB), unwrapped phase (degrees) and, where known, coherence over logarithmic frequency.
+    """Magnitude (dB), unwrapped phase (degrees) and, if known, coherence over logarithmic frequency.
 
-    A line shows the median over the valid responses (magnitude and phase apart, the phase around its mean direction:
-    summary.py says why not the complex mean), a light band what 5–95 % of them spanned, and in another colour the
-    newest valid response with the bound that holds the truth with a probability of 99.7 %. Lines that were never valid
-    are left open.
+    A curve shows the median over the valid responses (separately for magnitude and phase, the phase around its mean
+    direction; summary.py explains why not the complex mean), a light band their range of 5–95 %, and another colour
+    the newest valid response with its bound, which covers the true value with a probability of 99.7 %. Lines that were
+    never valid remain open.
 
     Parameters
     ----------
     responses
         (rows, lines); may be thinned, partly or wholly invalid, or empty.
     title
-        Heading, from the recording; shortened where it does not fit.
+        Heading, from the recording; shortened if it does not fit.
     names
         Names of the input and the output channel.
     fitted
-        The newest fit, or that of the mean, drawn from the first to the last line.
+        The newest fit, or the fit of the mean; drawn from the first to the last line.
     mean
-        The mean of the run, drawn with its 95 % bound in place of the median and of the newest response.
+        The mean of the run; drawn with its 95 % bound instead of the median and the newest response.
     dark
-        Light on dark.
+        Whether to draw light on dark.
     """
     look = style(dark)
     summary = summarised(responses, mean)
@@ -88,7 +88,7 @@ def bode_figure(
 
 
 def _curve(summary: Summary, fitted: Model) -> tuple[Floats, Floats, Floats]:
-    """The model's Hz, dB and degrees, its phase on the turn that the newest response is drawn on."""
+    """The model's Hz, dB and degrees; its phase on the same turn as that of the newest response."""
     lines_hz = summary.responses.lines.frequency_hz
     f = np.union1d(np.geomspace(lines_hz[0], lines_hz[-1], _FIT_POINTS), lines_hz)
     value = fitted.response(f)
@@ -138,7 +138,7 @@ def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
 def _draw(
     axes: Axes, look: Style, summary: Summary, run: Floats, value: Floats, low: Floats, high: Floats, median: bool
 ) -> None:
-    """One panel: span, median, newest; `run` is (3, lines), the rest (lines,)."""
+    """Draw one panel: range, median, newest; `run` is (3, lines), the others (lines,)."""
     f = summary.responses.lines.frequency_hz
     few = len(f) <= FEW_LINES
     run_marker: dict[str, Any] = {"marker": "o", "markersize": 4.5} if few else {}
@@ -158,7 +158,7 @@ def _draw(
 
 
 def _band(axes: Axes, f: Floats, low: Floats, high: Floats, colour: str, alpha: float, gid: str) -> None:
-    """Filled between neighbours; a line with no neighbour gets a bar instead, or its span would be invisible."""
+    """Fill the range between neighbouring lines; a line without neighbours gets a bar, to be visible."""
     axes.fill_between(f, low, high, color=colour, alpha=alpha, linewidth=0, zorder=2, gid=gid)
     alone = _alone(low + high)
     if alone.any():
@@ -213,7 +213,7 @@ def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
 def _limits(
     axes: Axes, run: Floats, newest: tuple[Floats, Floats, Floats], curve: Floats, room: float
 ) -> tuple[float, float]:
-    """Limits that hold span and newest, and bounds and fit as far as they do not squeeze the rest to a stripe."""
+    """Limits that contain range and newest, and bounds and fit as far as these leave room for the rest."""
     drawn = np.concatenate([run.ravel(), newest[0]])
     drawn = drawn[np.isfinite(drawn)]
     if not drawn.size:

@@ -1,4 +1,4 @@
-"""Before and after: two responses over each other, their ratio, and where along the schedule they differ."""
+"""Pictures of a comparison: two responses, their ratio, and the differences along the schedule."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 PlaceChange = tuple[float, float, bool, Complex, NDArray[np.bool_]]
-"""From, to, whether going back, ratio and which lines differ, (lines,) each."""
+"""From, to, whether return, ratio and mask of the lines that differ, (lines,) each."""
 
 _FLOOR_DB = -1000.0
 _HEIGHT_IN = 7.8
@@ -29,18 +29,18 @@ _HEIGHT_IN = 7.8
 def comparison_figure(
     before: Response, after: Response, ratio: Complex, bound: Floats, differs: NDArray[np.bool_], *, dark: bool = False
 ) -> Figure:
-    """Magnitude and phase of both with their 95 % bounds; below, the ratio in dB and degrees with its own.
+    """Magnitude and phase of both with 95 % bounds; below, the ratio in dB and degrees with its bound.
 
     Parameters
     ----------
     before, after
-        On the same lines.
+        The responses, at the same lines.
     ratio, bound
         After over before and the radius around it, (lines,).
     differs
         Which lines are marked, (lines,).
     dark
-        Light on dark.
+        Whether to draw light on dark.
     """
     look = style(dark)
     f = before.lines.frequency_hz
@@ -124,7 +124,7 @@ def _ratio(
 
 
 def _squeeze(axes: Axes, drawn: Floats, room: float) -> None:
-    """Limits that hold the values, and bounds as far as they leave these room."""
+    """Limits that contain the values, and the bounds as far as these leave room for them."""
     known = drawn[np.isfinite(drawn)]
     if known.size:
         reach = max(0.35 * float(np.ptp(known)), room)
@@ -132,10 +132,10 @@ def _squeeze(axes: Axes, drawn: Floats, room: float) -> None:
 
 
 def places_figure(frequency_hz: Floats, places: list[PlaceChange], *, dark: bool = False) -> Figure:
-    """The change of the magnitude over place and frequency, going forth and going back; dots mark what differs."""
+    """The change of the magnitude over place and frequency, forward and return; dots mark significant differences."""
     look = style(dark)
     ways = [[p for p in places if p[2] == back] for back in (False, True)]
-    shown = [(way, name) for way, name in zip(ways, ("going forth (rising)", "going back (falling)")) if way]
+    shown = [(way, name) for way, name in zip(ways, ("forward (rising)", "return (falling)")) if way]
     reach = max(float(np.nanmax(np.abs([decibels(p[3]) for p in places]), initial=0.0)), 0.1)
     edges_hz = frequency_edges(frequency_hz) if len(frequency_hz) > 1 else frequency_hz[0] * np.array([0.9, 1.1])
     with drawing(look):
@@ -191,7 +191,7 @@ def _legend(figure: Figure, look: Style) -> None:
         Line2D([], [], markerfacecolor=look.paper, **dot),
     ]
     figure.legend(
-        handles, ["before, bound: 95 %", "after, bound: 95 %", "differs", "does not"], loc="upper left",
+        handles, ["before, bound: 95 %", "after, bound: 95 %", "differs", "does not differ"], loc="upper left",
         bbox_to_anchor=(0.085, 1 - 0.76 / figure.get_size_inches()[1]), ncols=4, borderpad=0.0, borderaxespad=0.0,
         handlelength=1.6, columnspacing=2.0,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The picture of an excitation: one period, its lines with their phases, and how its samples are spread."""
+"""The picture of an excitation: one period, its lines with their phases, and the histogram of its samples."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _CLASSES = 41
-_POINTS_MAX = 20_000  # of a period; a longer one is drawn by its extremes
+_POINTS_MAX = 20_000  # of a period; of a longer one only the extremes are drawn
 
 
 def save_excitation_picture(design: Design, path: str | PathLike[str], *, dark: bool = False) -> Path:
@@ -32,7 +32,7 @@ def save_excitation_picture(design: Design, path: str | PathLike[str], *, dark: 
 def excitation_figure(design: Design, *, dark: bool = False) -> Figure:
     """One period over time beside the histogram of its samples; below, amplitude and phase of each line.
 
-    Broken lines are the predicted extremes of the torque, motion included, and where one is set its limit.
+    Broken lines are the predicted extremes of the torque, motion included, and its limit if one is set.
     """
     look, waveform = style(dark), design.waveform
     with drawing(look):
@@ -78,7 +78,7 @@ def _facts(design: Design) -> str:
 def _period(axes: Axes, look: Style, waveform: Waveform) -> None:
     samples, rate_hz = waveform.samples, waveform.lines.rate_hz
     ms = 1000 * np.arange(samples.size + 1) / rate_hz
-    held = np.append(samples, samples[-1])  # a drive holds each sample until the next
+    held = np.append(samples, samples[-1])  # a drive outputs each sample until the next
     if held.size > _POINTS_MAX:
         each = -(-samples.size // (_POINTS_MAX // 2))
         parts = np.array_split(samples, -(-samples.size // each))
@@ -124,7 +124,7 @@ def _lines(sizes: Axes, phases: Axes, look: Style, waveform: Waveform) -> None:
     if lines.quiet and waveform.about.get("kind") == "odd":
         quiet = np.asarray([k for k in lines.quiet if k % 2]) * lines.resolution_hz
         sizes.plot(quiet, np.zeros(quiet.size), "o", markersize=5, markerfacecolor="none", markeredgecolor=look.newest,
-                   clip_on=False, zorder=5, label="odd bins left quiet")  # fmt: skip
+                   clip_on=False, zorder=5, label="odd bins without excitation")  # fmt: skip
         sizes.legend(loc="upper right")
     sizes.set_ylim(0, (1.5 if sizes.get_legend() else 1.15) * float(np.max(np.abs(spectrum))))
     sizes.set_ylabel("amplitude in N m")

@@ -1,4 +1,4 @@
-"""The pictures that a document asks for by name, in the size of its page."""
+"""The pictures that a document names, in the size of its page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH_IN = 9.0
-"""Of all pictures of a document: on A4 they are drawn at three quarters, where their letters are of 7 points."""
+"""Width of all pictures of a document; on A4 they are scaled to three quarters, with letters of 7 points."""
 
 
 def drawn(picture: Picture) -> Figure:

@@ -1,4 +1,4 @@
-"""A document as one HTML file that needs nothing else: no script, no network, figures as SVG within it."""
+"""A document as one self-contained HTML file: no scripts, no network, figures as SVG."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from livebode.report.svg import inline_svg
 
 
 def to_html(document: Document) -> str:
-    """The page. Whatever stands in the document is text in it, also where it looks like a tag."""
+    """The page. All content of the document is text, even if it looks like a tag."""
     title = _text(f"{document.title}: {document.kind.lower()}")
     body = "\n".join(_section(section, i) for i, section in enumerate(document.sections))
     facts = "".join(f"<div><dt>{_text(n)}</dt><dd>{_text(v)}</dd></div>" for n, v in document.facts)
@@ -19,7 +19,7 @@ def to_html(document: Document) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        # Nothing is ever fetched or run, also where a text should get past the escaping.
+        # Nothing is loaded or executed, even if a text should pass the escaping.
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
         'img-src data:">\n'
         f"<title>{title}</title>\n<style>\n{STYLE_SHEET}</style>\n</head>\n<body>\n"
@@ -31,7 +31,7 @@ def to_html(document: Document) -> str:
 
 
 def readable(text: str) -> str:
-    """The text without characters that no page can show."""
+    """The text without characters that a page cannot show."""
     return "".join(c if c.isprintable() or c in "\n\t" else "\ufffd" for c in text)
 
 

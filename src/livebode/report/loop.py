@@ -25,12 +25,12 @@ Complex = NDArray[np.complex128]
 
 _POINTS = 1200
 _DRAWS = 100  # of the fit's parameters, for the band
-_LOWEST_DEG = -460.0  # below it there is only the delay
+_LOWEST_DEG = -460.0  # below it only the delay acts
 _REACH = 2.2  # of the Nyquist plot
 
 
 class Loop(Protocol):
-    """What is drawn: a session's report has it."""
+    """The part of a loop report that is drawn."""
 
     @property
     def fit(self) -> Fit: ...
@@ -43,15 +43,15 @@ class Loop(Protocol):
 
 
 def save_loop_picture(found: Loop, directory: str | PathLike[str], *, title: str = "", dark: bool = False) -> Path:
-    """Write margins.png into an existing directory."""
+    """Write margins.png to an existing directory."""
     return save(loop_figure(found, title=title, dark=dark), Path(directory) / "margins.png", style(dark))
 
 
 def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
-    """|L| and its phase over frequency beside the Nyquist plot, as the fit has them with a 95 % band.
+    """|L| and its phase over frequency beside the Nyquist plot, from the fit with a 95 % band.
 
-    Dots are the measured lines, F·G, with 95 % bounds. Open diamonds mark where |L| = 1, squares where L is negative,
-    as far as a margin was read there. Beyond the lines the curve is dashed: there only the model speaks.
+    Dots are the measured lines, F·G, with 95 % bounds. Open diamonds mark |L| = 1 and squares negative L, if a margin
+    was computed there. Beyond the lines the curve is dashed: it is from the model only.
     """
     look = style(dark)
     f = np.geomspace(found.fit.band_hz[0] / 4, found.loop.rate_hz / 2, _POINTS)
@@ -76,7 +76,7 @@ def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: f
 
 
 def _curves(found: Loop, f: Floats) -> tuple[Complex, tuple[Floats, Floats], tuple[Floats, Floats]]:
-    """L by the fit, and (dB, degrees) at both ends of the band that holds 95 %."""
+    """L of the fit, and (dB, degrees) at both ends of its 95 % band."""
     values = found.fit.parameters.value[:1]
     covariance = found.fit.parameters.covariance[0]
     size, turned = np.linalg.eigh(covariance)
@@ -185,7 +185,7 @@ def _measured(found: Loop) -> tuple[Floats, Complex, Floats]:
 
 
 def _marked(found: Loop) -> list[tuple[str, Floats]]:
-    """Where the drawn margins were read: |L| = 1 (diamonds), L negative (squares)."""
+    """Mark the frequencies of the margins: |L| = 1 (diamonds), L negative (squares)."""
     f = dict(zip(found.margins.names, found.margins.frequency_hz[0]))
     kinds = (("D", ("phase_margin", "delay_margin")), ("s", ("gain_margin", "gain_reduction")))
     low = found.fit.band_hz[0] / 4
@@ -219,7 +219,7 @@ def _legend(figure: Figure, look: Style, left: float) -> None:
         Line2D([], [], marker="D", **mark),
         Line2D([], [], marker="s", **mark),
     ]
-    texts = ["L by the fit, 95 % band", "beyond the lines", "measured lines, 95 %", "|L| = 1", "L negative"]
+    texts = ["L of the fit, 95 % band", "beyond the lines", "measured lines, 95 %", "|L| = 1", "L negative"]
     figure.legend(
         handles, texts, loc="upper left", bbox_to_anchor=(left, 1 - 0.76 / figure.get_size_inches()[1]), ncols=5,
         borderpad=0.0, borderaxespad=0.0, handlelength=1.8, columnspacing=1.8,

@@ -1,4 +1,4 @@
-"""Maps over frequency for runs with many lines: the magnitude, and its change against the median of the run."""
+"""Maps over frequency for runs with many lines: the magnitude, and its change from the median of the run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# About one cell for two pixels of the picture: finer cells cost time and show nothing more.
+# About one cell for two pixels of the picture: finer cells cost time and show no more detail.
 _TIME_CELLS_MAX = 400
 _SCHEDULE_CELLS_MAX = 80
 _LINE_CELLS_MAX = 250
@@ -28,7 +28,7 @@ _LINE_CELLS_MAX = 250
 def draw_maps(
     figure: Figure, look: Style, responses: Responses, use: NDArray[np.bool_], schedule: str | None, left: float
 ) -> None:
-    """Two rows of maps (magnitude above, change below) against the scheduling signal, if any, and against time."""
+    """Draw two rows of maps (magnitude above, change below) over the schedule, if any, and over time."""
     width_in, height_in = figure.get_size_inches()
     grid = figure.add_gridspec(
         2,
@@ -61,12 +61,12 @@ def draw_maps(
             if row == 1:
                 panel.set_xlabel(across[i][2])
         axes[0].set_ylabel("frequency in Hz")
-        name = words.magnitude_label(responses, 40) if row == 0 else "change against the median in dB"
+        name = words.magnitude_label(responses, 40) if row == 0 else "change from the median in dB"
         _colour_bar(figure, grid[row, -1], meshes[-1], name)
 
 
 def grouped_lines(frequency_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """At most 250 lines: neighbours share a cell that shows the first valid of them in each row."""
+    """Reduce to at most 250 lines: neighbours share a cell that shows the first valid value in each row."""
     group = -(-len(frequency_hz) // _LINE_CELLS_MAX)
     if group == 1:
         return frequency_hz, values
@@ -139,7 +139,7 @@ def _level_colours(level_db: Floats) -> dict[str, Any]:
 
 
 def _change_colours(look: Style, change_db: Floats) -> dict[str, Any]:
-    """Even around zero and wide enough for 99 % of the cells, so that one outlier does not hide everything else."""
+    """Limits symmetric around zero that contain 99 % of the cells, so that an outlier does not hide the rest."""
     known = np.abs(change_db[np.isfinite(change_db)])
     reach = max(float(np.quantile(known, 0.99)), 0.1)
     return {"cmap": look.change_map, "vmin": -reach, "vmax": reach}

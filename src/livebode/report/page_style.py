@@ -1,4 +1,4 @@
-"""The style sheet of a report's page: light and dark on a screen, black on white on A4."""
+"""The style sheet of a report: light and dark on a screen, black on white on A4."""
 
 from __future__ import annotations
 

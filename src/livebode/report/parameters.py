@@ -1,4 +1,4 @@
-"""Fitted parameters, or margins, over time, each in a panel of its own with its bound."""
+"""Fitted parameters or margins over time, one panel each, with bounds."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Curve = tuple[str, str, Floats, Floats]
-"""Name, unit, values and half-widths of the bounds, (rows,) each; NaN where there is no number."""
+"""Name, unit, values and half-widths of the bounds, (rows,) each; NaN if there is no value."""
 
 _COLUMNS = 2
-_REACH = 4.0  # times what 90 % of the values span: one wild bound is not to flatten the rest
+_REACH = 4.0  # times the range of 90 % of the values: one wide bound must not flatten the rest
 
 
 def parameters_figure(time_s: Floats, curves: Sequence[Curve], *, dark: bool = False) -> Figure:
-    """Each curve over time, with a band for its bound; open where there is no number.
+    """Draw each curve over time, with a band for its bound; open where there is no value.
 
     Parameters
     ----------
     time_s
         (rows,).
     curves
-        What is drawn, in order.
+        The curves, in order.
     dark
-        Light on dark.
+        Whether to draw light on dark.
     """
     look = style(dark)
     rows = -(-len(curves) // _COLUMNS)

@@ -37,7 +37,7 @@ _WIDTH = A4[0] - 2 * _MARGIN
 _HEIGHT_MAX = A4[1] - 90 * mm  # of a picture with its caption below a heading
 _TONE = {"ok": "#00734d", "check": "#8a5a00", "alarm": "#b3261e", "differs": "#b3261e", "open": "#5b6775"}
 _LETTERS = 105  # of a listing's line
-_CELL_LINES = 40  # of a table: a cell does not go on over pages
+_CELL_LINES = 40  # of a table: a cell cannot continue on another page
 
 
 def save_pdf(document: Document, path: Path) -> None:
@@ -71,7 +71,7 @@ class _Pages(BaseDocTemplate):  # type: ignore[misc]
         self._sections = 0
 
     def afterFlowable(self, flowable: Flowable) -> None:  # noqa: N802
-        """Each heading becomes an entry of the outline."""
+        """Add each heading to the outline."""
         if isinstance(flowable, Words) and flowable.style.name == "heading":
             name = f"section {self._sections}"
             self._sections += 1
@@ -80,7 +80,7 @@ class _Pages(BaseDocTemplate):  # type: ignore[misc]
 
 
 class _Numbered(Canvas):  # type: ignore[misc]
-    """Pages that know how many they are, which is known only at the end."""
+    """Pages with their total number, which is known only at the end."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -107,7 +107,7 @@ def _foot(canvas: Canvas, text: str) -> None:
 
 
 class _Drawing(Flowable):  # type: ignore[misc]
-    """A figure as wide as the page, or as fits its height."""
+    """A figure as wide as the page, or as its height permits."""
 
     def __init__(self, picture: Picture) -> None:
         super().__init__()
@@ -124,7 +124,7 @@ class _Drawing(Flowable):  # type: ignore[misc]
 
 
 class _Kept(KeepTogether):  # type: ignore[misc]
-    """A picture with the line below it, and how much room they need."""
+    """A picture with its caption and their height."""
 
     def __init__(self, picture: Picture) -> None:
         figure = _Drawing(picture)
@@ -152,7 +152,7 @@ _CODE = _style("code", 7, fontName=FIXED, leading=9)
 
 
 def _words(text: str, style: ParagraphStyle) -> Words:
-    # Paragraphs have a markup of their own, in which a text from the data is to be nothing but text.
+    # Paragraphs have a markup language; text from data must remain plain text.
     return Words(escape(readable(text), quote=False), style)
 
 
@@ -191,7 +191,7 @@ _LINES = [
 
 def _section(section: Section) -> list[Flowable]:
     flow = [flowable for part in section.parts for flowable in _part(part)]
-    # A heading does not stay behind alone: what begins below it is to have room on the same page.
+    # A heading stays with the beginning of its content on the same page.
     begins = section.parts[0] if section.parts else None
     room = flow[0].room if isinstance(begins, Picture) else 30 * mm
     return [CondPageBreak(room + 18 * mm), _words(section.title, _HEADING), *flow]
@@ -219,7 +219,7 @@ def _table(table: Table) -> list[Flowable]:
     if not titled:
         for cells, texts in zip(rows, table.rows):
             cells[0] = _cell(texts[0], _NAME, widths[0])
-    if not rows:  # a grid has a row at least
+    if not rows:  # a grid has at least one row
         return []
     ruled = [*_LINES, ("LINEBELOW", (0, 0), (-1, 0), 0.8, _MUTED)] if titled else _LINES
     grid = Grid(rows, colWidths=widths, style=ruled, repeatRows=int(titled), splitInRow=1, hAlign="LEFT")
@@ -227,7 +227,7 @@ def _table(table: Table) -> list[Flowable]:
 
 
 def _widths(table: Table) -> list[float]:
-    """Columns as wide as their texts, up to what the page has."""
+    """Columns as wide as their texts, limited by the page."""
     if not any(table.headings):
         return [0.24 * _WIDTH, 0.76 * _WIDTH]
     every = [table.headings, *table.rows]

@@ -1,9 +1,8 @@
-"""A Matplotlib figure drawn with a PDF page's own strokes and letters.
+"""A Matplotlib figure as vectors and text of a PDF page.
 
-ReportLab takes neither SVG nor pages of another PDF; svglib, which reads SVG, knows no clip paths and would be one more
-dependency; pixels at 200 dpi are coarse under a magnifier and hold no text to search. Matplotlib asks of a backend only
-to draw a path, an image and a text, so the shortest way keeps all lines sharp and all text searchable: draw on
-ReportLab's canvas.
+ReportLab accepts neither SVG nor pages of another PDF; svglib, which reads SVG, does not support clip paths and would
+be another dependency; an image of 200 dpi is coarse and its text cannot be searched. A Matplotlib backend only has to
+draw a path, an image and a text. This one draws on ReportLab's canvas, so lines are sharp and text is searchable.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
 
 PLAIN, BOLD, FIXED = "DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"
-_RASTER_DPI = 220  # of maps, whose cells are pixels anyway
+_RASTER_DPI = 220  # of maps, whose cells are pixels in any case
 _CAPS = {"butt": 0, "round": 1, "projecting": 2}
 _JOINS = {"miter": 0, "round": 1, "bevel": 2}
 _MOVE, _LINE, _CURVE3, _CURVE4, _CLOSE = 1, 2, 3, 4, 79
 
 
 def register_fonts() -> None:
-    """Make Matplotlib's own fonts, which have the field's letters, known to ReportLab."""
+    """Register Matplotlib's fonts, which contain the required symbols, with ReportLab."""
     folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     for name in (PLAIN, BOLD, FIXED):
         if name not in pdfmetrics.getRegisteredFontNames():
@@ -43,7 +42,7 @@ def register_fonts() -> None:
 
 
 def draw_on(canvas: Canvas, figure: Figure) -> None:
-    """Draw the figure from the canvas's origin on, one point of it for one of the page."""
+    """Draw the figure at the origin of the canvas, one point of it for one point of the page."""
     width_in, height_in = figure.get_size_inches()
     before = figure.dpi
     figure.dpi = 72
@@ -57,7 +56,7 @@ def draw_on(canvas: Canvas, figure: Figure) -> None:
 
 
 class _OnCanvas(RendererBase):
-    """What Matplotlib draws with: a page, in points from its lower left."""
+    """A Matplotlib renderer on a page, in points from the lower left corner."""
 
     def __init__(self, canvas: Canvas, width: float, height: float) -> None:
         super().__init__()
@@ -73,7 +72,7 @@ class _OnCanvas(RendererBase):
         return False
 
     def draw_path(self, gc: Any, path: Curve, transform: Any, rgbFace: Any = None) -> None:
-        # Lines that leave the page are cut there: PDF readers err on coordinates in the millions.
+        # Lines are clipped to the page: PDF readers fail on coordinates in the millions.
         page = None if rgbFace is not None else (0.0, 0.0, self.width, self.height)
         simplify = False if rgbFace is not None else None
         self._paint(gc, rgbFace, path.iter_segments(transform, clip=page, simplify=simplify))
@@ -81,7 +80,7 @@ class _OnCanvas(RendererBase):
     def draw_markers(
         self, gc: Any, marker_path: Curve, marker_trans: Any, path: Curve, trans: Any, rgbFace: Any = None
     ) -> None:
-        """All of them as one shape: thousands of single ones would take seconds."""
+        """Draw all markers as one shape: thousands of single shapes would take seconds."""
         one = [(np.asarray(points), code) for points, code in marker_path.iter_segments(marker_trans, simplify=False)]
         at = [points[-2:] for points, _ in path.iter_segments(trans, simplify=False)]
         inside = [p for p in at if -9 < p[0] < self.width + 9 and -9 < p[1] < self.height + 9]
@@ -158,7 +157,7 @@ def _set_stroke(canvas: Canvas, gc: Any) -> None:
 
 
 def _shape(canvas: Canvas, segments: Any) -> Any:
-    """The path as ReportLab has it; a curve of second order becomes one of third."""
+    """Convert a path for ReportLab; quadratic curves become cubic."""
     shape, x, y = canvas.beginPath(), 0.0, 0.0
     for points, code in segments:
         p = [float(v) for v in points]

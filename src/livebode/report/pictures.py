@@ -1,4 +1,4 @@
-"""The two pictures that every run leaves."""
+"""The two pictures that every run writes."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def save_pictures(
     fitted: Model | None = None,
     dark: bool = False,
 ) -> list[Path]:
-    """Write bode.png and tracking.png into an existing directory and return their paths; see the two figures.
+    """Write bode.png and tracking.png to an existing directory and return their paths.
 
-    The same responses give the same bytes: no date and no version stand in the files.
+    The same responses give the same bytes: the files contain no date and no version.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def save_pictures(
 
 def save(figure: Figure, path: Path, look: Style) -> Path:
     """Write a figure; the same figure gives the same bytes."""
-    path.unlink(missing_ok=True)  # a link in a run that came from anybody would name another file
+    path.unlink(missing_ok=True)  # a symbolic link in a run from a stranger could point to another file
     with drawing(look), quiet_about_letters():
         figure.savefig(path, format="png", metadata={"Software": None})
     return path

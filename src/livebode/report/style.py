@@ -1,7 +1,7 @@
-"""Light and dark: the colours and sizes of every picture, and what text from data needs before it is drawn.
+"""Light and dark: colours and sizes of every picture, and the preparation of text from data.
 
-Figures are made with Matplotlib's objects, never with pyplot, and Matplotlib is imported where a picture is made, so
-that importing livebode stays cheap. Nothing here changes the settings of a program that uses Matplotlib itself.
+Figures use Matplotlib's objects, never pyplot, and Matplotlib is imported when a picture is drawn, so that the import
+of livebode is cheap. The settings of a program that uses Matplotlib itself do not change.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 DPI = 110
-# A line's own marker and error bar are drawn up to this many lines; more would be a hedge, and become a band.
+# Up to this many lines each has a marker and an error bar; more are drawn as a band.
 FEW_LINES = 40
 
 
 @dataclass(frozen=True)
 class Style:
-    """Colours of one look, after Okabe and Ito, so that people who see fewer hues can tell them apart.
+    """Colours of one look, after Okabe and Ito, which people with colour-vision deficiency can distinguish.
 
-    `run` and `newest` are the two of the Bode plot, `traces` one for each line of the tracking plot, in an order in
-    which neighbours differ most.
+    `run` and `newest` are the colours of the Bode plot, `traces` those of the lines of the tracking plot, in an order
+    in which neighbours differ most.
     """
 
     paper: str
@@ -78,7 +78,7 @@ def style(dark: bool) -> Style:
 
 @contextmanager
 def drawing(look: Style) -> Iterator[None]:
-    """Matplotlib's own defaults with this look, whatever the user's matplotlibrc says; undone at the end."""
+    """Use Matplotlib's defaults with this look, whatever the user's matplotlibrc is; restore settings afterwards."""
     import matplotlib
 
     settings: Any = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith("backend")}
@@ -125,7 +125,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def heading(figure: Figure, look: Style, title: str, facts: str, left: float) -> None:
-    """Title and a line of facts at the upper left, in inches from the top, so that every picture has the same head."""
+    """Draw title and a line of facts at the upper left, in inches from the top: all pictures have the same head."""
     width_in, height_in = figure.get_size_inches()
     for text, down_in, size, weight, colour in (
         (title, 0.36, 13, "bold", look.ink),
@@ -136,7 +136,7 @@ def heading(figure: Figure, look: Style, title: str, facts: str, left: float) ->
 
 
 def _fit(line: Text, text: str, width_px: float) -> None:
-    """Write `text` with as many letters as are not wider than `width_px`."""
+    """Draw `text`, shortened to at most `width_px`."""
     line.set_text(text)
     with quiet_about_letters():
         while len(text) > 8 and (measured := line.get_window_extent().width) > width_px:
@@ -146,14 +146,14 @@ def _fit(line: Text, text: str, width_px: float) -> None:
 
 @contextmanager
 def quiet_about_letters() -> Iterator[None]:
-    """A name from the data may hold letters that the font has not; they show as boxes, which is no reason to warn."""
+    """Suppress warnings about characters that the font lacks: names from data may contain them; they show as boxes."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 
 def plain(axes: Axes, grid: bool = True) -> None:
-    """The look of one panel: a quiet grid behind the data, short ticks."""
+    """Set the look of one panel: a light grid behind the data, short ticks."""
     axes.tick_params(length=3.5, width=0.8)
     axes.tick_params(which="minor", length=2.0, width=0.6)
     axes.set_axisbelow(True)
@@ -166,10 +166,10 @@ def empty_note(axes: Axes, look: Style, text: str = "no valid response") -> None
 
 
 def shortened(text: str, letters: int) -> str:
-    """One line of at most `letters` columns: control characters become spaces, and the middle gives way.
+    """One line of at most `letters` columns: control characters become spaces, and the middle is removed.
 
-    >>> shortened("a channel name that goes on", 15)
-    'a chann…goes on'
+    >>> shortened("a channel with a long name", 15)
+    'a chann…ng name'
     """
     text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     if columns(text) <= letters:
@@ -187,5 +187,5 @@ def shortened(text: str, letters: int) -> str:
 
 
 def columns(text: str) -> int:
-    """Width in columns of a terminal or in letters of the usual width; wide (East Asian) ones count twice."""
+    """Width in columns of a terminal or in letters of normal width; wide (East Asian) letters count twice."""
     return sum(2 if unicodedata.east_asian_width(c) in "WF" else 0 if unicodedata.combining(c) else 1 for c in text)

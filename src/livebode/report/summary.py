@@ -1,9 +1,9 @@
-"""What a run comes to, line by line: the middle, the span, and the newest response.
+"""The result of a run at each line: median, range, and newest response.
 
-The middle is the median over the valid responses, taken apart for magnitude and phase. A machine that moves changes
-its response; the complex mean would then round off a peak that wanders, the more the sharper it is, and one spike
-moves it. The median does neither, and always lies in the span drawn around it. It is biased upwards where the noise is
-as large as the response itself: there the bound says so.
+The median over the valid responses is taken separately for magnitude and phase. The response of a machine in motion
+changes; the complex mean would flatten a moving peak, the more the sharper it is, and a single spike shifts it. The
+median avoids both and is always within the drawn range. It is biased upwards where the noise is as large as the
+response itself; the bound shows this.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from livebode.core import Response, Responses
 
 Floats = NDArray[np.float64]
 
-# The probability of ±3 standard deviations of a normal number, given to the circle around a complex response.
+# The probability of ±3 standard deviations of a normal variable, used for the circle around a complex response.
 PROBABILITY = 0.9973
 BOUND_C = sqrt(-log(1 - PROBABILITY))
 MEAN_PROBABILITY = 0.95
 MEAN_C = sqrt(-log(1 - MEAN_PROBABILITY))
 SPAN = (0.05, 0.95)
-# The middle of an unwrapped phase curve lies between −225° and 135°: the cut is as far as can be from the angles at
-# which machines dwell (multiples of 90°, a little late), so that noise does not turn a curve by a whole turn.
+# The middle of an unwrapped phase curve is between −225° and 135°: the cut is as far as possible from the usual angles
+# of machines (multiples of 90°, with a small delay), so that noise does not shift a curve by a whole turn.
 _TURN_FROM_DEG = -225.0
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Low, middle and high over the run, each of shape (3, lines); NaN for a line that was never valid.
+    """5 %, 50 % and 95 % quantiles over the run, each of shape (3, lines); NaN for a line that was never valid.
 
     `magnitude_db` in dB, `phase_deg` unwrapped along frequency, `coherence` between 0 and 1. `newest` is the last row
-    in which any line is valid, and None where there is none; `newest_phase_deg` is on the branch of the middle.
+    in which any line is valid, or None; `newest_phase_deg` is on the branch of the median.
     """
 
     responses: Responses
@@ -49,9 +49,9 @@ class Summary:
 
 
 def summarised(responses: Responses, mean: Response | None = None) -> Summary:
-    """Middle, span and newest of a run; never raises, whatever is missing.
+    """Compute median, range and newest response of a run; never raises, whatever is missing.
 
-    With a `mean` of the run that stands in place of the newest, with the bound that holds with 95 %.
+    A `mean` of the run replaces the newest response, with its 95 % bound.
     """
     use = usable(responses)
     value = np.where(use, responses.value, np.nan)
@@ -80,7 +80,7 @@ def summarised(responses: Responses, mean: Response | None = None) -> Summary:
 
 
 def usable(responses: Responses) -> NDArray[np.bool_]:
-    """Where a response can be drawn: valid, finite and not zero, shape (rows, lines)."""
+    """Mask of the values that can be drawn: valid, finite and not zero, shape (rows, lines)."""
     return np.asarray(responses.valid & np.isfinite(responses.value) & (responses.value != 0))
 
 
@@ -114,8 +114,8 @@ def quantiles(values: Floats) -> Floats:
 def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
     """Phase along frequency without jumps of whole turns; shape (lines,), degrees.
 
-    Lines whose phase nothing is known about (`weak`: the bound is larger than the response) follow the others and do
-    not lead them, so that noise cannot wind the curve up.
+    Lines with an unknown phase (`weak`: the bound is larger than the response) follow the others, so that noise cannot
+    add turns to the curve.
     """
     known = np.isfinite(phase_deg)
     lead = known & ~weak if np.any(known & ~weak) else known

@@ -1,4 +1,4 @@
-"""A figure as SVG that stands in a page: its colours follow the page's light or dark, its text stays text."""
+"""A figure as SVG in a page: its colours follow the light or dark page, and its text remains text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _PROLOGUE = re.compile(r"^.*?(?=<svg)", re.S)
 _METADATA = re.compile(r"<metadata>.*?</metadata>", re.S)
 _SIZE = re.compile(r'<svg [^>]*?viewBox="([^"]+)"[^>]*>')
-# What is referred to by others is in <defs>, or a clip path; all other names repeat from figure to figure.
+# Only names in <defs> and of clip paths are referenced; all other names repeat from figure to figure.
 _NAMED = re.compile(r'<g id="[^"]*">')
 _STYLE = re.compile(r'style="[^"]*"')
 _COLOUR = re.compile(r"#[0-9a-f]{6}")
@@ -27,11 +27,11 @@ def inline_svg(figure: Figure, label: str, salt: str) -> str:
     Parameters
     ----------
     figure
-        Of `LIGHT`; its colours become the variables of `variables`.
+        Drawn with `LIGHT`; its colours become the variables of `variables`.
     label
-        What it shows, for who cannot see it; escaped already.
+        Text alternative for screen readers; already escaped.
     salt
-        Tells the names within it from those of the page's other figures.
+        Makes the names in it different from those of the other figures of the page.
     """
     import matplotlib
 
@@ -45,14 +45,14 @@ def inline_svg(figure: Figure, label: str, salt: str) -> str:
 
 
 def variables(look: Style) -> str:
-    """The page's colours in this look, as CSS variables, named after those of the light one."""
+    """The colours of this look as CSS variables, named after those of the light look."""
     return " ".join(f"--c{light[1:]}: {own};" for light, own in _pairs(look).items())
 
 
 def _pairs(look: Style) -> dict[str, str]:
     names = ("paper", "muted", "grid", "nothing")
     found = dict(zip(LIGHT.traces, look.traces))
-    # Last, so that a colour that is a trace's too is in the dark what its main use is.
+    # Last, so that a colour that a trace shares gets the dark colour of its main use.
     named = ("ink", "run", "newest", *names)
     return found | {getattr(LIGHT, name): getattr(look, name) for name in named}
 

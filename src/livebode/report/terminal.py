@@ -1,7 +1,7 @@
-"""A Bode plot in characters, for the terminal in which a run has just ended.
+"""A Bode plot in characters, for the terminal at the end of a run.
 
-plotext draws it on a figure of its own that hangs on a terminal of its own, so nothing is left behind in plotext's
-module-wide one and two calls give the same text.
+plotext draws on a separate figure with a separate terminal object, so no state remains in its module-wide figure, and
+two calls give the same text.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ _PLAIN = str.maketrans(
 def terminal_bode(
     responses: Responses, width: int = 80, height: int = 24, colour: bool = True, unicode: bool = True
 ) -> str:
-    """Magnitude in dB over phase in degrees over logarithmic frequency: the medians over the run, as text.
+    """Magnitude in dB above phase in degrees over logarithmic frequency: the medians over the run, as text.
 
     Parameters
     ----------
     width, height
-        Columns and lines of the terminal; the text is never wider or higher. Below 40 × 16, and where no response is
-        valid, one sentence takes the picture's place.
+        Columns and lines of the terminal; the text is never wider or higher. Below 40 × 16, and if no response is
+        valid, one sentence replaces the plot.
     colour
-        With ANSI colours.
+        Whether to use ANSI colours.
     unicode
-        False keeps to ASCII, for terminals whose encoding is not UTF-8.
+        False uses only ASCII, for terminals whose encoding is not UTF-8.
     """
     summary = summarised(responses)
     middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'valid response')}"
@@ -64,7 +64,7 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
     figure.subplots(2, 1)
     figure.theme("colorless")
     magnitude_db, phase_deg = summary.magnitude_db[1], summary.phase_deg[1]
-    upper = -(-(height - 1) * 5 // 9)  # the lower panel carries one line more, the frequency's label
+    upper = -(-(height - 1) * 5 // 9)  # the lower panel has one more line, the label of the frequency
     rows = max((upper - 2) // 2, 2)
     ranges = [_range(magnitude_db, 1.0), _range(phase_deg, 5.0)]
     ticks_at = [ticks.linear_ticks(*ranges[0], most=rows), ticks.phase_ticks(*ranges[1], most=max(rows - 1, 2))]
@@ -86,7 +86,7 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
 
 
 def _frequency_ruler(panel: Any, summary: Summary, canvas: int) -> None:
-    """Ticks at round frequencies; positions are logarithms, for plotext's own log scale labels powers of ten."""
+    """Ticks at round frequencies; positions are logarithms, because plotext's log scale labels only powers of ten."""
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
     at = ticks.line_ticks(summary.responses.lines.frequency_hz, low_hz, high_hz, most=max(3, min(10, canvas // 9)))
     panel.ruler(0, 0).lim(float(np.log10(low_hz)), float(np.log10(high_hz))).ticks(
@@ -95,7 +95,7 @@ def _frequency_ruler(panel: Any, summary: Summary, canvas: int) -> None:
 
 
 def _curve(panel: Any, frequency_hz: Floats, values: Floats, width: int, colour: bool, unicode: bool) -> None:
-    """The curve between neighbouring lines, broken at lines without a value, and a dot at each line if they are few."""
+    """Draw the curve, interrupted at lines without a value, and a dot at each line if they are few."""
     from plotext import marker, pixel
 
     known = np.isfinite(values)
@@ -117,7 +117,7 @@ def _range(values: Floats, least: float) -> tuple[float, float]:
 
 
 def _written(text: str, width: int | None = None, unicode: bool = False) -> str:
-    """Text as this terminal can show it, in at most `width` columns; what ASCII has not becomes a question mark."""
+    """Text in at most `width` columns; without Unicode, characters outside ASCII become question marks."""
     if not unicode:
         text = text.translate(_PLAIN).encode("ascii", "replace").decode()
     if width is not None:

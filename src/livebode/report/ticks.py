@@ -1,4 +1,4 @@
-"""Ticks that an engineer would choose: 20, 50, 100, 200 Hz in plain numbers, decibels and degrees in round steps."""
+"""Ticks as engineers draw them: 20, 50, 100, 200 Hz in plain numbers, decibels and degrees in round steps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-# From the most welcome to the last resort.
+# In order of preference.
 _MANTISSAS = ((1.0, 2.0, 5.0), (1.0, 2.0, 3.0, 5.0, 7.0), (1.0, 3.0), (1.0,))
 
 
@@ -33,7 +33,7 @@ def frequency_ticks(low_hz: float, high_hz: float, most: int = 10) -> list[float
 
 
 def line_ticks(frequency_hz: np.ndarray, low_hz: float, high_hz: float, most: int = 10) -> list[float]:
-    """The measured lines themselves where they are few and have room for a number each, else round frequencies.
+    """The measured lines if there is room for a number at each, otherwise round frequencies.
 
     >>> line_ticks(np.array([20.0, 40.0, 80.0]), 18, 90)
     [20.0, 40.0, 80.0]
@@ -56,7 +56,7 @@ def minor_frequency_ticks(low_hz: float, high_hz: float) -> list[float]:
 
 
 def frequency_label(frequency_hz: float) -> str:
-    """Plain number; from 100 kHz on with k or M.
+    """Plain number; from 100 kHz with k or M.
 
     >>> [frequency_label(f) for f in (0.05, 20, 2000, 12345.6, 200e3, 1.5e6)]
     ['0.05', '20', '2000', '12345.6', '200k', '1.5M']
@@ -89,7 +89,7 @@ def nice_step(least: float) -> float:
 
 
 def phase_ticks(low_deg: float, high_deg: float, most: int = 8) -> list[float]:
-    """Multiples of a step in which quarter turns are met: 10, 15, 30, 45, 90, 180 degrees, then whole turns.
+    """Multiples of a step that divides a quarter turn, 10, 15, 30, 45, 90, or of 180 degrees or whole turns.
 
     >>> phase_ticks(-200, 100)
     [-180.0, -135.0, -90.0, -45.0, 0.0, 45.0, 90.0]

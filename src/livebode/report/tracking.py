@@ -1,4 +1,4 @@
-"""How the magnitude of each line went: against time, and against the scheduling signal where there is one."""
+"""Magnitude of each line over time, and over the schedule if there is one."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# More traces than this cannot be told apart by colour and label; time × frequency maps take over.
+# More traces than this cannot be distinguished by colour and label; maps are drawn instead.
 TRACES_MAX = 10
-# A step in time this many times the usual one is a hole in the recording and not drawn across.
+# A step in time this many times the usual one is a gap in the recording; no line is drawn across it.
 _HOLE_STEPS = 2.5
 
 
 def tracking_figure(
     responses: Responses, *, title: str = "", schedule_name: str = "", dark: bool = False, width_in: float | None = None
 ) -> Figure:
-    """Magnitude of every line in dB against time and, where the run has one that varies, the scheduling signal.
+    """Magnitude of every line in dB over time and, if the run has a schedule that varies, over the schedule.
 
-    Up to ten lines are traces with the bound that holds the truth with a probability of 99.7 % as a light band, each
-    named at its end. Against the scheduling signal they are points, full while it rises and hollow while it falls,
-    because what a moving machine shows on the way back differs. More lines become maps over frequency: the magnitude,
-    and below it the change against the median of the run. Stretches without a valid response stay open.
+    Up to ten lines are traces with a light band, the bound that covers the true value with a probability of 99.7 %,
+    each labelled at its end. Over the schedule they are points, filled while it rises and hollow while it falls,
+    because the response of a moving machine depends on the direction. More lines become maps over frequency: the
+    magnitude, and below it the change from the median of the run. Intervals without a valid response remain open.
 
     Parameters
     ----------
     responses
         (rows, lines); may be thinned, partly or wholly invalid, or empty.
     title
-        Heading, from the recording; shortened where it does not fit.
+        Heading, from the recording; shortened if it does not fit.
     schedule_name
         Name of the scheduling signal with its unit, for the axis.
     dark
-        Light on dark.
+        Whether to draw light on dark.
     width_in
-        Of the picture; 9.5 inches, or 12 with a schedule, unless said.
+        Width of the picture; default: 9.5 inches, or 12 with a schedule.
     """
     look = style(dark)
     use = usable(responses)
@@ -57,7 +57,7 @@ def tracking_figure(
         figure = new_figure(width_in or (12.0 if schedule else 9.5), 7.0 if mapped else 5.6)
         left = 0.78 / figure.get_size_inches()[0]
         said = words.facts(responses, int(use.any(axis=1).sum())) + (
-            " · grey: nothing valid there" if mapped and use.any() else ""
+            " · grey: no valid response" if mapped and use.any() else ""
         )
         heading(figure, look, title or "Tracking", said, left)
         if not use.any():
@@ -70,7 +70,7 @@ def tracking_figure(
 
 
 def scheduled(responses: Responses, use: NDArray[np.bool_]) -> bool:
-    """True where the scheduling signal takes at least two values at valid responses."""
+    """Whether the scheduling signal has at least two values at valid responses."""
     at = responses.schedule[use.any(axis=1)]
     at = at[np.isfinite(at)]
     return bool(at.size > 1 and at.max() > at.min())
@@ -120,7 +120,7 @@ def _traces(
 
 
 def bounds_db(value: NDArray[np.complex128], bound: Floats) -> Floats:
-    """Lower and upper bound of the magnitude in dB, shape (2, rows, lines); −1000 dB where zero is within it."""
+    """Lower and upper bound of the magnitude in dB, shape (2, rows, lines); −1000 dB if the bound contains zero."""
     size = np.abs(value)
     return np.array([np.maximum(decibels(np.maximum(size - bound, 0.0)), -1000.0), decibels(size + bound)])
 
@@ -146,7 +146,7 @@ def _against_time(
 
 
 def with_holes(time_s: Floats, columns: list[Floats]) -> tuple[Floats, list[Floats]]:
-    """A NaN row wherever time jumps, so that no line is drawn across a gap of the recording."""
+    """Insert a NaN row at each jump of the time, so that no line is drawn across a gap of the recording."""
     steps = np.diff(time_s)
     usual = float(np.median(steps)) if steps.size else 0.0
     at = np.flatnonzero((steps > _HOLE_STEPS * usual) | (steps < 0)) + 1 if usual > 0 else np.zeros(0, dtype=np.intp)
@@ -164,7 +164,7 @@ def _against_schedule(
     x = responses.schedule
     falling = is_falling(x)
     size = float(np.clip(60.0 / np.sqrt(max(len(x), 1)), 2.0, 4.5))
-    faint = float(np.clip(64.0 / max(len(x), 1), 0.04, 0.16))  # many strokes lie on top of each other
+    faint = float(np.clip(64.0 / max(len(x), 1), 0.04, 0.16))  # many strokes overlap
     for i, colour in enumerate(colours):
         known = np.isfinite(bounds[0][:, i]) & np.isfinite(x)
         axes.vlines(
@@ -186,7 +186,7 @@ def _against_schedule(
 
 
 def is_falling(schedule: Floats) -> NDArray[np.bool_]:
-    """True for rows in which the scheduling signal goes down; a row at rest keeps the direction before it."""
+    """Mask of the rows in which the scheduling signal falls; a row at standstill has the previous direction."""
     known = np.flatnonzero(np.isfinite(schedule))
     falling = np.zeros(len(schedule), dtype=bool)
     if known.size < 2:
@@ -211,7 +211,7 @@ def _limits(axes: Axes, magnitude_db: Floats, bounds: Floats) -> None:
 
 
 def _name_lines(axes: Axes, responses: Responses, magnitude_db: Floats, colours: tuple[str, ...]) -> None:
-    """Each line's frequency at the right edge, at the height where it ended, moved apart where they would touch."""
+    """Label each trace with its frequency at the right edge, at its last value; shift labels that would overlap."""
     low, high = axes.get_ylim()
     height_pt = axes.get_position().height * axes.figure.get_size_inches()[1] * 72  # type: ignore[union-attr]
     ended = [(i, c[np.isfinite(c)][-1]) for i, c in enumerate(magnitude_db.T) if np.isfinite(c).any()]
@@ -232,7 +232,7 @@ def _name_lines(axes: Axes, responses: Responses, magnitude_db: Floats, colours:
 
 
 def spread(wanted: Floats, apart: float) -> Floats:
-    """Positions at least `apart` from each other, in the same order, as near as can be to those wanted in 0 … 1.
+    """Positions at least `apart` from each other, in the same order, as near as possible to the given ones in 0 … 1.
 
     >>> spread(np.array([0.5, 0.52, 0.9]), 0.1)
     array([0.46, 0.56, 0.9 ])

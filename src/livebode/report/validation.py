@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from livebode.validation import Correlation, Validation
 
 _SHOWN = 600  # samples of the output
-_CLIPPED = 4.0  # times the limit: larger correlations stop at the edge, with a mark
+_CLIPPED = 4.0  # times the limit: larger correlations are clipped at the edge, with a mark
 
 
 def save_validation_picture(
     found: Sequence[Validation], directory: str | PathLike[str], *, title: str = "", dark: bool = False
 ) -> Path:
-    """Write validation.png into an existing directory."""
+    """Write validation.png to an existing directory."""
     return save(validation_figure(found, title=title, dark=dark), Path(directory) / "validation.png", style(dark))
 
 
@@ -35,10 +35,10 @@ def validation_figure(
 ) -> Figure:
     """A row for each model: the last samples of the output, and the correlations over the lags.
 
-    `folded` puts the correlations below the output, for a page that is not as wide.
+    `folded` puts the correlations below the output, for a narrow page.
 
-    The band holds 97 % of what chance makes at a lag, the dashed lines are 2.17/√L. Lags that cannot tell a wrong
-    model are thin; a triangle at the edge stands for a correlation that goes on beyond it.
+    The band contains 97 % of random correlations at a lag; the dashed lines are ±2.17/√L. Lags that cannot detect a
+    wrong model are thin; a triangle at the edge marks a correlation beyond it.
     """
     look = style(dark)
     columns = max(len(v.correlations) for v in found)
@@ -47,7 +47,7 @@ def validation_figure(
             figure, grid = _grid(9.0, 2 * len(found), columns, [1.0] * columns)
         else:
             figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(found), columns + 1, [1.5, *[1.0] * columns])
-        facts = f"{found[0].samples} samples · band: 97 % of chance at each lag · dashed: 2.17/√L"
+        facts = f"{found[0].samples} samples · band: 97 % of random correlations at each lag · dashed: 2.17/√L"
         heading(figure, look, title or "Validation", facts, 0.7 / figure.get_size_inches()[0])
         for row, one in enumerate(found):
             last, below = row == len(found) - 1, 2 * row + 1 if folded else row

@@ -1,4 +1,4 @@
-"""What pictures say about a run in words: the quantity, its unit, how much was valid."""
+"""Texts of the pictures: the quantity, its unit, how much is valid."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def quantity(responses: Responses) -> str:
 
 
 def magnitude_label(responses: Responses, letters: int = 60) -> str:
-    """The magnitude with the unit that 0 dB stands for."""
+    """The label of the magnitude, with the unit of 0 dB."""
     return shortened(f"magnitude in dB re 1 {responses.unit}" if responses.unit else "magnitude in dB", letters)
 
 
 def lines_phrase(responses: Responses) -> str:
-    """How many lines and where they lie."""
+    """Number of lines and their range."""
     f = responses.lines.frequency_hz
     if len(f) == 1:
         return f"1 line, {frequency_label(f[0])} Hz"
@@ -33,13 +33,13 @@ def lines_phrase(responses: Responses) -> str:
 
 
 def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None = None) -> str:
-    """The line below the title: quantity, channels, lines, and how much was valid."""
+    """The line below the title: quantity, channels, lines, and how much is valid."""
     path = f" from {shortened(names[0], 30)} to {shortened(names[1], 30)}" if names else ""
     return f"{quantity(responses)}{path} · {lines_phrase(responses)} · {valid_rows} of {counted(len(responses))} valid"
 
 
 def clock(time_s: np.ndarray) -> tuple[float, str]:
-    """Origin to subtract from times and the label that says so: seconds since 1970 are no ticks for an axis."""
+    """Origin to subtract from times, with the label: seconds since 1970 are unreadable as ticks."""
     finite = time_s[np.isfinite(time_s)]
     first, last = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     if abs(first) < _CLOCK_FROM_S or last - first > abs(first) / 10:

@@ -16,7 +16,7 @@ export class Bode {
     this.line = 0;
   }
 
-  // Begin anew on these lines.
+  // Start again with these lines.
   begin(facts, unit, symbol) {
     this.clear();
     this.lines = facts.frequency_hz;
@@ -36,7 +36,7 @@ export class Bode {
     ];
   }
 
-  // Nothing is shown until the next beginning.
+  // Show nothing until the next `begin`.
   clear() {
     for (const made of this.charts) made.destroy();
     this.charts = [];
@@ -134,7 +134,7 @@ export class Bode {
     const known = sure.some((values) => values.some(Number.isFinite));
     const edges = drawn.flatMap((curve) => [`${key}High`, `${key}Low`].map((edge) => by(curve, curve[edge])));
     const all = drawn.map((curve) => by(curve, curve[key]));
-    // A measured point is drawn whether it is sure or not; only its band may leave the picture.
+    // A measured point is always in the picture; only its band may leave it.
     const points = drawn.flatMap((curve, i) => (curve === this.curves.measured ? [all[i]] : []));
     return this.ranges[index](...extent(known ? [...sure, ...points] : all, [...edges, ...all], index ? 10 : 3));
   }

@@ -1,4 +1,4 @@
-// What all charts share: colours, letters, ticks, and ranges that do not jump.
+// Common parts of the charts: colours, letters, ticks, and ranges that do not jump.
 import uPlot from "/static/uplot/uPlot.esm.js";
 import { colour, onTheme } from "./theme.js";
 import { hertz } from "./words.js";
@@ -25,7 +25,7 @@ export function axis(label, more = {}) {
   };
 }
 
-// Round frequencies on a logarithmic axis: the lines themselves where they are few, else 1, 2, 5 of every decade.
+// Round frequencies on a logarithmic axis: the lines themselves if they are few, otherwise 1, 2, 5 of every decade.
 export function frequencyTicks(lines) {
   return (u, _axis, low, high) => {
     const inside = lines().filter((f) => f >= low && f <= high);
@@ -53,7 +53,7 @@ export const frequencyAxis = (lines, label) =>
     values: (_u, splits) => splits.map((f) => (label ? hertz(f) : "")),
   });
 
-// A range that grows at once and shrinks only after a while, so that the eye can rest.
+// A range that grows immediately and shrinks after a delay, so that the picture is steady.
 export function steady({ step, least, holdMs = 2500 }) {
   let kept = null,
     since = 0;

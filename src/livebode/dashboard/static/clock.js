@@ -1,4 +1,4 @@
-// Moments of a run: time of day in the viewer's zone where the run has a clock, else the run's own time in s.
+// Times of a run: time of day in the viewer's zone if the run has a clock, otherwise the run's own time in s.
 const PLAIN = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" };
 const format = (more) => new Intl.DateTimeFormat("en-GB", { ...PLAIN, ...more });
 const TIME = format({}),
@@ -7,7 +7,7 @@ const TIME = format({}),
   DAY = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short" }), // year-month-day
   ZONE = format({ timeZoneName: "short" });
 
-let clock = []; // from which second of the run on, and seconds since 1970 at its second 0, as it is from there
+let clock = []; // pairs: second of the run from which it is valid, and seconds since 1970 at second 0 of the run
 
 // Whether another clock is used from here on.
 export function setClock(pieces) {
@@ -20,7 +20,7 @@ const originS = (timeS) => (clock.findLast(([fromS]) => fromS <= timeS) ?? clock
 const dateOf = (timeS) => new Date(1000 * (timeS + originS(timeS)));
 const zoneOf = (date) => ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName").value;
 
-// For a sentence: "14:32:07 CEST", with its date where that is not today's; `fine` with hundredths.
+// For a sentence: "14:32:07 CEST", with its date if that is not today; `fine` with hundredths.
 export function moment(timeS, fine = false) {
   if (!Number.isFinite(timeS)) return "–";
   if (!clock.length) return seconds(timeS);

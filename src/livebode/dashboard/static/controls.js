@@ -1,4 +1,4 @@
-// Buttons, tabs, downloads and keys: what the person can press.
+// Buttons, tabs, downloads and keys.
 import { moment } from "./clock.js";
 import { Menu, numbers, picture } from "./download.js";
 import { keys } from "./keys.js";
@@ -14,7 +14,7 @@ const TABS = [
 const SPANS = [
   ["20", "20 s"],
   ["120", "2 min"],
-  ["whole", "whole"],
+  ["whole", "all"],
 ];
 
 export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain }) {
@@ -108,7 +108,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     const [from, to] = whole ? [tracking.fromS, tracking.toS] : [at, at];
     return { axis: page.axis, quantity: page.quantity, format, from, to };
   };
-  const ready = (act) => () => (page.facts.begun ? act() : complain("the run has not begun"));
+  const ready = (act) => () => (page.facts.begun ? act() : complain("The run has not started."));
   const get = (format, whole) =>
     numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) =>
       complain(error.message),
@@ -127,8 +127,8 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     ],
     ["this response as CSV", ready(() => get("csv", false))],
     ["this response as .mat", ready(() => get("mat", false))],
-    ["every response in the tracking's span as CSV", ready(() => get("csv", true))],
-    ["every response in the tracking's span as .mat", ready(() => get("mat", true))],
+    ["all responses in the time span as CSV", ready(() => get("csv", true))],
+    ["all responses in the time span as .mat", ready(() => get("mat", true))],
   ]);
   $("axis").addEventListener("change", () => {
     page.axis = page.wanted = Number($("axis").value);
@@ -150,22 +150,22 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     $("keys-list"),
     [
       [["?"], "this help", () => $("keys").showModal()],
-      [[" "], "pause, and go on", () => timeline.toggle()],
-      [["←", "→"], "the line under the cursor", null],
-      [[",", "."], "a tenth of a second back and forth in the record", null],
+      [[" "], "pause or resume", () => timeline.toggle()],
+      [["←", "→"], "move the cursor to the next line", null],
+      [[",", "."], "0.1 s backward or forward in the record", null],
       [["1", "2", "3", "4"], "plant, open loop, closed loop, sensitivity", null],
-      [["F"], "freeze this curve as a reference, and let it go", freeze],
+      [["F"], "freeze this curve as a reference, or release it", freeze],
       [["M", "P", "G"], "map, parameters, margins", null],
       [
         ["A"],
-        "alarms only, and to the events",
+        "alarms only; go to the events",
         () => {
           $("alarms-only").click();
           $("events").focus();
         },
       ],
       [["D"], "download", () => menu.show(true)],
-      [["0"], "the whole band of frequencies", () => bode.zoom(bode.whole)],
+      [["0"], "full frequency band", () => bode.zoom(bode.whole)],
       [["T"], "light or dark", nextTheme],
     ],
     {

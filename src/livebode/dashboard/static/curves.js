@@ -3,8 +3,8 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 
 export const NAMES = ["measured", "reference", "baseline", "model"];
 
-// From a frame at the lines or on the grid to arrays over the grid; between lines `undefined` (spanned), where a line
-// is not valid `null` (a gap).
+// From a frame at the lines or on the grid to arrays over the grid; between lines `undefined` (connected), at an
+// invalid line `null` (a gap).
 export function overGrid(frame, grid, at) {
   const whole = frame.columns === grid.length && frame.kind === "model";
   const spread = (of) => {
@@ -23,7 +23,7 @@ export function overGrid(frame, grid, at) {
     deg: spread((i) => phase[i]),
     degHigh: spread((i) => phase[i] + halfDeg(reach[i])),
     degLow: spread((i) => phase[i] - halfDeg(reach[i])),
-    // What can be told from zero: of a curve beside the measured one, the rest must not set the scale.
+    // Values that differ from zero; other values of an overlaid curve must not set the scale.
     dbSure: spread((i) => (reach[i] >= 1 ? NaN : magnitude[i])),
     degSure: spread((i) => (reach[i] >= 1 ? NaN : phase[i])),
     coherence: spread((i) => coherence[i]),
@@ -31,7 +31,7 @@ export function overGrid(frame, grid, at) {
   };
 }
 
-// Whole turns by which a curve's phase is to be moved so that it lies beside another one, degrees.
+// Whole turns that shift the phase of a curve next to that of another one, degrees.
 export function turns(curve, beside) {
   const away = [];
   for (let i = 0; i < curve.deg.length; i++) {
@@ -45,7 +45,7 @@ export function turns(curve, beside) {
 
 export const moved = (values, by) => (by === 0 ? values : values.map((v) => (Number.isFinite(v) ? v + by : v)));
 
-// Lowest and highest of what is drawn, and of its bounds as far as they do not squeeze the rest to a stripe.
+// Lowest and highest drawn value, with bounds as far as they leave room for the rest.
 export function extent(curves, edges, room) {
   let low = Infinity,
     high = -Infinity;

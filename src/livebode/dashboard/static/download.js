@@ -1,4 +1,4 @@
-// Downloads: the picture from the canvases, numbers from the server, where they are exact.
+// Downloads: the picture from the canvases, the exact numbers from the server.
 import { element } from "./make.js";
 import { colour } from "./theme.js";
 
@@ -8,7 +8,7 @@ function save(name, blob) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// The Bode plot as it stands, with a title, as a PNG.
+// The displayed Bode plot with a title, as a PNG.
 export async function picture(name, title, words, charts) {
   const ratio = devicePixelRatio,
     head = 54 * ratio;

@@ -1,4 +1,4 @@
-// Events, one row for each cause, newest first; those that a person should act on can be acknowledged.
+// Events, one row for each cause, newest first; alarms can be acknowledged.
 import { element } from "./make.js";
 import { post } from "./link.js";
 import { moment } from "./clock.js";
@@ -74,7 +74,7 @@ export class Events {
   item(notice, alarm) {
     const { id, cause, kind, first_s: firstS, last_s: lastS, message, count, seen } = notice;
     const open = seen < count;
-    let act = element("span", {}, open ? "" : "✓ seen");
+    let act = element("span", {}, open ? "" : "✓ acknowledged");
     if (open && this.may && alarm) {
       act = element(
         "button",

@@ -1,4 +1,4 @@
-// A finger that goes across a chart chooses a band; two taps show the whole.
+// A finger that is dragged across a chart selects a band; two taps show the full band.
 export function byFinger(u, choose, whole) {
   let from = null,
     tapped = -1e9;

@@ -1,13 +1,13 @@
-// Frames from the server as typed arrays; the layout is written down in frames.py.
+// Frames from the server as typed arrays; frames.py documents the layout.
 const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history"];
 export const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
 
-// All frames in a message, one behind the other.
+// All frames of a message, in order.
 export function* framesOf(buffer) {
   const view = new DataView(buffer);
   let at = 0;
   while (at + 16 <= buffer.byteLength) {
-    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1) throw new Error("this is no frame of curves");
+    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1) throw new Error("this is not a frame of curves");
     const rows = view.getUint32(at + 8, true),
       columns = view.getUint32(at + 12, true),
       cells = rows * columns;
@@ -43,5 +43,5 @@ const FLOOR_DB = -1000;
 export const lowDb = (db, reach) => (reach < 1 ? db + 20 * Math.log10(1 - reach) : reach >= 1 ? FLOOR_DB : NaN);
 export const highDb = (db, reach) => db + 20 * Math.log10(1 + reach);
 export const halfDeg = (reach) => (reach < 1 ? (180 / Math.PI) * Math.asin(reach) : reach >= 1 ? 180 : NaN);
-// The probability that the band holds the truth: |error|²/σ² follows F(2, 2·dof).
+// The probability that the band covers the true value: |error|²/σ² follows F(2, 2·dof).
 export const holds = (dof) => (Number.isFinite(dof) ? 1 - (1 + 9 / dof) ** -dof : 1 - Math.exp(-9));

@@ -1,6 +1,6 @@
-// The frozen reference: this moment's response, kept beside what follows.
+// The frozen reference: a response that remains in the plot.
 export const REFERENCE_GONE =
-  "A new run has begun with other lines or another quantity: the frozen reference was let go.";
+  "A new run with other lines or another quantity has started: the frozen reference was released.";
 
 export function freezing(page, { bode, link }, button, legend) {
   function freeze() {

@@ -1,4 +1,4 @@
-// How the source and the tracking are doing, in one line.
+// State of the source and of the tracking, in one line.
 import { element } from "./make.js";
 import { plain } from "./words.js";
 
@@ -14,7 +14,7 @@ export function health(host, found, facts, span) {
   const measured = source?.measured_hz;
   tile(
     "rate",
-    `${plain(facts.rate_hz, 6)} Hz${measured ? `, comes with ${plain(measured, 5)} Hz` : ""}`,
+    `${plain(facts.rate_hz, 6)} Hz${measured ? `, measured ${plain(measured, 5)} Hz` : ""}`,
     measured && Math.abs(measured / facts.rate_hz - 1) > 0.02,
     "samples per second",
   );
@@ -31,13 +31,13 @@ export function health(host, found, facts, span) {
         "silent",
         source.silent_s === null ? "–" : ms(1000 * source.silent_s),
         found.stale,
-        "since the last batch came",
+        "time since the last batch",
       );
       if (source.latency_s !== null)
-        tile("on the way", ms(1000 * source.latency_s), false, "this computer's clock less the sender's");
+        tile("latency", ms(1000 * source.latency_s), false, "clock of this computer minus clock of the sender");
       tile("waiting", `${plain(source.waiting_bytes / 1024, 3)} KiB`, source.waiting_bytes > 1 << 20);
       if (source.waiting_s !== undefined)
-        tile("backlog", `${source.waiting_s.toFixed(1)} s`, source.waiting_s > 2, "received and not tracked yet");
+        tile("backlog", `${source.waiting_s.toFixed(1)} s`, source.waiting_s > 2, "received, but not yet tracked");
     }
   }
   if (found.behind_ms !== undefined)
@@ -47,7 +47,7 @@ export function health(host, found, facts, span) {
       "not shown",
       whole(found.given_up),
       true,
-      "updates that came faster than they could be shown; the record has them",
+      "updates that arrived faster than they could be shown; the record contains them",
     );
   if (found.refused) tile("wrong tokens", whole(found.refused), true);
   tile("window", `${whole(facts.window)} samples, ${plain((1000 * facts.window) / facts.rate_hz, 4)} ms`);

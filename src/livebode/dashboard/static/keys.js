@@ -1,7 +1,7 @@
-// The keyboard, and the page that says what it does.
+// The keyboard and its help.
 import { element } from "./make.js";
 
-// Whether the element that has the focus does something by itself with a key.
+// Whether the element with the focus uses a key itself.
 function uses({ tagName, type }, key) {
   if (tagName === "INPUT" && type === "range") return key.startsWith("Arrow");
   if (tagName === "INPUT" && type === "checkbox") return key === " ";
@@ -10,7 +10,7 @@ function uses({ tagName, type }, key) {
   return tagName === "INPUT" || tagName === "SELECT";
 }
 
-// `actions` are [keys, words, act]; `each` has what a key does that shares its words with others.
+// `actions` are [keys, words, act]; `each` has the action of a key that shares its words with others.
 export function keys(dialog, list, actions, each) {
   list.replaceChildren(
     ...actions.flatMap(([names, words]) => [

@@ -1,4 +1,4 @@
-// The web socket: connects again by itself with growing pauses, says what the page wishes, hands out what comes.
+// The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
 import { framesOf } from "./frames.js";
 
 const PAUSE_MS_MAX = 8000;
@@ -6,7 +6,7 @@ const PAUSE_MS_MAX = 8000;
 export class Link {
   constructor({ onNews, onFrame, onState }) {
     Object.assign(this, { onNews, onFrame, onState });
-    this.wishes = new Map(); // what to say again after a break, by kind
+    this.wishes = new Map(); // requests to repeat after a reconnection, by kind
     this.pauseMs = 250;
     this.connect();
   }
@@ -35,7 +35,7 @@ export class Link {
     };
   }
 
-  // `keep` is the name under which the wish is said again after a break; a later one of this name replaces it.
+  // `keep` is the name under which the request is repeated after a reconnection; a later one of this name replaces it.
   wish(wish, keep) {
     if (keep) this.wishes.set(keep, wish);
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(wish));

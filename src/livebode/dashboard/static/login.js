@@ -1,4 +1,4 @@
-// The token goes once, in the body of a POST; what comes back is a cookie that scripts cannot read.
+// The token is sent once, in the body of a POST; the answer is a cookie that scripts cannot read.
 import { applyTheme } from "./theme.js";
 
 applyTheme();
@@ -14,5 +14,5 @@ form.addEventListener("submit", async (event) => {
   }).catch(() => null);
   token.value = "";
   if (answer?.ok) location.replace("/");
-  else wrong.textContent = answer ? (await answer.json()).error : "there is no answer";
+  else wrong.textContent = answer ? (await answer.json()).error : "The server does not answer.";
 });

@@ -1,4 +1,4 @@
-// The page: what comes from the server goes to the panels, what the person does goes to the server.
+// The page: messages from the server go to the panels, actions of the person go to the server.
 import { Bode } from "./bode.js";
 import { setClock } from "./clock.js";
 import { controls } from "./controls.js";
@@ -41,7 +41,7 @@ const map = new LineMap($("map"), $("map-hover"));
 const parameters = new Trends(
   $("pane-parameters"),
   (t) => t.model !== "margins",
-  "No model is fitted: [fit] in the configuration asks for one.",
+  "No model is fitted: add [fit] to the configuration.",
 );
 const margins = new Margins($("pane-margins"));
 const events = new Events($("events"), $("alarms-only"), $("alarm-count"), (text) => complain(text));
@@ -99,10 +99,10 @@ const link = new Link({
   },
 });
 
-// An answer to an earlier wish, which would undo the choice of another axis since.
+// An answer to an earlier request; it would undo the choice of another axis.
 const overtaken = ({ facts, axes }) => page.wanted < axes.length && facts.axis !== (page.wanted ?? facts.axis);
 
-// The axis or its quantity is another one, the run has begun, or the link is new.
+// The axis or its quantity has changed, the run has started, or the link is new.
 function begin({ facts, axes, trends }) {
   page.facts = facts;
   $("axis-label").hidden = axes.length < 2;
@@ -152,7 +152,7 @@ function begin({ facts, axes, trends }) {
   if (facts.watched !== page.quantity) say();
 }
 
-// What is shown is of no axis any more: another one was chosen, whose machine has perhaps never sent.
+// Another axis was chosen, whose machine may not have sent anything: clear the page.
 function clear() {
   Object.assign(page, { key: null, measured: null, past: null, seen: null, read: null, health: null });
   if (page.facts) page.facts = { ...page.facts, begun: false, name: $("axis").selectedOptions[0]?.text ?? page.facts.name };
@@ -161,13 +161,13 @@ function clear() {
   for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
   parameters.begin([]);
   margins.lines = null;
-  margins.begin([], "No samples have come yet.");
+  margins.begin([], "No samples have arrived yet.");
   events.begin(page.axis, false);
   timeline.take({ first_s: null, last_s: null, live: false, growing: false });
   status();
 }
 
-// Whatever shows a time shows it by another clock.
+// All displayed times follow the new clock.
 function newClock() {
   events.draw();
   for (const what of ["bode", "rows", "trends"]) page.dirty.add(what);

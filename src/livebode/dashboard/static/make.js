@@ -1,4 +1,4 @@
-// Elements whose text is text, whatever a machine sends: never HTML.
+// Elements with plain text, never HTML, whatever a machine sends.
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -10,7 +10,7 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-// Buttons of which one is chosen. `choices` are {value, text, title, why}; one with `why` cannot be chosen, and says so.
+// Buttons of which one is chosen. `choices` are {value, text, title, why}; `why` is the reason that one is disabled.
 export function segments(host, choices, chosen, onChoose) {
   const focused = host.contains(document.activeElement);
   host.replaceChildren();

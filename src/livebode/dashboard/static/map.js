@@ -1,10 +1,10 @@
-// Position × frequency (time × frequency where nothing moves): the level, or its change against the median of the place.
+// Position × frequency (time × frequency at standstill): the level, or its change from the median of the place.
 import { moment, ticks, timeLabel } from "./clock.js";
 import { onTheme, colour } from "./theme.js";
 import { hertz, signed } from "./words.js";
 
 const CELLS = 56;
-// Cividis (Nuñez, Anderton, Renslow 2018), made to read the same with any colour vision; blue to orange for a change.
+// Cividis (Nuñez, Anderton, Renslow 2018), which looks the same with any colour vision; blue to orange for a change.
 const LEVELS = [
   [0, 32, 76],
   [0, 48, 111],
@@ -66,7 +66,7 @@ export class LineMap {
     this.paint();
   }
 
-  // Nothing is shown until the next beginning.
+  // Show nothing until the next `begin`.
   clear() {
     this.begin({ frequency_hz: [] }, this.schedule);
     this.hover.textContent = "";

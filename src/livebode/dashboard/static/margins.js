@@ -1,10 +1,10 @@
-// The margins of the loop with their bounds, and which of them are small.
+// The margins of the loop with their bounds; small ones are marked.
 import { element } from "./make.js";
 import { Series } from "./series.js";
 import { bounded } from "./trends.js";
 import { hertz, plain } from "./words.js";
 
-// What is usual for a servo loop: 6 dB, 30°, Ms 2. Below that the number is marked, with a word.
+// Usual limits of a servo loop: 6 dB, 30°, Ms 2. Worse values are marked, with a word.
 const ROWS = [
   ["gain_margin", "gain may rise by", (v) => v < 6],
   ["gain_reduction", "gain may fall by", (v) => Math.abs(v) < 6],
@@ -32,7 +32,7 @@ export class Margins {
     this.items.get(trend.name).take(trend);
   }
 
-  // As they were at a moment, or as they are.
+  // The margins at a time, or the newest.
   draw(atS = NaN) {
     const { lines, items } = this,
       rows = [];
@@ -60,7 +60,7 @@ export class Margins {
         ),
       );
     }
-    // It is of the newest response, so not of a moment of the past.
+    // It belongs to the newest response, so it is not shown for a time in the past.
     if (lines && !Number.isFinite(atS))
       rows.push(
         element(
@@ -73,14 +73,14 @@ export class Margins {
             `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? " ⚠ large" : ""}`,
           ),
           element("td", {}, `${hertz(lines.frequency_hz)} Hz`),
-          element("td", {}, "measured, no model"),
+          element("td", {}, "measured, without a model"),
         ),
       );
     if (!rows.length) {
       this.host.replaceChildren(element("p", { class: "empty" }, this.why));
       return;
     }
-    const head = ["margin", "value, ± 95 % if the model is complete", "at", "how it is known"].map((t) =>
+    const head = ["margin", "value, ± 95 % if the model is complete", "at", "source"].map((t) =>
       element("th", { scope: "col" }, t),
     );
     this.host.replaceChildren(

@@ -1,4 +1,4 @@
-// The past on the page: what was before it came, moments of the record, and what of it is tracked and mapped.
+// The past: times in the record, and the history in the tracking plot and the map.
 import { framesOf } from "./frames.js";
 import { ask } from "./link.js";
 
@@ -6,12 +6,12 @@ const WHOLE_MS = 4000,
   ROWS = 1000;
 
 export function past(page, { bode, tracking, map, timeline, link }, { complain, status }) {
-  // What happened before this page came: the recent past at first, the whole run when it is asked for.
+  // The time before this page was opened: first the recent past, the whole run on request.
   async function fill() {
     const { span } = timeline,
       whole = page.spanS === "whole",
       half = Number(page.spanS) / 2;
-    const between = page.facts?.axis !== page.axis || page.quantity === null; // another axis was chosen, and its facts have not come
+    const between = page.facts?.axis !== page.axis || page.quantity === null; // another axis was chosen, and its facts have not arrived
     if (between || !page.facts.begun || !Number.isFinite(span.last_s)) {
       setTimeout(fill, 300);
       return;

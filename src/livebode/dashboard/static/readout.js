@@ -1,4 +1,4 @@
-// What stands at the cursor: Hz, dB, degrees, their bounds, coherence, and the distance from the reference.
+// The values at the cursor: Hz, dB, degrees, their bounds, coherence, and the difference from the reference.
 import { moment } from "./clock.js";
 import { halfDeg, highDb, holds, lowDb } from "./frames.js";
 import { element } from "./make.js";
@@ -8,7 +8,7 @@ const WORDS = { measured: "measured", reference: "reference", baseline: "baselin
 
 function around(low, value, high) {
   if (!Number.isFinite(value - low) || low <= -999)
-    return Number.isFinite(high) ? "not told from zero" : "bound not known";
+    return Number.isFinite(high) ? "includes zero" : "bound not known";
   return `−${(value - low).toFixed(2)} … +${(high - value).toFixed(2)} dB`;
 }
 
@@ -30,7 +30,7 @@ export function readout(host, hz, found, schedule) {
   const frame = found.measured?.frame;
   const words = frame
     ? `at ${moment(frame.timeS[0], true)}${Number.isFinite(frame.schedule[0]) ? `, ${schedule.name || "schedule"} ${frame.schedule[0].toFixed(3)} ${schedule.unit}` : ""}` +
-      `; bands are ±3σ${Number.isFinite(frame.dof[0]) || frame.dof[0] === Infinity ? ` and hold the truth with ${(100 * holds(frame.dof[0])).toFixed(2)} %` : ""}`
+      `; bands are ±3σ${Number.isFinite(frame.dof[0]) || frame.dof[0] === Infinity ? ` and cover the true value with ${(100 * holds(frame.dof[0])).toFixed(2)} %` : ""}`
     : "no response yet";
   host.replaceChildren(
     element(

@@ -1,4 +1,4 @@
-// The newest responses in memory: times, schedule, and for each line magnitude, phase and reach; a ring of bounded size.
+// The newest responses: times, schedule, and for each line magnitude, phase and reach; a ring buffer of bounded size.
 const ROWS_MAX = 2400,
   CELLS_MAX = 1 << 20;
 
@@ -32,7 +32,7 @@ export class Rows {
     this.count = Math.min(this.count + 1, this.room);
   }
 
-  // The same rows with those of a frame before them, as far as they are older.
+  // These rows, preceded by the older rows of a frame.
   behind(frame) {
     const after = new Rows(this.columns),
       first = this.count ? this.timeS[this.order()[0]] : Infinity;
@@ -41,7 +41,7 @@ export class Rows {
     return after;
   }
 
-  // Places of the rows in order of their coming.
+  // Indices of the rows in order of arrival.
   order() {
     const first = (this.next - this.count + this.room) % this.room;
     return Array.from({ length: this.count }, (_, i) => (first + i) % this.room);

@@ -1,4 +1,4 @@
-// One parameter over time, thinned where it is long.
+// One parameter over time, thinned if it is long.
 const POINTS_MAX = 1500;
 const number = (v) => (v === null ? NaN : v);
 
@@ -7,7 +7,7 @@ export class Series {
     Object.assign(this, { model, name, unit, t: [], v: [], s: [], status: [] });
   }
 
-  // All rows at the beginning, and later the newest one.
+  // Take all rows at first, later the newest row.
   take(trend) {
     trend.time_s.forEach((t, i) => {
       if (this.t.length && t <= this.t.at(-1)) return;
@@ -21,7 +21,7 @@ export class Series {
         this[name] = this[name].filter((_, i) => i % 2 === 0 || i === this[name].length - 1);
   }
 
-  // The place of the row nearest to a moment; of the newest one without a moment.
+  // Index of the row nearest to a time; without a time, of the newest row.
   at(timeS) {
     if (!Number.isFinite(timeS)) return this.t.length - 1;
     let best = 0;
@@ -31,7 +31,7 @@ export class Series {
     return best;
   }
 
-  // The same, but of the newest row with a value.
+  // The same, but without a time the newest row with a value.
   known(timeS) {
     let at = this.at(timeS);
     if (!Number.isFinite(timeS)) while (at > 0 && !Number.isFinite(this.v[at])) at--;

@@ -1,4 +1,4 @@
-// Light, dark, or as the system wants it; remembered in this browser.
+// Light, dark, or the setting of the system; stored in this browser.
 const WORDS = ["auto", "light", "dark"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();

@@ -1,4 +1,4 @@
-// The moment that is shown: the newest one, or one of the record.
+// The time that is shown: the newest, or a time in the record.
 import { moment } from "./clock.js";
 
 export class Timeline {
@@ -18,12 +18,12 @@ export class Timeline {
   take(span) {
     this.span = { ...span, first_s: span.first_s ?? NaN, last_s: span.last_s ?? NaN };
     const { first_s: first, last_s: last } = this.span;
-    // The moment that is shown was in a run before this one.
+    // The time that is shown belongs to a previous run.
     if (this.atS !== null && (this.atS < first || this.atS > last)) this.go(this.atS);
     else this.draw();
   }
 
-  // Show a moment of the record.
+  // Show a time in the record.
   go(timeS) {
     const { first_s: first, last_s: last } = this.span;
     if (!Number.isFinite(first)) return;
@@ -52,8 +52,8 @@ export class Timeline {
     this.slider.setAttribute("aria-valuetext", moment(paused ? this.atS : last));
     this.from.textContent = moment(first);
     this.to.textContent = moment(last);
-    this.now.textContent = !Number.isFinite(first) ? "" : paused ? `shown: ${moment(this.atS, true)}` : live ? "the newest" : "the end";
-    this.pause.textContent = paused ? (live ? "Live" : "The end") : "Pause";
+    this.now.textContent = !Number.isFinite(first) ? "" : paused ? `shown: ${moment(this.atS, true)}` : live ? "newest" : "end";
+    this.pause.textContent = paused ? (live ? "Live" : "End") : "Pause";
     this.pause.classList.toggle("primary", paused);
   }
 }

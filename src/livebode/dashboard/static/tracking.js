@@ -22,7 +22,7 @@ export class Tracking {
     this.lines = facts.frequency_hz;
     this.schedule = schedule;
     this.rows = null;
-    // Each axis keeps its choice, whatever lines others have.
+    // Each axis has its own choice, independent of the lines of others.
     const key = JSON.stringify([facts.axis, this.lines]),
       n = Math.min(AT_FIRST, this.lines.length);
     this.chosen = this.choices.get(key);
@@ -33,7 +33,7 @@ export class Tracking {
     this.build();
   }
 
-  // Nothing is shown until the next beginning.
+  // Show nothing until the next `begin`.
   clear() {
     Object.assign(this, { lines: [], chosen: [], rows: null, fromS: NaN, toS: NaN, marked: NaN });
     this.drawChips();
@@ -53,7 +53,7 @@ export class Tracking {
             "aria-pressed": String(place >= 0),
             "data-line": i,
             onclick: () => this.toggle(i),
-            title: place >= 0 ? "Leave this line out" : "Track this line",
+            title: place >= 0 ? "Hide this line" : "Track this line",
           },
           ...(place >= 0 ? [swatch] : []),
           `${hertz(f)} Hz`,
@@ -160,7 +160,7 @@ export class Tracking {
     } else {
       const usual = order.length > 1 ? (rows.timeS[order.at(-1)] - rows.timeS[order[0]]) / order.length : 0;
       order.forEach((r, i) => {
-        // A break in the record is a break in the curve.
+        // A gap in the record is a gap in the curve.
         if (i && rows.timeS[r] - rows.timeS[order[i - 1]] > Math.max(GAP_S, 5 * usual)) {
           x.push(rows.timeS[r] - 1e-3);
           at.push(-1);

@@ -1,4 +1,4 @@
-// Parameters over time with the bound that covers 95 % where the model is complete: a small chart for each.
+// Parameters over time with 95 % bounds, valid if the model is complete: a small chart for each.
 import { axis, chart } from "./chart.js";
 import { ticks } from "./clock.js";
 import { element } from "./make.js";
@@ -14,7 +14,7 @@ export const bounded = (value, sigma, unit) =>
     : "–";
 
 export class Trends {
-  // `wanted` says which parameters are shown here.
+  // `wanted` selects the parameters that are shown here.
   constructor(host, wanted, empty) {
     Object.assign(this, { host, wanted, empty, items: new Map() });
   }
@@ -27,7 +27,7 @@ export class Trends {
     this.draw();
   }
 
-  // All rows of a parameter at the beginning, and later the newest one.
+  // Take all rows of a parameter at first, later the newest row.
   take(trend) {
     if (!this.wanted(trend)) return;
     const key = `${trend.model}\0${trend.name}`;
@@ -77,11 +77,11 @@ export class Trends {
     );
   }
 
-  // Draw what changed, each with its value at a moment, or the newest.
+  // Draw the parameters that changed, each with its value at a time, or the newest.
   draw(atS = NaN) {
     if (this.host.hidden) return;
     for (const item of this.items.values()) {
-      if (item.s.every((s) => s === 0 || Number.isNaN(s)) && item.s.some((s) => s === 0)) continue; // it is held at a value
+      if (item.s.every((s) => s === 0 || Number.isNaN(s)) && item.s.some((s) => s === 0)) continue; // it is fixed
       if (!item.made) this.build(item);
       const at = item.known(atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
@@ -95,7 +95,7 @@ export class Trends {
   }
 }
 
-// What nine tenths of the values span, and their bounds: one odd fit does not hide the rest.
+// The range of 90 % of the values and their bounds: one outlier does not hide the rest.
 function reach({ v, s }) {
   const sorted = v.filter(Number.isFinite).sort((a, b) => a - b);
   if (!sorted.length) return [0, 1];

@@ -1,15 +1,15 @@
-// What the page says at its top: whether what is shown is of now, and what is known of the machine.
+// The head of the page: whether the display is current, and the verdict on the machine.
 const BACKLOG_S = 2;
 
 const seconds = (s) => (s < 120 ? `${Math.round(s)} s` : `${Math.round(s / 60)} min`);
 
-// Word and look of the lamp; green only where what is shown came just now.
+// Word and look of the lamp; green only if the display is current.
 export function lamp({ up, facts, health }, { live, growing }, paused) {
   if (!up) return ["no connection", "lost"];
   if (!facts.begun) return ["waiting for the first samples", "stale"];
   if (paused) return ["paused", "paused"];
   if (!live) return growing ? ["being recorded", ""] : ["recorded", ""];
-  if (!health) return ["waiting for news", "stale"];
+  if (!health) return ["waiting for data", "stale"];
   const { source, stale, silent_s: silentS } = health;
   if (source && !source.connected) return [`not connected, silent for ${seconds(silentS)}`, "stale"];
   if (stale) return [`silent for ${seconds(silentS)}`, "stale"];
@@ -19,10 +19,10 @@ export function lamp({ up, facts, health }, { live, growing }, paused) {
 
 // Word, look and reason: OK, check, ALARM or not assessed.
 export function verdict({ up, facts, health }, openAlarms, look) {
-  if (!up || !facts.begun || !health) return ["not assessed", "open", "nothing is known of the machine now"];
-  if (health.alarms?.length) return ["ALARM", "alarm", `not as learned: ${health.alarms.join(", ")}`];
-  if (look === "stale") return ["check", "check", "no new samples are shown"];
-  if (openAlarms) return ["check", "check", `${openAlarms} not acknowledged`];
-  if (!facts.baseline) return ["not assessed", "open", "the run has no baseline; livebode learn makes one"];
-  return ["OK", "ok", "no difference from the baseline is shown"];
+  if (!up || !facts.begun || !health) return ["not assessed", "open", "no current data of the machine"];
+  if (health.alarms?.length) return ["ALARM", "alarm", `differs from the baseline: ${health.alarms.join(", ")}`];
+  if (look === "stale") return ["check", "check", "no new samples"];
+  if (openAlarms) return ["check", "check", `${openAlarms} unacknowledged`];
+  if (!facts.baseline) return ["not assessed", "open", "the run has no baseline; create one with livebode learn"];
+  return ["OK", "ok", "no significant difference from the baseline"];
 }

@@ -1,4 +1,4 @@
-// Numbers and names as people read them.
+// Numbers and names for people.
 export function plain(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";

@@ -1,1 +1,1 @@
-"""What a report says of a run, or of two, as plain data: gathered here, laid out by `livebode.report`."""
+"""The contents of the reports of one or two runs, as plain data; `livebode.report` lays them out."""

@@ -1,4 +1,4 @@
-"""What the monitoring of a run found, as findings of a verdict."""
+"""Results of the monitoring of a run, as findings of a verdict."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ACTIVE_MAX = 5
 
 
 def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
-    """The active alarms of a run, or why there are none; the summary first."""
+    """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
     if not monitoring:
         return (_so_far(run, happenings),)
@@ -39,13 +39,13 @@ def _newest(happenings: EventSummary) -> list[Event]:
 
 
 def _so_far(run: Run, happenings: EventSummary) -> Finding:
-    """What is known of changes where run.json does not contain it."""
+    """The changes so far, if run.json does not contain a summary yet."""
     if run.finished:
         return Finding(
-            "open", "Changes are not assessed without a baseline; `livebode learn` makes one from healthy runs."
+            "open", "Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs."
         )
     came, cleared = happenings.count("change"), happenings.count("change-cleared")
     if not came:
-        return Finding("open", "No change was reported so far; the verdict on the whole run comes with its end.")
-    message = f"So far {many(came, 'change')} came and {cleared} cleared."
+        return Finding("open", "No change was reported so far; the final verdict is available at the end of the run.")
+    message = f"So far {many(came, 'change')} reported, {cleared} cleared."
     return Finding("alarm" if came > cleared else "check", message)

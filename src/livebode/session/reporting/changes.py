@@ -1,4 +1,4 @@
-"""What two runs' models say: parameters and margins before and after, with the change and its bound."""
+"""Parameters and margins of two runs, with the changes and their bounds."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Change:
     Attributes
     ----------
     bound
-        Of the change; holds with 95 % for all changes of the table together (Bonferroni). What the model lacks is the
-        same in both runs and counts in both bounds, so this one is wide.
+        Of the change; covers all changes of the table together with 95 % (Bonferroni). The model error is the same in
+        both runs but counts in both bounds, so this bound is conservative.
     seen
-        The change that this comparison finds with a probability of 95 %.
+        The smallest change that this comparison detects with a probability of 95 %.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Change:
 
     @property
     def words(self) -> str:
-        """The name for people."""
+        """The name without underscores."""
         return self.name.replace("_", " ")
 
     @property
     def amount(self) -> float:
-        """After less before."""
+        """After minus before."""
         return self.after[0] - self.before[0]
 
     @property
@@ -54,7 +54,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Changes:
-    """Parameters and margins of both runs; each empty with the reason in words."""
+    """Changes of parameters and margins; empty with a reason if there are none."""
 
     parameters: tuple[Change, ...]
     parameter_words: str
@@ -63,26 +63,26 @@ class Changes:
 
 
 def changes(of: Compared) -> Changes:
-    """Fit the same model to what was compared of each run, and read the margins of the loops described."""
+    """Fit the same model to the compared response of each run, and compute the margins of the described loops."""
     own = [said(run.summary) for run in of.runs]
     section = next((s["fit"] for s in own if "fit" in s), None)
     if section is None:
-        return Changes((), "No parameters: neither run has a [fit].", (), "No margins: they are read around a fit.")
+        return Changes((), "No parameters: neither run has a [fit] section.", (), "No margins: they need a fit.")
     model = FitSection.model_validate(section)
     try:
         fits = [
-            fit_averaged(replace(average, response=one, words="what was compared"), model)[0]
+            fit_averaged(replace(average, response=one, words="the compared response"), model)[0]
             for average, one in zip(of.averages, (of.overall.before, of.overall.after))
         ]
     except LivebodeError as error:
-        return Changes((), f"No parameters: {error}.", (), "No margins: they are read around a fit.")
+        return Changes((), f"No parameters: {error}.", (), "No margins: they need a fit.")
     for run, fit in zip(of.runs, fits):
         if fit.status != "ok":
-            words = f"No parameters: no model holds for {run.path.name}: {fit.sentence}."
-            return Changes((), words, (), "No margins: they are read around a fit.")
+            words = f"No parameters: the fit to {run.path.name} was rejected: {fit.sentence}."
+            return Changes((), words, (), "No margins: they need a fit.")
     rows = [{name: (value, bound, unit) for name, value, bound, unit in fit.rows()} for fit in fits]
     found = _table(rows)
-    words = f"The {fits[0].model.name} model, fitted to what was compared, at {fits[0].lines} lines."
+    words = f"The {fits[0].model.name} model, fitted to the compared responses at {fits[0].lines} lines."
     loops = [LoopSection.model_validate(s.get("loop", {})) for s in own]
     try:
         read = [_margins(fit, loop) for fit, loop in zip(fits, loops)]
@@ -90,7 +90,12 @@ def changes(of: Compared) -> Changes:
         return Changes(found, words, (), f"No margins: {error}.")
     known = [m for m in read if m is not None and m.ok[0]]
     if len(known) < len(read):
-        return Changes(found, words, (), "No margins: not both runs describe a loop that the fit makes stable.")
+        return Changes(
+            found,
+            words,
+            (),
+            "No margins: they need a described loop in both runs that is stable with the fitted model.",
+        )
     return Changes(found, words, _table([_rows(m) for m in known]), "")
 
 
@@ -131,5 +136,5 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[Change, ...
 
 
 def percent(change: Change, amount: float) -> float:
-    """An amount as a share of the value before; NaN of zero."""
+    """An amount in percent of the value before; NaN if that is zero."""
     return 100 * amount / abs(change.before[0]) if change.before[0] else float(np.nan)

@@ -1,4 +1,4 @@
-"""The report of two runs: before and after."""
+"""The report of the comparison of two runs."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, 
 from livebode.session.said import said
 
 _TEST = (
-    "A line differs where |G₂ − G₁|² over the variance of both means is larger than chance makes it with a probability "
-    "of {alpha:.2g}: 5 % for all {m} together (Bonferroni). Two runs of the same machine are told apart at any line no "
-    "more often than that. The variance is of the scatter between windows, its degrees of freedom are Welch's and "
-    "Satterthwaite's."
+    "A line differs if |G₂ − G₁|², divided by the variance of both means, exceeds a limit that chance exceeds with a "
+    "probability of {alpha:.2g}: 5 % for all {m} together (Bonferroni). For two runs of an unchanged machine, the "
+    "probability that any line differs is at most 5 %. The variance is from the scatter between windows, with degrees "
+    "of freedom by Welch and Satterthwaite."
 )
 _TONES = {**TONES, "ok": "no difference shown"}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
@@ -41,7 +41,7 @@ class Comparison:
 
     @classmethod
     def of(cls, before: Path, after: Path) -> Comparison:
-        """Read and compare; errors as `compare`."""
+        """Read and compare two runs; raises the errors of `compare`."""
         found = compare(Run.open(before), Run.open(after))
         return cls(found, changes(found))
 
@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def tables(self) -> tuple[str, ...]:
-        """Ratio at each line, and changes of parameters and margins, for a terminal."""
+        """Tables for the terminal: ratio at each line, changes of parameters and margins."""
         d = self.found.overall
         rows = [
             f"{f:>10g} Hz {signed(db):>9} ± {around:<8} dB {signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
@@ -61,7 +61,7 @@ class Comparison:
             )
         ]
         more = len(rows) - _LINES_SHOWN
-        lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} lines more; --json has all"] * (more > 0))
+        lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} more lines; --json prints all"] * (more > 0))
         changed = [
             f"  {c.words:22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
             + "  changed" * c.significant
@@ -95,7 +95,7 @@ class Comparison:
             ("before", str(one.path)), ("after", str(other.path)),
             ("before written", written(one.path / "run.json")), ("after written", written(other.path / "run.json")),
             ("responses", " and ".join(f"{a.count:,}" for a in self.found.averages)),
-            ("compared at", _span(self.found)), ("report made", moment(made.timestamp())),
+            ("compared at", _span(self.found)), ("report written", moment(made.timestamp())),
         )  # fmt: skip
         sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
         there = tuple(section for section in sections if section is not None)
@@ -107,10 +107,8 @@ class Comparison:
     def _response(self) -> Section:
         d = self.found.overall
         how = "means over the common places, each place counted alike" if self.found.places else "means of the runs"
-        caption = (
-            f"Before and after: {how}, with 95 % bounds. Below: after over before, with the bound that holds with "
-        )
-        caption += f"95 % at all {d.m} lines together; full marks differ."
+        caption = f"Before and after: {how}, with 95 % bounds. Below: ratio after/before, with the bound that covers "
+        caption += f"all {d.m} lines together with 95 %; filled marks differ."
         picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
                                          "differs": d.differs}, caption)  # fmt: skip
         radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
@@ -124,7 +122,7 @@ class Comparison:
         ]  # fmt: skip
         step = -(-len(rows) // _LINES_SHOWN)
         shown = [row for i, row in enumerate(rows) if i % step == 0 or d.differs[i]]
-        note = f"Every {step}. line, and those that differ. " if step > 1 else ""
+        note = f"Every {step}th line, and those that differ. " if step > 1 else ""
         headings = ("Hz", "before dB", "±", "after dB", "±", "ratio dB", "±", "ratio °", "±", "p", "differs")
         table = Table(headings, tuple(shown), tuple(range(10)), note + "± of the ratio: 95 % at all lines together.")
         return Section("Frequency response", (picture, Paragraph(_TEST.format(alpha=ALPHA / d.m, m=d.m)), table))
@@ -133,16 +131,14 @@ class Comparison:
         places = self.found.places
         if not places:
             return None
-        caption = (
-            "Change of the magnitude at each place and line, going forth and going back; dots mark those that differ."
-        )
+        caption = "Change of the magnitude at each place and line, forward and return; dots mark those that differ."
         data = {
             "frequency_hz": self.found.overall.before.lines.frequency_hz,
             "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
         }
         found = [
             (
-                f"{p.low:.3g} … {p.high:.3g}", "back" if p.back else "forth", f"{f:g}",
+                f"{p.low:.3g} … {p.high:.3g}", "return" if p.back else "forward", f"{f:g}",
                 *polar(complex(p.difference.ratio[i]), float(p.difference.bound[i])), _p(p.difference.p[i]),
             )
             for p in places
@@ -152,10 +148,10 @@ class Comparison:
         parts: list[Part] = [Picture("places", data, caption)]
         if found:
             left_out = len(found) - _PLACES_SHOWN
-            note = f"{left_out} more left out; --json has all." if left_out > 0 else ""
-            headings = ("place", "way", "Hz", "ratio dB", "±", "ratio °", "±", "p")
+            note = f"{left_out} more rows not shown; --json prints all." if left_out > 0 else ""
+            headings = ("place", "direction", "Hz", "ratio dB", "±", "ratio °", "±", "p")
             parts.append(Table(headings, tuple(found[:_PLACES_SHOWN]), tuple(range(2, 8)), note))
-        return Section("Place by place", tuple(parts))
+        return Section("By place", tuple(parts))
 
     def _parameters(self) -> Section:
         parts: list[Part] = []
@@ -165,7 +161,7 @@ class Comparison:
         ):
             parts += [Paragraph(words)] if words else []
             if table:
-                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "sure")
+                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "significant")
                 parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), _NOTE))
         return Section("Parameters and margins", tuple(parts))
 
@@ -180,15 +176,15 @@ class Comparison:
         return Section("Events", tuple(parts))
 
 
-_NOTE = "± of before and after holds 95 % each, ± of the change for the whole table together (Bonferroni)."
+_NOTE = "± of before and after covers 95 % each; ± of the change covers the whole table together (Bonferroni)."
 
 
 def _settings(before: Run, after: Run) -> Section:
-    """What differs in the configurations."""
+    """Differences between the configurations."""
     one, other = (set(_flat(said(run.summary))) for run in (before, after))
     rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
     if not rows:
-        return Section("Settings", (Paragraph("Both runs were made with the same settings."),))
+        return Section("Settings", (Paragraph("Both runs have the same settings."),))
     return Section("Settings that differ", (Table(("setting", "before", "after"), rows),))
 
 
@@ -240,5 +236,7 @@ def _p(p: float) -> str:
 
 def _span(of: Compared) -> str:
     f = of.overall.before.lines.frequency_hz
-    where = f"; {many(len(of.places), 'place')} of the schedule, each way counted" if of.places else ""
+    where = (
+        f"; {many(len(of.places), 'place')} of the schedule, forward and return counted separately" if of.places else ""
+    )
     return f"{many(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz{where}"

@@ -1,4 +1,4 @@
-"""The verdict on two runs: alarms, what differs, and how large a change would have been seen."""
+"""The verdict on two runs: alarms, differences and the smallest detectable change."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def verdict(found: Compared, changes: Changes) -> tuple[Finding, ...]:
 
 
 def _alarms(found: Compared) -> Iterator[Finding]:
-    """What the monitoring of either run reported; nothing of a finished run without a baseline."""
+    """Alarms of both runs; none for a finished run without a baseline."""
     for run, when in zip(found.runs, ("Before", "After")):
         if run.summary.get("monitoring", {}).get("baseline") is not None or not run.finished:
             for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
@@ -42,7 +42,7 @@ def _alarms(found: Compared) -> Iterator[Finding]:
 
 def _overall(d: Difference) -> Finding:
     if not np.isfinite(d.p).any():
-        return Finding("open", "At no line both runs have a valid mean with a known sigma.")
+        return Finding("open", "There is no line at which both runs have a valid mean with a known sigma.")
     if not d.differs.any():
         return Finding("ok", f"No line differs by more than chance ({d.m} tested together; {_seen([d])}).")
     f, worst = d.before.lines.frequency_hz, int(np.nanargmin(d.p))
@@ -57,22 +57,22 @@ def _by_place(places: tuple[Place, ...]) -> Iterator[Finding]:
     if not places:
         return
     if not any(np.isfinite(p.difference.p).any() for p in places):
-        yield Finding("open", "At no place both runs have a valid mean with a known sigma.")
+        yield Finding("open", "There is no place at which both runs have a valid mean with a known sigma.")
         return
     there = [p for p in places if p.difference.differs.any()]
     count = sum(int(p.difference.differs.sum()) for p in there)
-    words = f"Place by place {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
+    words = f"By place: {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
     words += f"of {many(len(places), 'place')} (forward and return counted separately"
     words += ")." if there else f"; {_seen([p.difference for p in places])})."
     yield Finding("differs" if there else "ok", words)
 
 
 def _seen(found: Sequence[Difference]) -> str:
-    """The change that would have been found: at the best of the lines, and at every one."""
+    """The smallest detectable change: at every line and at the best line."""
     seen = 100 * np.concatenate([d.seen[np.isfinite(d.p)] for d in found])
     least, most = float(seen.min()), float(seen.max())
-    at = f"≥ {most:.2g} % would have been seen"
-    return at if most < 1.5 * least else f"{at} at every line, ≥ {least:.2g} % at the best one"
+    at = f"detectable: ≥ {most:.2g} %"
+    return at if most < 1.5 * least else f"{at} at every line, ≥ {least:.2g} % at the best line"
 
 
 def _changed(what: str, table: tuple[Change, ...]) -> Iterator[Finding]:
@@ -84,7 +84,7 @@ def _changed(what: str, table: tuple[Change, ...]) -> Iterator[Finding]:
         yield Finding("differs", f"{many(len(moved), what)} of {len(table)} changed: {listed}.")
         return
     seen = "; ".join(f"{c.words} ≥ {percent(c, c.seen):.2g} %" for c in table[:6] if isfinite(percent(c, c.seen)))
-    yield Finding("ok", f"No change of a {what} shown" + (f" (would have been seen: {seen})." if seen else "."))
+    yield Finding("ok", f"No significant change of a {what}" + (f" (detectable: {seen})." if seen else "."))
 
 
 def _hz(frequency_hz: NDArray[np.float64]) -> str:

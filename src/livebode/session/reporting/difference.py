@@ -1,4 +1,4 @@
-"""Two runs held against each other line by line: the mean responses, their ratio, and which lines differ."""
+"""Comparison of two runs line by line: mean responses, their ratio, and the lines that differ."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from livebode.session.said import said
 Floats = NDArray[np.float64]
 
 ALPHA = 0.05
-"""How often two runs of the same machine may be told apart at any line at all."""
+"""Probability that two runs of an unchanged machine differ at any line."""
 _PLACES = 12
-_ALONG = 1.645 / 2**0.5  # sigma of a complex value covers both parts; one of them stays within this with 95 %
-_WINDOWS_MIN = 3.0  # side by side in a place, for a scatter that means something
+_ALONG = 1.645 / 2**0.5  # sigma of a complex value covers both parts; one part is below this with 95 %
+_WINDOWS_MIN = 3.0  # non-overlapping windows at a place; fewer give no usable scatter
 _SAME_HZ = 1e-6
 _SPEEDS_APART = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What changed at the lines that both runs have.
+    """Changes at the lines that both runs have.
 
-    |G₂ − G₁|²/σ², with σ² = σ₂² + max(1, |G₂/G₁|²)·σ₁², follows F(2, 2d) where nothing changed (d by Welch and
-    Satterthwaite), so that p = (1 + |G₂ − G₁|²/(σ²·d))^−d. A line differs where p < α/m for m lines (Bonferroni), which
-    is where the ratio's bound does not cover 1: over all lines together a false claim comes at most with α = 5 %.
+    |G₂ − G₁|²/σ², with σ² = σ₂² + max(1, |G₂/G₁|²)·σ₁², follows F(2, 2d) if nothing changed (d by Welch and
+    Satterthwaite), so that p = (1 + |G₂ − G₁|²/(σ²·d))^−d. A line differs if p < α/m for m lines (Bonferroni), that is,
+    if the bound of the ratio does not cover 1. The probability of a false claim at any line is at most α = 5 %.
 
     Attributes
     ----------
     before, after
-        The mean responses; on the common lines, over the common places where both runs have a schedule.
+        The mean responses at the common lines; over the common places if both runs have a schedule.
     ratio, bound
-        G₂/G₁ and the radius around it that holds with 95 % at all lines together, (lines,).
+        G₂/G₁ and the radius of its bound, which covers all lines together with 95 %, (lines,).
     p
         (lines,).
     seen
-        The relative change at each line that this comparison finds with a probability of 95 %, (lines,).
+        The smallest relative change at each line that is detected with a probability of 95 %, (lines,).
     m
-        How many were tested together.
+        Number of lines that are tested together.
     """
 
     before: Response
@@ -58,12 +58,12 @@ class Difference:
 
     @property
     def differs(self) -> NDArray[np.bool_]:
-        """Which lines differ, (lines,)."""
+        """Mask of the lines that differ, (lines,)."""
         return np.asarray(self.p < ALPHA / self.m)
 
     @classmethod
     def of(cls, before: Response, after: Response, m: int | None = None) -> Difference:
-        """Of two mean responses on the same lines; `m` where they are tested together with others."""
+        """The difference of two mean responses on the same lines; `m` if they are tested together with others."""
         known = before.valid & after.valid & np.isfinite(before.sigma) & np.isfinite(after.sigma)
         m = m or max(int(np.count_nonzero(known)), 1)
         with np.errstate(all="ignore"):
@@ -80,7 +80,7 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One of the places that both runs went to: from where to where, forth (rising) or back, and the difference."""
+    """The difference at a place of both runs: an interval of the schedule, forward (rising) or return."""
 
     low: float
     high: float
@@ -90,18 +90,18 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """Two runs: their difference over all, place by place, and what a reader has to know of both.
+    """Two runs and their differences, over all and by place, with warnings.
 
     Attributes
     ----------
     runs, averages
         Before and after.
     overall
-        Of the means; of runs with a schedule of the means over the common places, which count alike.
+        Difference of the means; with a schedule, of the means over the common places with equal weights.
     places
-        By place and direction; empty without a schedule in both. Tested together.
+        Differences by place and direction, tested together; empty without a schedule in both runs.
     warnings
-        What makes the comparison weaker than it looks, in sentences.
+        Reasons why the comparison is weaker than it seems, in sentences.
     """
 
     runs: tuple[Run, Run]
@@ -112,12 +112,12 @@ class Compared:
 
 
 def compare(before: Run, after: Run) -> Compared:
-    """Hold two runs against each other.
+    """Compare two runs.
 
     Raises
     ------
     GridError
-        If quantity or unit differ, or no line is common.
+        If quantity or unit differ, or the runs have no common line.
     SignalError
         If a run has no valid response.
     """
@@ -132,7 +132,9 @@ def compare(before: Run, after: Run) -> Compared:
         if span[1] > span[0]:
             means = [_by_place(run, span) for run in (before, after)]
     elif any(a.moved for a in both):
-        warnings.append("Only one of the runs moved along a schedule: what differs may be the places, not the machine.")
+        warnings.append(
+            "Only one of the runs has a changing schedule: differences may be due to the position, not the machine."
+        )
     shared = sorted(means[0].keys() & means[1].keys()) if means else []
     if not shared:
         one, other = (_on(a.response, common, i) for a, i in zip(both, at))
@@ -155,8 +157,8 @@ def _refuse(before: Run, after: Run) -> None:
         if one != other:
             raise GridError(
                 "not-alike",
-                f"{before.path.name!r} has the {what} {one!r} and {after.path.name!r} {other!r}: such responses have "
-                "nothing in common",
+                f"{before.path.name!r} has the {what} {one!r} and {after.path.name!r} {other!r}: such responses cannot "
+                "be compared",
                 f"compare runs of the same {what}",
                 what=what,
                 values=[one, other],
@@ -164,7 +166,7 @@ def _refuse(before: Run, after: Run) -> None:
 
 
 def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """The common lines on the grid of the first run, and where they stand in both."""
+    """The common lines on the grid of the first run, and their indices in both runs."""
     f, g = before.frequency_hz, after.frequency_hz
     nearest = np.abs(f[:, np.newaxis] - g).argmin(axis=1)
     first = np.flatnonzero(np.abs(g[nearest] / f - 1) < _SAME_HZ)
@@ -181,24 +183,24 @@ def _common(before: Lines, after: Lines) -> tuple[Lines, tuple[NDArray[np.intp],
 
 
 def _about(before: Run, after: Run, common: int) -> list[str]:
-    """What in the settings makes two responses differ though the machine does not."""
+    """Warnings about settings that make the responses of an unchanged machine differ."""
     words = []
     if common < max(len(before.lines), len(after.lines)):
         words.append(
-            f"The runs share {common} of {len(before.lines)} and {len(after.lines)} lines; these are compared."
+            f"The runs have {common} of {len(before.lines)} and {len(after.lines)} lines in common; these are compared."
         )
     one, other = (said(run.summary).get("tracking", {}) for run in (before, after))
     for key, what in (("estimator", "estimators"), ("hann", "windows"), ("differenced", "differencing")):
         usual = getattr(TrackingSection(), key)
         if (a := one.get(key, usual)) != (b := other.get(key, usual)):
-            words.append(f"Different {what} ({a} and {b}) may make a difference of their own.")
+            words.append(f"Different {what} ({a} and {b}) may cause differences.")
     if before.lines.rate_hz != after.lines.rate_hz:
         words.append(
-            f"The rates differ ({before.lines.rate_hz:g} and {after.lines.rate_hz:g} Hz), and with them the delay of "
-            "the hold that is in every response."
+            f"The rates differ ({before.lines.rate_hz:g} and {after.lines.rate_hz:g} Hz), so the delay of the hold, "
+            "which every response contains, differs too."
         )
     if ("motion" in before.found) != ("motion" in after.found):
-        words.append("Only one of the runs is freed from the axis's motion.")
+        words.append("Only one of the runs is corrected for the axis's motion.")
     return words
 
 
@@ -209,16 +211,16 @@ def _averages(run: Run) -> bool:
 def _overlap(both: tuple[Averaged, Averaged], span: tuple[float, float]) -> list[str]:
     words = " and ".join(f"{a.spans[0]:.4g} … {a.spans[1]:.4g}" for a in both)
     if span[1] <= span[0]:
-        return [f"The runs have no place in common ({words} of the schedule): what differs may be the place."]
+        return [f"The runs have no place in common ({words} of the schedule): differences may be due to the position."]
     said = []
     if span[1] - span[0] < 0.9 * max(a.spans[1] - a.spans[0] for a in both):
-        said.append(f"The runs went different ways ({words} of the schedule); only the common part is compared.")
+        said.append(f"The runs cover different ranges ({words} of the schedule); only the common part is compared.")
     speeds = [_speeds(a.overview) for a in both]
     fast = [float(np.median(s)) if s.size else 0.0 for s in speeds]
     if max(fast) > (1 + _SPEEDS_APART) * min(fast):
         said.append(
-            f"The runs went at different speeds (typically {fast[0]:.3g} and {fast[1]:.3g} a second), and a response "
-            "in motion depends on it: what differs may be the speed."
+            f"The runs have different speeds (median {fast[0]:.3g} and {fast[1]:.3g} per second), and a response in "
+            "motion depends on the speed: differences may be due to it."
         )
     return said
 
@@ -231,7 +233,7 @@ def _speeds(of: Responses) -> Floats:
 
 
 def _by_place(run: Run, span: tuple[float, float]) -> dict[tuple[int, bool], Responses]:
-    """The mean at each place of the span, going forth and going back; those with too few windows are left out."""
+    """The mean at each place of the span, forward and return, without those that have too few windows."""
     edges = np.linspace(*span, _PLACES + 1)
     means: dict[tuple[int, bool], RunningMean] = {}
     hop = int(run.found.get("hop", run.lines.window))
@@ -260,7 +262,7 @@ def _known(one: Response) -> NDArray[np.bool_]:
 
 
 def _together(parts: list[Response], known: NDArray[np.bool_]) -> Response:
-    """The mean over places, each counted alike, at each line over those where both runs know it."""
+    """The mean over places with equal weights; at each line only over places where both runs have a known value."""
     n = np.count_nonzero(known, axis=0)
     value, sigma = (np.array([getattr(part, name) for part in parts]) for name in ("value", "sigma"))
     dof = np.array([part.dof for part in parts])[:, np.newaxis]

@@ -1,4 +1,4 @@
-"""The events of a run, grouped by kind, however many there are."""
+"""The events of a run, grouped by kind, in bounded memory."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from livebode.records.grouped_events import each_event, event_counts
 from livebode.session.reporting.wording import many
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
-"""Kinds that are told in full; so are those of the record itself."""
-_IN_FULL = 20  # of the first and of the newest
+"""Kinds that are listed individually; so are the events of the record itself."""
+_IN_FULL = 20  # of the first and of the newest events, each
 _LETTERS = 600
 
 
 @dataclass
 class Kind:
-    """How often something happened, the first and the newest time."""
+    """The first and the newest event of a kind, and their number."""
 
     first: Event
     newest: Event
@@ -29,7 +29,7 @@ class Kind:
 
 @dataclass
 class EventSummary:
-    """Events by kind, and those to tell in full: the first and the newest of them."""
+    """Events by kind, and the first and the newest of those that are listed individually."""
 
     kinds: dict[str, Kind] = field(default_factory=dict)
     early: list[Event] = field(default_factory=list)
@@ -55,30 +55,34 @@ class EventSummary:
         (self.early if len(self.early) < _IN_FULL else self.late).append(event)
 
     def count(self, kind: str) -> int:
-        """How often it happened."""
+        """Number of events of this kind."""
         return self.kinds[kind].count if kind in self.kinds else 0
 
     @property
     def in_full(self) -> list[Event]:
-        """The alarms and events of the record, in their order: the first and the newest of them."""
+        """The first and the newest alarms and events of the record, in their order."""
         return [*self.early, *self.late]
 
     @property
     def left_out(self) -> int:
-        """How many between the first and the newest are not kept."""
+        """Number of events between the first and the newest that are not retained."""
         return self.told - len(self.early) - len(self.late)
 
     def parts(self) -> tuple[Part, ...]:
-        """A table of the kinds, and the alarms in full."""
+        """A table of the kinds, and a list of the alarms."""
         if not self.kinds:
-            return (Paragraph("Nothing happened: the run has no event."),)
+            return (Paragraph("The run has no events."),)
         rows = tuple(
             (name, f"{k.count:,}", moment(k.first.time_s, 2), moment(k.newest.time_s, 2), k.newest.message[:_LETTERS])
             for name, k in self.kinds.items()
         )
-        grouped = Table(("kind", "count", "first", "newest", "what the newest says"), rows, (1,))
+        grouped = Table(("kind", "count", "first", "newest", "newest message"), rows, (1,))
         if not self.told:
             return (grouped,)
-        note = f"{many(self.left_out, 'event')} between them left out; events.jsonl has all." if self.left_out else ""
+        note = (
+            f"{many(self.left_out, 'event')} between them not shown; events.jsonl contains all."
+            if self.left_out
+            else ""
+        )
         in_full = tuple((moment(e.time_s, 2), e.kind, e.message[:_LETTERS]) for e in self.in_full)
-        return grouped, Table(("when", "kind", "message"), in_full, note=note)
+        return grouped, Table(("time", "kind", "message"), in_full, note=note)

@@ -1,4 +1,4 @@
-"""All that a report draws on, read from a run's directory once."""
+"""The data of a report, read once from a run directory."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What fresh data said of the run's model: the recording's name, the verdicts, and what else is to be said."""
+    """Validation of the model: name of the recording, verdicts and notes."""
 
     on: str
     found: tuple[Validation, ...]
@@ -35,24 +35,24 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A run as a report needs it.
+    """The data of a run that a report needs.
 
     Attributes
     ----------
     run, configuration
-        The run, and what it was asked to do.
+        The run and its complete configuration.
     of
-        What it averages to.
+        Its mean response.
     fit, fit_words
-        The model fitted to that, or None, and to what or why not.
+        The model fitted to the mean and the data of the fit; or None and the reason.
     loop, loop_words
-        Margins of the described loop, or None, and why not.
+        Margins of the described loop; or None and the reason.
     tracks
         Parameters and margins over the run, by model.
     happenings
         Its events.
     judged
-        The validation, where one was asked for.
+        The validation, if requested.
     """
 
     run: Run
@@ -68,7 +68,7 @@ class Material:
 
     @property
     def title(self) -> str:
-        """What was measured, as pictures call it."""
+        """Name of the recording or source, for titles."""
         source = self.configuration.get("source", {})
         name = Path(source["log"]).name if "log" in source else source.get("url", "")
         if "demo" in self.configuration:
@@ -77,12 +77,12 @@ class Material:
 
     @property
     def described(self) -> bool:
-        """Whether the configuration says what feeds back."""
+        """Whether the configuration describes the controllers."""
         return any(name in self.configuration.get("loop", {}) for name in ("velocity", "position", "position_pd"))
 
     @property
     def samples(self) -> int:
-        """How many samples were tracked; of a run that is not finished, as far as its responses go."""
+        """Number of tracked samples; of an unfinished run, up to its last response."""
         return int(self.run.summary.get("counts", {}).get("samples", self.of.response.sample + 1))
 
     @property
@@ -97,7 +97,7 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
     Raises
     ------
     RecordError, SignalError
-        If it is not a run, cannot be read, or has no valid response.
+        If the directory is not a run, cannot be read, or has no valid response.
     """
     run = Run.open(directory)
     configuration, of = said(run.summary), averaged(run)
@@ -110,12 +110,12 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
 
 def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
     if "fit" not in configuration:
-        return None, "No model was fitted: the run has no [fit]. `livebode fit RUN` fits one afterwards."
+        return None, "No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one."
     try:
         found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
     except LivebodeError as error:
         return None, f"No model was fitted: {error}."
-    return (found, words) if found.status == "ok" else (None, f"No model holds for {words}: {found.sentence}.")
+    return (found, words) if found.status == "ok" else (None, f"The fit to {words} was rejected: {found.sentence}.")
 
 
 def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple[LoopReport | None, str]:
@@ -123,7 +123,7 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
     if described.feedback is None:
         return None, "No margins: the run's configuration does not describe the loop ([loop])."
     if fit is None:
-        return None, "No margins: they are read around a fitted model, and there is none."
+        return None, "No margins: they need a fitted model, and there is none."
     try:
         found = loop_report(fit, "the mean", of.overview, described)
     except LivebodeError as error:
@@ -132,7 +132,7 @@ def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple
 
 
 def written(path: Path) -> str:
-    """When a file was written; nothing where it is not there."""
+    """Time at which a file was written; empty if the file does not exist."""
     try:
         return moment(path.stat().st_mtime)
     except OSError:
@@ -140,5 +140,5 @@ def written(path: Path) -> str:
 
 
 def by_schedule(of: Averaged) -> bool:
-    """Whether the response can be drawn over the schedule."""
+    """Whether the response can be plotted over the schedule."""
     return of.moved and bool(np.isfinite(of.overview.schedule).any())

@@ -9,15 +9,15 @@ from livebode.session.reporting.material import Material
 from livebode.session.reporting.wording import duration, many, pairs
 
 _ESTIMATOR = {
-    "joint": "joint: S_wy/S_wu, without bias in any linear loop",
-    "direct": "direct: S_uy/S_uu, biased where something feeds y back to u",
-    "indirect": "indirect: the closed loop's response, from which the described controllers are taken",
+    "joint": "joint: S_wy/S_wu, unbiased in any linear loop",
+    "direct": "direct: S_uy/S_uu, biased if y is fed back to u",
+    "indirect": "indirect: response of the closed loop, from which the described controllers are removed",
 }
 _NOISE = {
-    "periods": "the scatter between windows that lie whole periods apart",
-    "auto": "the scatter between windows that lie whole periods apart; where the schedule moves, detection lines "
+    "periods": "the scatter between windows that are whole periods apart",
+    "auto": "the scatter between windows that are whole periods apart; where the schedule moves, detection lines "
     "(non-excited bins)",
-    "quiet": "detection lines (non-excited bins), at standstill the scatter between periods where it is larger",
+    "quiet": "detection lines (non-excited bins); at standstill the scatter between periods if it is larger",
 }
 _ROLES = {"excitation": "excitation w", "input": "plant input u", "output": "output y", "schedule": "schedule"}
 
@@ -40,13 +40,13 @@ def how(of: Material) -> Section:
         ("hop", f"{found['hop']} samples, {found['rate_hz'] / found['hop']:.4g} responses/s" if "hop" in found else ""),
         ("estimator", _ESTIMATOR.get(tracking.get("estimator", ""), "")),
         ("bounds from", _NOISE.get(tracking.get("noise", ""), "")),
-        ("besides", ", ".join(_options(tracking, of))),
+        ("options", ", ".join(_options(tracking, of))),
         ("loop", "; ".join(_loop(of.configuration.get("loop", {})))),
     ]
     bounds = (
         "The effective time of a response is the centre of its window. A bound contains the true response with the "
-        "probability that is given beside it. It covers noise, and distortion where it is seen; "
-        "a systematic error that nothing in the signals shows is not in it."
+        "stated probability. It covers noise, and distortion where it is detected; "
+        "it does not cover a systematic error that the signals do not show."
     )
     return Section("How it was measured", (pairs(rows), Paragraph(bounds)))
 
@@ -58,18 +58,18 @@ def _options(tracking: dict[str, Any], of: Material) -> list[str]:
     if tracking.get("differenced"):
         said.append(f"differenced: {', '.join(tracking['differenced'])}")
     if tracking.get("spikes"):
-        said.append(f"spikes left out of {', '.join(tracking['spikes'])}")
+        said.append(f"windows with spikes of {', '.join(tracking['spikes'])} excluded")
     if tracking.get("hann"):
         said.append("Hann window")
     if tracking.get("dtype") == "float32":
         said.append("single precision")
     if "motion" in of.configuration:
-        said.append("freed from the axis's motion by a model that moves as it did")
+        said.append("corrected for the axis's motion with a moving model")
     return said
 
 
 def _loop(loop: dict[str, Any]) -> list[str]:
-    """The described controllers in words; nothing where there are none."""
+    """The described controllers in words; empty if there are none."""
     said = []
     for name in ("velocity", "position", "position_pd"):
         if name in loop:

@@ -1,4 +1,4 @@
-"""The fitted parameters of a run over its length, read in parts and thinned."""
+"""The fitted parameters over a run, read in parts and thinned."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _COLUMNS = ("sample", "time_s", "model", "name", "value", "sigma", "unit", "stat
 
 @dataclass(frozen=True)
 class Newest:
-    """The newest number of a quantity, and the moment that it is of."""
+    """The newest value of a quantity, with its effective time."""
 
     value: float
     sigma: float
@@ -29,18 +29,18 @@ class Newest:
 
 @dataclass(eq=False)
 class Track:
-    """What one model says over time: the parameters' and what follows from them, or the loop's margins.
+    """Parameters and derived quantities of one model over time, or the margins of the loop.
 
     Attributes
     ----------
     time_s
-        Of the rows that were kept, (rows,).
+        Effective times of the retained rows, (rows,).
     values, sigmas
-        By name, (rows,) each; NaN where there is no number.
+        By name, (rows,) each; NaN if there is no value.
     newest
-        By name, of all rows.
+        By name, from all rows.
     statuses
-        How often each was, of all rows; of the margins those of the first of them.
+        Number of rows with each status, from all rows of the first quantity.
     """
 
     time_s: Floats
@@ -52,7 +52,7 @@ class Track:
 
 
 def tracks(run: Run, kept: NDArray[np.int64], time_s: Floats) -> dict[str, Track]:
-    """Tracks by model, at the responses whose newest samples are `kept`; empty where nothing was fitted."""
+    """Tracks by model, at the responses whose newest samples are `kept`; empty if nothing was fitted."""
     found: dict[str, Track] = {}
     for table in run.tables("parameters"):
         columns = {name: table[name].to_numpy(zero_copy_only=False) for name in _COLUMNS}
@@ -87,5 +87,5 @@ def _take(track: Track, name: str, rows: dict[str, NDArray[np.generic]], kept: N
 
 
 def failed(track: Track) -> dict[str, int]:
-    """The statuses that are no number."""
+    """Numbers of rejected fits by status."""
     return {word: count for word, count in track.statuses.items() if word != OK}

@@ -20,23 +20,23 @@ _SECTIONS = (
 
 
 def run_report(directory: Path, judged: Judged | None = None, *, made: datetime) -> Document:
-    """What a run measured, how, and what it comes to.
+    """Build the report of a run.
 
-    The run is read once, in parts; curves are thinned to 2048 responses, tables and means are of all.
+    The run is read once, in parts. Curves are thinned to 2048 responses; tables and means use all of them.
 
     Parameters
     ----------
     directory
-        That a run left: in one piece or in segments, finished or not.
+        Run directory, in one piece or in segments, finished or not.
     judged
-        What fresh data said of its model.
+        Validation of its model on independent data.
     made
-        When the report is made, for the title block.
+        Time of the report, for the title block.
 
     Raises
     ------
     RecordError, SignalError
-        If it is not a run, cannot be read, or has no valid response.
+        If the directory is not a run, cannot be read, or has no valid response.
     """
     of = read(directory, judged)
     found = [make(of) for make in _SECTIONS]
@@ -60,14 +60,14 @@ def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
     begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
     rows = (
         ("machine", of.title),
-        ("sent by", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
+        ("source", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
         ("run", of.run.path.resolve().name),
         ("run's clock", f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
-        ("begun", moment(float(begun)) if begun is not None else ""),
+        ("started", moment(float(begun)) if begun is not None else ""),
         ("duration", duration(of.samples / of.run.lines.rate_hz)),
-        ("recording's file", written(Path(log)) if log else ""),
+        ("recording written", written(Path(log)) if log else ""),
         ("run written", written(of.run.path / "run.json")),
-        ("report made", moment(made.timestamp())),
+        ("report written", moment(made.timestamp())),
         ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
     )
     return tuple((name, value) for name, value in rows if value)

@@ -24,8 +24,8 @@ from livebode.session.reporting.wording import (
 )
 
 _LINES_SHOWN = 60
-_PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses that these can show
-_TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and as many responses as these can show
+_PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses per curve
+_TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses per trace
 
 
 def response(of: Material) -> Section:
@@ -33,7 +33,7 @@ def response(of: Material) -> Section:
     one = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
     caption = (
-        f"Bars: {of.of.words}, with 95 % bounds. Light: what 5–95 % of the single responses span"
+        f"Bars: {of.of.words}, with 95 % bounds. Light: range of 5–95 % of the single responses"
         f"{_thinned(of)}.{' Dashed: the ' + of.fit.model.name + ' model fitted to it.' if of.fit else ''}"
     )
     picture = Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
@@ -43,7 +43,7 @@ def response(of: Material) -> Section:
         for f, polar, c, n in zip(frequency, polar_rows(one, BOUND_95), one.coherence, of.of.valid)
     ]
     step = -(-len(rows) // _LINES_SHOWN)
-    note = f"Every {step}. line of {len(rows)}; responses.parquet has all." if step > 1 else ""
+    note = f"Every {step}th of {len(rows)} lines; responses.parquet contains all." if step > 1 else ""
     table = Table(
         ("Hz", f"dB{_re(of)}", "± dB", "degrees", "± degrees", "coherence γ²", "valid"),
         tuple(rows[::step]), tuple(range(7)), note,
@@ -52,7 +52,7 @@ def response(of: Material) -> Section:
 
 
 def tracking(of: Material) -> Section:
-    """Magnitude of the lines over time and, where there is one, the schedule."""
+    """Magnitude of the lines over time and over the schedule, if there is one."""
     where = f" and over {of.channels.get('schedule', 'the schedule')}" if by_schedule(of.of) else ""
     shown = of.of.overview
     if len(shown.lines) <= _TRACES_MAX:
@@ -63,7 +63,7 @@ def tracking(of: Material) -> Section:
 
 
 def parameters(of: Material) -> Section | str:
-    """What was fitted: of the mean, the newest, and over time."""
+    """Fitted parameters: of the mean, newest, and over time."""
     tracks = [t for t in of.tracks.values() if t.model != MARGINS]
     if of.fit is None and not tracks:
         return of.fit_words
@@ -74,10 +74,10 @@ def parameters(of: Material) -> Section | str:
     rows = []
     for name in dict.fromkeys([*fitted, *newest]):
         now = newest.get(name)
-        mean = with_bound(*fitted[name]) if name in fitted else ("held" if now and not now.sigma else "—", "")
+        mean = with_bound(*fitted[name]) if name in fitted else ("fixed" if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
         rows.append((name.replace("_", " "), *mean, *late, units.get(name) or (now.unit if now else "")))
-    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % where the model is complete."
+    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % if the model is complete."
     at = next((n.time_s for n in newest.values()), float("nan"))
     headings = ("", "of the mean", "±", f"newest, at {moment(at, 2)}" if newest else "newest", "±", "unit")
     if of.fit is not None:
@@ -85,8 +85,8 @@ def parameters(of: Material) -> Section | str:
         words = (
             f"The {of.fit.model.name} model, fitted to {of.fit_words}, at {many(of.fit.lines, 'line')} from {low:g} "
         )
-        words += f"to {high:g} Hz. It lacks ε = {100 * of.fit.epsilon:.2g} % of |G|"
-        words += f"; reduced χ² {of.fit.chi2:.3g} by sigma alone." if isfinite(of.fit.chi2) else "."
+        words += f"to {high:g} Hz. Model error ε = {100 * of.fit.epsilon:.2g} % of |G|"
+        words += f"; reduced χ² {of.fit.chi2:.3g} from sigma alone." if isfinite(of.fit.chi2) else "."
         parts.append(Paragraph(words))
     else:
         parts.append(Paragraph(of.fit_words))
@@ -96,12 +96,12 @@ def parameters(of: Material) -> Section | str:
 
 
 def motion(of: Material) -> Section | None:
-    """The model that moved as the axis did; None where the run was not freed from its motion."""
+    """The model of the axis in motion; None if the run was not corrected for motion."""
     model = of.run.found.get("motion", {}).get("model")
     if model is None:
         return None
     words = (
-        f"The newest chunk's model: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg; on the way:"
+        f"The newest chunk's model: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg; by position:"
     )
     columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
     rows = tuple((f"{x:.4g}", f"{k:.5g}", f"{b:.4g}") for x, k, b in columns)
@@ -110,7 +110,7 @@ def motion(of: Material) -> Section | None:
 
 
 def margins(of: Material) -> Section | str:
-    """The loop's margins, with bounds, and where they were read."""
+    """The margins of the loop, with bounds and frequencies."""
     if of.loop is None:
         return of.loop_words
     if of.loop.message:
@@ -127,11 +127,11 @@ def margins(of: Material) -> Section | str:
         rows.append((WORDS[name], *with_bound(value, bound[i]), unit, f"{at:.4g}", mark))
     size, around, at_hz = of.loop.at_lines
     about = "" if of.fit is None else f"Of the fit: {of.fit.about_bounds}. "
-    note = f"{about}At the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
+    note = f"{about}From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
     note += f"(at {at_hz:g} Hz). Tuning {of.loop.tuning.verdict}: {of.loop.tuning.sentence}"
-    table = Table(("", "", "±", "unit", "at Hz", "read"), tuple(rows), (1, 2, 4), note)
+    table = Table(("margin", "value", "±", "unit", "at Hz", "range"), tuple(rows), (1, 2, 4), note)
     caption = (
-        "Open loop L by the fit with its 95 % band, and the measured lines; right: near −1, with the circle of Ms."
+        "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
     )
     parts: list[Part] = [table, Picture("loop", {"found": of.loop}, caption)]
     if MARGINS in of.tracks and _moving(of.tracks[MARGINS]):
@@ -140,7 +140,7 @@ def margins(of: Material) -> Section | str:
 
 
 def events(of: Material) -> Section:
-    """Alarms and all else that happened."""
+    """Alarms and other events."""
     monitoring = of.run.summary.get("monitoring", {})
     words = alarms(of.run, of.happenings)[0].text
     if monitoring.get("baseline"):
@@ -152,22 +152,22 @@ def events(of: Material) -> Section:
 
 
 def quality(of: Material) -> Section:
-    """Gaps, bad samples, responses that are not valid, and how the source did."""
+    """Gaps, bad samples, invalid responses and the state of the source."""
     counts = of.run.summary.get("counts", {})
     rows = [
         ("samples", f"{of.samples:,}"),
         *((words, f"{counts[key]:,}") for key, words in _COUNTS.items() if counts.get(key) is not None),
         ("responses", f"{of.of.count:,}"),
-        ("with a line that is not valid", f"{of.of.incomplete:,} ({share(of.of.incomplete, of.of.count)})"),
+        ("with an invalid line", f"{of.of.incomplete:,} ({share(of.of.incomplete, of.of.count)})"),
     ]
     table = pairs(rows)
     parts: list[Part] = [table]
     if "counts" not in of.run.summary:
-        parts.append(Paragraph("The counts of samples come with the end of the run."))
+        parts.append(Paragraph("The counts of samples are written at the end of the run."))
     if source := of.run.summary.get("source"):
         parts.append(pairs([(_SOURCE.get(key, key), _plain(value)) for key, value in source.items()]))
     if (speed := of.run.summary.get("speed")) is not None:
-        words = f"{speed['recorded_s']:.4g} s of machine were tracked in {speed['run_s']:.3g} s"
+        words = f"{speed['recorded_s']:.4g} s of signals were tracked in {speed['run_s']:.3g} s"
         parts.append(Paragraph(f"{words} ({speed['times_real_time']:.3g} times real time)."))
     return Section("Data quality", tuple(parts))
 
@@ -177,17 +177,17 @@ _COUNTS = {
     "implausible": "implausibly large samples", "spike": "spikes",
 }  # fmt: skip
 _SOURCE = {
-    "connected": "connection stood at the end", "lost": "lost samples", "silent_s": "silent, s",
-    "measured_hz": "rate by arrival, Hz", "clock_offset_s": "sender's clock at sample 0",
+    "connected": "connected at the end", "lost": "lost samples", "silent_s": "silent, s",
+    "measured_hz": "rate of arrival, Hz", "clock_offset_s": "sender's clock at sample 0",
     "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "waiting_s": "backlog, s",
     "first_sample": "first sample", "counts": "events",
 }  # fmt: skip
 
 
 def validation(of: Material) -> Section | str:
-    """What fresh data said of the model, or that none were asked."""
+    """Validation of the model on independent data, or why there is none."""
     if of.judged is None:
-        return "No validation: the model was not judged on fresh data. `livebode report RUN --on FRESH` does that."
+        return "No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`."
     parts: list[Part] = [Paragraph(f"{v.sentence}.") for v in of.judged.found]
     rows = tuple(
         (
@@ -197,7 +197,7 @@ def validation(of: Material) -> Section | str:
         for v in of.judged.found
         for c in v.correlations
     )  # fmt: skip
-    headings = ("model", "ε with", "lags inside", "largest", "p together", "counts")
+    headings = ("model", "ε with", "lags inside", "largest", "joint p", "counts")
     parts.append(Table(headings, rows, (2, 3, 4), " ".join(f"{n}." for n in of.judged.notes)))
     caption = f"On {of.judged.on}: measured and simulated output, and the residual's correlations with their limits."
     parts.append(Picture("validation", {"found": of.judged.found}, caption))
@@ -205,12 +205,12 @@ def validation(of: Material) -> Section | str:
 
 
 def settings(of: Material) -> Section:
-    """The configuration as it would stand in a file, with everything that was left out filled in."""
+    """The complete configuration as TOML, with all defaults."""
     return Section("Settings", (Listing(to_toml(of.configuration) or "# none"),))
 
 
 def versions(of: Material) -> Section:
-    """What ran."""
+    """Versions of the software."""
     rows = [(name.replace("_", " "), str(value)) for name, value in of.run.summary.get("versions", {}).items()]
     return Section("Versions", (pairs(rows),))
 
@@ -236,7 +236,7 @@ def _thinned(of: Material) -> str:
 
 
 def _drawn(of: Material, kept: int) -> str:
-    return f" (thinned: {kept:,} of {of.of.count:,} responses are drawn)" if kept < of.of.count else ""
+    return f" (thinned: {kept:,} of {of.of.count:,} responses)" if kept < of.of.count else ""
 
 
 def _re(of: Material) -> str:

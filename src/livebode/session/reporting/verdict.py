@@ -1,4 +1,4 @@
-"""The first page in sentences: alarms, what to check, what is not assessed, and what is OK."""
+"""The findings of the first page: alarms, what to check, what is not assessed, and what is OK."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from livebode.session.reporting.wording import many, share
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
 _INVALID_MANY = 0.05
 _EPSILON_LARGE = 0.1
-# Usual in motion control: below them a loop rings.
+# Usual limits in motion control; a loop beyond them rings.
 _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
 _TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "check", "cannot be judged": "open"}
 
@@ -39,7 +39,7 @@ def _record(of: Material) -> list[Finding]:
         found.append(
             Finding(
                 "check",
-                "The run is not finished: it is still recorded, or it was stopped. The report covers what is there.",
+                "The run is not finished: it is still recording, or it was stopped. The report covers the data so far.",
             )
         )
     found += [
@@ -70,7 +70,7 @@ def _signals(of: Material) -> list[Finding]:
 def _valid(of: Material) -> list[Finding]:
     bad, every = of.of.incomplete, of.of.count
     text = f"{many(every, 'response')} at {many(len(of.run.lines), 'line')}; {bad:,} of them ({share(bad, every)}) "
-    text += "have a line that is not valid (the first window after a start or a gap never is)."
+    text += "have an invalid line (the first window after a start or a gap is always invalid)."
     found = [Finding("check" if bad > _INVALID_MANY * every else "ok", text)]
     if never := [f"{f:g} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
         found.append(Finding("check", f"Never valid: {', '.join(never[:8])}{' …' * (len(never) > 8)}."))
@@ -80,17 +80,17 @@ def _valid(of: Material) -> list[Finding]:
 def _fits(of: Material) -> list[Finding]:
     if of.fit is None:
         return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
-    lacks = f"it lacks ε = {100 * of.fit.epsilon:.2g} % of |G|"
+    lacks = f"model error ε = {100 * of.fit.epsilon:.2g} % of |G|"
     rough = of.fit.epsilon > _EPSILON_LARGE
     if rough and of.of.moved:
-        lacks += "; the axis moved, and one model of its mean cannot hold: read the fits along the run"
-    found = [Finding("check" if rough else "ok", f"The {of.fit.model.name} model fits the run's average: {lacks}.")]
+        lacks += "; the axis moved, so one model of the mean is not valid: see the fits over the run"
+    found = [Finding("check" if rough else "ok", f"The {of.fit.model.name} model, fitted to the run's mean: {lacks}.")]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
             reasons = ", ".join(f"{count:,} {word}" for word, count in why.items())
             tone = "check" if not_ok > _INVALID_MANY * every else "ok"
-            found.append(Finding(tone, f"Of {many(every, 'fit')} along the run {not_ok:,} have no number: {reasons}."))  # type: ignore[arg-type]
+            found.append(Finding(tone, f"Of {many(every, 'fit')} over the run, {not_ok:,} were rejected: {reasons}."))  # type: ignore[arg-type]
     return found
 
 
@@ -101,7 +101,7 @@ def _margins(of: Material) -> list[Finding]:
     if not least:
         return [Finding("check", f"No margins: {of.loop.message}.")]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
-    where = f"over {many(len(of.loop.places), 'fit')} along the way" if len(of.loop.places) > 1 else "of the fit"
+    where = f"of {many(len(of.loop.places), 'fit')} over the run" if len(of.loop.places) > 1 else "of the fit"
     sizes = [
         f"{words} {least[name]:.3g}{unit}" if isfinite(least[name]) else f"{words} without limit"
         for words, name, unit in (
@@ -116,6 +116,6 @@ def _margins(of: Material) -> list[Finding]:
 
 def _validated(of: Material) -> list[Finding]:
     if of.judged is None:
-        text = "The model was not judged on fresh data; `livebode report RUN --on FRESH` does it."
+        text = "The model was not validated on independent data; use `livebode report RUN --on LOG`."
         return [Finding("open", text)] if of.fit is not None else []
     return [Finding(_TRUSTED[v.verdict], f"On {of.judged.on}: {v.sentence}.") for v in of.judged.found]

@@ -1,4 +1,4 @@
-"""Numbers, moments and settings as a reader of a report expects them."""
+"""Numbers, times and settings as a report shows them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from livebode.core.document import Table
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 BOUND_95 = float(np.sqrt(np.log(20.0)))
-"""`Response.bound` of this holds with 95 %."""
+"""`Response.bound(BOUND_95)` covers the true value with 95 %."""
 
 
 def many(number: int, noun: str) -> str:
@@ -47,7 +47,7 @@ def duration(of_s: float) -> str:
 
 
 def with_bound(value: float, bound: float) -> tuple[str, str]:
-    """Value and bound with as many digits as the bound's second one.
+    """Value and bound, rounded to two significant digits of the bound.
 
     >>> with_bound(501234.5, 1234.5), with_bound(0.0028, 1.2e-5), with_bound(3.0, float("nan"))
     (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
@@ -55,7 +55,7 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
     if not isfinite(value):
         return "—", "—"
     if not isfinite(bound) or bound <= 0:
-        return f"{value:.5g}", "held" if bound == 0 else "not known"
+        return f"{value:.5g}", "fixed" if bound == 0 else "not known"
     digits = 1 - floor(log10(bound))
     if abs(value) >= 1e7 or digits > 9:
         return f"{value:.5g}", f"{bound:.2g}"
@@ -63,14 +63,14 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
 
 
 def decibels(size: float) -> float:
-    """20·log10, −inf of zero."""
+    """20·log10; −inf for zero."""
     return 20 * log10(size) if size > 0 else -float("inf")
 
 
 def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
-    """Magnitude in dB, its bound, degrees, their bound, of a value that is known within a circle.
+    """Magnitude in dB with its bound and phase in degrees with its bound, for a value with a circular bound.
 
-    The bound in dB is the wider side, towards zero; where zero is within, neither has one.
+    The bound in dB is the larger side, towards zero. A circle that contains zero gives no bounds.
     """
     size = abs(value)
     if not isfinite(size) or size == 0:
@@ -79,7 +79,7 @@ def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
     if not isfinite(radius):
         return db, "not known", deg, "not known"
     if radius >= size:
-        return db, "any", deg, "any"
+        return db, "unbounded", deg, "unbounded"
     return db, f"{-decibels(1 - radius / size):.2g}", deg, f"{np.degrees(np.arcsin(radius / size)):.2g}"
 
 
@@ -97,12 +97,12 @@ def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:
 
 
 def pairs(rows: list[tuple[str, str]]) -> Table:
-    """Names and values, without those that have none."""
+    """A table of names and values, without empty values."""
     return Table(("", ""), tuple((name, value) for name, value in rows if value))
 
 
 def to_toml(values: dict[str, Any]) -> str:
-    """Plain data as TOML; what is None is left out.
+    """Plain data as TOML, without values that are None.
 
     >>> print(to_toml({"lines": {"window": 400, "frequencies": "20:140:20"}, "fit": None}))
     [lines]
@@ -115,7 +115,7 @@ def to_toml(values: dict[str, Any]) -> str:
 def _section(values: dict[str, Any], path: tuple[str, ...]) -> list[str]:
     inner = {name: value for name, value in values.items() if isinstance(value, dict)}
     own = [f"{_key(n)} = {_value(v)}" for n, v in values.items() if n not in inner and v is not None]
-    # An empty section says that what it names is wanted; within another one it says nothing.
+    # An empty section switches its feature on; within another section it has no effect.
     head = [f"\n[{'.'.join(map(_key, path))}]"] if path and (own or (not inner and len(path) == 1)) else []
     return head + own + [line for name, value in inner.items() for line in _section(value, (*path, name))]
 
@@ -130,6 +130,6 @@ def _value(value: Any) -> str:
     if isinstance(value, float) and not isfinite(value):
         return str(value)
     if isinstance(value, str):
-        # JSON's escapes are TOML's, but for this one character that JSON leaves as it is.
+        # The escapes of JSON are valid in TOML, except for this character, which JSON does not escape.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return json.dumps(value)
