@@ -144,7 +144,7 @@ def test_files_that_are_not_what_they_seem(log: Path, tmp_path: Path) -> None:
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=nan\nrate_hz=1000",
          ("loop.velocity.gain = nan", "finite")),
         ("[source]\nlog='log.parquet'\n[signals]\noutput='y'\n[loop.velocity]\ngain=1\nrate_hz=500",
-         ("loop.velocity runs at 500 Hz", "1000 Hz", "held_ticks")),
+         ("loop.velocity has a rate of 500 Hz", "1000 Hz", "held_ticks")),
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("log")
