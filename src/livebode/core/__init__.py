@@ -1,6 +1,6 @@
 """The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
-from livebode.core.block import Block, Channel, missing_channel, nearest_channel
+from livebode.core.block import Block, Channel, nearest_name
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
     BaselineError,
@@ -68,8 +68,7 @@ __all__ = [
     "UsageError",
     "as_model",
     "counted",
-    "missing_channel",
-    "nearest_channel",
+    "nearest_name",
     "rms",
     "rounded_down",
     "widened",

@@ -128,7 +128,7 @@ class Block:
             raise SignalError(
                 "channel-unknown",
                 f"there is no channel {name!r}",
-                nearest_channel(name, self.names),
+                nearest_name(name, self.names),
                 channel=name,
                 allowed=list(self.names),
             ) from None
@@ -139,23 +139,14 @@ class Block:
         return replace(self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0)
 
 
-def missing_channel(name: str, names: Iterable[str]) -> str:
-    """The message for a channel that does not exist, with the nearest name.
+def nearest_name(name: str, names: Iterable[str], what: str = "Channels") -> str:
+    """The remedy for a name that does not exist: the nearest one, and all of them, which are `what`.
 
-    >>> missing_channel("iq_adX", ["iq_adx", "theta_mx"])
-    "there is no channel 'iq_adX'; did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
-    """
-    return f"there is no channel {name!r}; {nearest_channel(name, names)}"
-
-
-def nearest_channel(name: str, names: Iterable[str]) -> str:
-    """The remedy for a channel that does not exist.
-
-    >>> nearest_channel("iq_adX", ["iq_adx", "theta_mx"])
+    >>> nearest_name("iq_adX", ["iq_adx", "theta_mx"])
     "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
     """
     known = list(names)
     folded = {k.casefold(): k for k in known}
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
     hint = f"did you mean {folded[near[0]]!r}? " if near else ""
-    return f"{hint}Channels: {', '.join(known) or 'none'}"
+    return f"{hint}{what}: {', '.join(known) or 'none'}"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import UsageError, missing_channel
+from livebode.core import UsageError, nearest_name
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.physical import Grid, PhysicalModel
 
@@ -66,7 +66,7 @@ class Problem:
                 raise UsageError(
                     "unknown-name",
                     f"the model {model.name!r} has no parameter {name!r}",
-                    _nearest(name, model),
+                    nearest_name(name, model.names, f"Parameters of {model.name!r}"),
                     argument="fixed" if name in fixed else "free",
                     value=name,
                     allowed=list(model.names),
@@ -205,7 +205,3 @@ class Problem:
         moved[np.arange(1, n + 1), :, np.arange(n)] += _STEP
         every = self.model.at(self._outward(moved, np.broadcast_to(start, (n + 1, *start.shape)), scale), self.grid)
         return every[0], np.moveaxis((every[1:] - every[0]) / _STEP, 0, -1)
-
-
-def _nearest(name: str, model: PhysicalModel) -> str:
-    return missing_channel(name, model.names).partition("; ")[2].replace("Channels", f"Parameters of {model.name!r}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from livebode.core import LivebodeError, SignalError, nearest_channel
+from livebode.core import LivebodeError, SignalError, nearest_name
 from livebode.session.axis import Axis
 from livebode.session.fits import Fits
 from livebode.session.follower import Follower
@@ -52,7 +52,7 @@ class Pipeline:
                 raise SignalError(
                     "channel-unknown",
                     f"there is no channel {name!r}",
-                    nearest_channel(name, names),
+                    nearest_name(name, names),
                     channel=name,
                     allowed=names,
                 )

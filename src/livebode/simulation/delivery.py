@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, SignalError, UsageError, missing_channel
+from livebode.core import Block, Channel, SignalError, UsageError, nearest_name
 
 CHANNELS = (
     Channel("w", "N m"),
@@ -51,7 +51,13 @@ def delivered(
     names = [channel.name for channel in CHANNELS]
     for name in channels or ():
         if name not in names:
-            raise SignalError("channel-unknown", missing_channel(name, names), channel=name, channels=names)
+            raise SignalError(
+                "channel-unknown",
+                f"there is no channel {name!r}",
+                nearest_name(name, names),
+                channel=name,
+                channels=names,
+            )
     rows = [names.index(name) for name in (names if channels is None else channels)]
     labels = tuple(CHANNELS[i] for i in rows)
     chosen = (Block(block.data[rows], labels, block.rate_hz, start=block.start) for block in blocks)

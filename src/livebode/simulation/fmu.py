@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, ExtraError, SimulationError, UsageError, missing_channel
+from livebode.core import Block, Channel, ExtraError, SimulationError, UsageError, nearest_name
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
 from livebode.simulation.divergence import diverged
@@ -133,7 +133,12 @@ class FmuAxis:
         for name in names:
             if name not in known:
                 raise UsageError(
-                    "unknown-name", missing_channel(name, known), value=name, allowed=list(known), path=str(self.path)
+                    "unknown-name",
+                    f"there is no channel {name!r}",
+                    nearest_name(name, known),
+                    value=name,
+                    allowed=list(known),
+                    path=str(self.path),
                 )
         return [known[name] for name in names]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
-from livebode.core import RecordingError, missing_channel
+from livebode.core import RecordingError, nearest_name
 from livebode.sources.recording import Column
 
 
@@ -36,14 +36,5 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
             )
     names = [column.name for column in columns if not column.temporal]
     raise RecordingError(
-        "channel-unknown", f"there is no channel {name!r}", nearest(name, names), channel=name, channels=names
+        "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
-
-
-def nearest(name: str, names: Iterable[str]) -> str:
-    """The remedy for an unknown channel: the nearest name, and all names.
-
-    >>> nearest("iq_adX", ["iq_adx", "theta_mx"])
-    "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
-    """
-    return missing_channel(name, names).removeprefix(f"there is no channel {name!r}; ")

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import RecordingError
-from livebode.sources.naming import nearest
+from livebode.core import RecordingError, nearest_name
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.rounding import exact_rate_hz
 from livebode.sources.steps import Gap, Steps
@@ -93,7 +92,7 @@ def find_time(columns: Sequence[Column], time: str | None) -> tuple[Column | Non
     raise RecordingError(
         "channel-unknown",
         f"there is no time column {bare!r}",
-        nearest(bare, names),
+        nearest_name(bare, names),
         argument="time",
         channel=bare,
         channels=names,

@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout
+from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout, nearest_name
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause
@@ -28,7 +28,6 @@ from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.spectra_batch import AnyBatch
-from livebode.sources.naming import nearest
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
@@ -201,7 +200,7 @@ class LiveSource(ABC):
                 raise SourceError(
                     "channel-unknown",
                     f"there is no channel {name!r}",
-                    nearest(name, names),
+                    nearest_name(name, names),
                     channel=name,
                     channels=names,
                 )
