@@ -1,4 +1,4 @@
-"""The smallest axis.toml that tracks: three lines of the signals that `tests.command.signals` makes."""
+"""The smallest axis.toml: three lines of the signals of `tests.command.signals`, and one line without excitation."""
 
 SMALL_AXIS = """
 [signals]
@@ -12,3 +12,18 @@ window = 100
 hop = 20
 """
 WITH_SCHEDULE = SMALL_AXIS.replace('output = "y"\n', 'output = "y"\nschedule = "n"\n')
+ONE_LINE = """
+[signals]
+output = "y"
+input = "w"
+[lines]
+frequencies = "100"
+window = 400
+"""
+"""Without an excitation; valid with the direct estimator only."""
+ONE_LINE_DIRECT = (
+    ONE_LINE
+    + """[tracking]
+estimator = "direct"
+"""
+)

@@ -20,10 +20,10 @@ from livebode.doctor.secrets import REMOVED, Secrets
 from livebode.session.axis import MAY_BE_SECRET, Axis
 from livebode.session.experiment import Experiment
 from tests.command import livebode, signals
+from tests.small_axis import ONE_LINE
 from tests.support.runs import small_run
 
 SECRET = "hunter2-and-more"
-REST = '[signals]\noutput = "y"\ninput = "w"\n[lines]\nfrequencies = "100"\nwindow = 400\n'
 
 
 def models(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -100,7 +100,7 @@ def test_a_value_is_kept_exactly_where_its_key_holds_no_secret(tmp_path: Path, p
 )
 def test_no_secret_of_a_configuration_is_in_the_bundle(tmp_path: Path, source: str) -> None:
     path = tmp_path / "axis.toml"
-    path.write_text(f"[source]\n{source}\n{REST}")
+    path.write_text(f"[source]\n{source}\n{ONE_LINE}")
     found = tmp_path / "report.zip"
     done = livebode("--log-file", tmp_path / "own.log", "doctor", path, "--bundle", found)
     assert found.exists(), done.err

@@ -24,6 +24,7 @@ from livebode.sources.live.address import PORTS
 from tests.command import livebode, signals, write_parquet
 from tests.peers.peer import Feeding, batches, free_port, send_all, until
 from tests.peers.plain import TcpPeer
+from tests.small_axis import ONE_LINE
 from tests.support.runs import small_run
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z (DEBUG|INFO|WARNING|ERROR) livebode\.[a-z0-9_.]+: .+")
@@ -125,7 +126,6 @@ SOURCES = {
     "opc.tcp": f'url = "opc.tcp://127.0.0.1:{{port}}"\nrate_hz = 1000\n{LOGIN}\n[source.nodes]\ny = "ns=2;s=y"',
     "ads": 'url = "ads://127.0.0.1:{port}"\nnet_id = "5.1.2.3.1.1"\nsymbol = "MAIN.r"\nchannels = ["w", "y"]',
 }
-REST = '[signals]\noutput = "y"\ninput = "w"\n[lines]\nfrequencies = "100"\nwindow = 400\n'
 
 
 def test_every_kind_of_url_is_in_the_test_below() -> None:
@@ -137,7 +137,9 @@ def test_a_source_that_does_not_answer_is_logged_with_its_address_and_without_a_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, kind: str
 ) -> None:
     monkeypatch.setenv("LIVEBODE_TEST_PASSWORD", SECRET)
-    (tmp_path / "axis.toml").write_text(f"[source]\ntimeout_s = 0.2\n{SOURCES[kind].format(port=free_port())}\n{REST}")
+    (tmp_path / "axis.toml").write_text(
+        f"[source]\ntimeout_s = 0.2\n{SOURCES[kind].format(port=free_port())}\n{ONE_LINE}"
+    )
     axis = Axis.read(tmp_path / "axis.toml")
     with caplog.at_level(logging.DEBUG, "livebode"), pytest.raises(SourceError):
         make_source(axis.source).open()
@@ -165,7 +167,7 @@ def test_a_source_that_does_not_answer_is_logged_with_its_address_and_without_a_
     ],
 )
 def test_a_configuration_that_is_refused_is_logged_without_its_secret(tmp_path: Path, source: str) -> None:
-    (tmp_path / "axis.toml").write_text(f"[source]\n{source}\n{REST}")
+    (tmp_path / "axis.toml").write_text(f"[source]\n{source}\n{ONE_LINE}")
     own = tmp_path / "own.log"
     done = livebode("--log-level", "debug", "run", tmp_path / "axis.toml", "--log-file", own)
     assert done.code == 2

@@ -12,18 +12,9 @@ from tests.command import livebode
 from tests.peers.broker import Mosquitto, publisher, stop
 from tests.peers.peer import CHANNELS, RATE_HZ, batches, until
 from tests.session_process import Running, events
+from tests.small_axis import ONE_LINE_DIRECT
 
 SECRET = "hunter2-and-more"
-REST = """
-[signals]
-output = "y"
-input = "w"
-[lines]
-frequencies = "100"
-window = 400
-[tracking]
-estimator = "direct"
-"""
 
 
 @pytest.mark.parametrize(
@@ -41,7 +32,7 @@ estimator = "direct"
     ],
 )
 def test_a_secret_in_the_configuration_is_refused_and_not_repeated(tmp_path: Path, source: str) -> None:
-    (tmp_path / "axis.toml").write_text(f"[source]\n{source}{REST}")
+    (tmp_path / "axis.toml").write_text(f"[source]\n{source}{ONE_LINE_DIRECT}")
     result = livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run")
     assert result.code == 2
     assert result.err.count("\n") == 1
@@ -52,9 +43,8 @@ def test_a_secret_in_the_configuration_is_refused_and_not_repeated(tmp_path: Pat
 def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PLC_PASSWORD", SECRET)
     with Mosquitto(tmp_path) as broker:
-        text = (
-            f'[source]\nurl = "mqtt://127.0.0.1:{broker.port}/t"\nusername = "plc"\npassword_env = "PLC_PASSWORD"{REST}'
-        )
+        login = 'username = "plc"\npassword_env = "PLC_PASSWORD"'
+        text = f'[source]\nurl = "mqtt://127.0.0.1:{broker.port}/t"\n{login}{ONE_LINE_DIRECT}'
         sender = publisher(broker.port)
         with Running(tmp_path, text, "--log-level", "debug") as running:
             until(lambda: broker.logged("Sending SUBACK"), "a subscription")
@@ -80,7 +70,7 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
 
 
 def test_options_hold_no_secret_either(tmp_path: Path) -> None:
-    (tmp_path / "axis.toml").write_text(f'[source]\nurl = "mqtt://h/t"\npassword_file = "p"{REST}')
+    (tmp_path / "axis.toml").write_text(f'[source]\nurl = "mqtt://h/t"\npassword_file = "p"{ONE_LINE_DIRECT}')
     (tmp_path / "p").write_text(SECRET)
     axis = ConfigurationFile(tmp_path / "axis.toml", {}).read()[""]
     assert SECRET not in repr(axis) + axis.model_dump_json()

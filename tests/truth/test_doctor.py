@@ -25,20 +25,11 @@ from livebode.doctor.udp_buffer import judged
 from livebode.kernel import instruction_sets
 from tests.command import livebode, signals, write_parquet
 from tests.peers.peer import free_port
+from tests.small_axis import ONE_LINE_DIRECT
 from tests.support.errors import refused
 from tests.support.runs import small_run
 
 ROOT = Path(__file__).parents[2]
-REST = """
-[signals]
-output = "y"
-input = "w"
-[lines]
-frequencies = "100"
-window = 400
-[tracking]
-estimator = "direct"
-"""
 FULL_DISK = """
 import contextlib, pathlib, sys
 from livebode.doctor.disk import check_disk
@@ -58,7 +49,7 @@ def doctor(*arguments: object) -> tuple[int, dict[str, dict[str, Any]]]:
     return done.code, {check["name"]: check for check in json.loads(done.out)["checks"]}
 
 
-def axis(folder: Path, source: str, rest: str = REST) -> Path:
+def axis(folder: Path, source: str, rest: str = ONE_LINE_DIRECT) -> Path:
     path = folder / "axis.toml"
     path.write_text(f"[source]\n{source}\n{rest}")
     return path
@@ -110,7 +101,7 @@ def test_a_port_of_the_dashboard_that_is_taken_fails_where_the_configuration_ser
     write_parquet(tmp_path / "log.parquet", signals(100))
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        path = axis(tmp_path, 'log = "log.parquet"', f"{REST}[serve]\nport = {port}\n")
+        path = axis(tmp_path, 'log = "log.parquet"', f"{ONE_LINE_DIRECT}[serve]\nport = {port}\n")
         code, checks = doctor(path)
         assert code == 2
         assert checks["dashboard port"]["verdict"] == "failed"
@@ -151,7 +142,7 @@ def test_a_port_that_another_program_receives_udp_on_fails(tmp_path: Path) -> No
 def test_each_of_several_axes_is_asked_for_its_source(tmp_path: Path) -> None:
     write_parquet(tmp_path / "a.parquet", signals(100))
     path = tmp_path / "axes.toml"
-    path.write_text(f'[axes.a.source]\nlog = "a.parquet"\n[axes.b.source]\nlog = "b.parquet"\n{REST}')
+    path.write_text(f'[axes.a.source]\nlog = "a.parquet"\n[axes.b.source]\nlog = "b.parquet"\n{ONE_LINE_DIRECT}')
     checks = doctor(path)[1]
     assert checks["configuration"]["facts"]["axes"] == ["a", "b"]
     assert (checks["source of a"]["verdict"], checks["source of b"]["verdict"]) == ("ok", "failed")
@@ -163,8 +154,8 @@ def test_each_of_several_axes_is_asked_for_its_source(tmp_path: Path) -> None:
     [
         ('[source]\nlog = "a"\n[signals]\noutputs = "y"\n', "outputs"),
         ("[source\n", "TOML"),
-        ('[source]\nurl = "udp://127.0.0.1:5000"\nrate_hz = 1000\n' + REST.replace('"100"', '"101"'), "101"),
-        ('[source]\nlog = "a"\n' + REST + '[monitoring]\nbaseline = "none.json"\n', "none.json"),
+        ('[source]\nurl = "udp://127.0.0.1:5000"\nrate_hz = 1000\n' + ONE_LINE_DIRECT.replace('"100"', '"101"'), "101"),
+        ('[source]\nlog = "a"\n' + ONE_LINE_DIRECT + '[monitoring]\nbaseline = "none.json"\n', "none.json"),
         ("[excitation]\nband_hz = [1, 2]\nwhat = 3\n[belt.mechanics]\n", "excitation.what"),
     ],
 )
