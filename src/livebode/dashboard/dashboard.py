@@ -22,6 +22,9 @@ from livebode.dashboard.viewed import Viewed
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096
 """Connections that the system queues until they are accepted; a client that finds no room retries a second later."""
+UNREAD_BYTES = 64 << 10
+"""Part of an answer that the system buffers for a client that does not read; else it takes megabytes, and the requests
+behind the first one are answered too, at the expense of others."""
 _START_S = 30.0
 _END_S = 2
 _logger = logging.getLogger(__name__)
@@ -192,6 +195,7 @@ def listening(serving: Serving) -> socket.socket:
     found = socket.socket(family, socket.SOCK_STREAM)
     try:
         found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, UNREAD_BYTES)  # accepted connections inherit it
         found.bind((serving.address, serving.port))
         found.listen(BACKLOG)
         found.setblocking(False)
