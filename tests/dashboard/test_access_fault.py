@@ -263,7 +263,7 @@ def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path,
 
 
 def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "dashboard.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "dashboard.md").read_text()
     command = re.search(r"^    (.*token_urlsafe.*)$", text, re.MULTILINE).group(1)
     path = tmp_path / "token"
     command = command.replace("/etc/livebode/token", str(path)).replace("python ", f"{sys.executable} ")
