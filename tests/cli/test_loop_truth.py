@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from examples.closed_loop import RATE_HZ, Drive
 from livebode.analysis.loop_report import loop_of_run
 from livebode.core import Lines
 from livebode.excitation import multisine
@@ -19,9 +18,10 @@ from livebode.fitting import mean_response
 from livebode.margins import margins
 from livebode.records import Run
 from livebode.records.summary_file import to_document
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.margins.test_margins_truth import read
 from tests.support.command import livebode, write_parquet
-from tests.support.loops import BELT, Case, parameters, values
+from tools.loops import BELT, Case, parameters, values
 
 LINES = Lines.parse("20:140:10", RATE_HZ, 400)
 AXIS = """
@@ -56,7 +56,7 @@ radius_m = 0.019
 def record(path: Path, seed: int, late: int = 0) -> Path:
     """Two seconds of the closed loop, with a gap in it; u acts `late` ticks after it was logged."""
     w = 0.3 * multisine(LINES)
-    u, y = Drive().run(w, 20, sigma=0.1, seed=seed)
+    u, y = TwoMassLoop().run(w, 20, sigma=0.1, seed=seed)
     columns = {"w": np.resize(w, u.size), "u": np.roll(u[0], -late), "y": y[0]}
     columns["y"][700] = np.nan
     return write_parquet(path, columns)

@@ -15,7 +15,7 @@ from livebode.simulation import BeltAxis, SimulatedAxis
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
 from tests.support.experiments import extremes
-from tests.support.structured_text import Machine
+from tools.structured_text import Machine
 
 RATE_HZ = 4000
 LOOP = """

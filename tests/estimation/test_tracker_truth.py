@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 from examples.loop_costs import costs
 from livebode.core import PID, Block, Cascade, Lines, Loop, Response
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
-TRUTH = Plant().response(LINES.frequency_hz)
+TRUTH = TwoMassPlant().response(LINES.frequency_hz)
 VELOCITY = PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ)
 POSITION = PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2)
 LOOP = Loop(Cascade(VELOCITY, POSITION))
@@ -21,7 +21,7 @@ LOOP = Loop(Cascade(VELOCITY, POSITION))
 @pytest.fixture(scope="module")
 def record() -> Block:
     w = multisine(LINES)
-    u, y = Drive().run(w, periods=4)
+    u, y = TwoMassLoop().run(w, periods=4)
     return Block(np.array([np.tile(w, 4), u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
 
 
@@ -92,7 +92,7 @@ def test_excitation_at_the_velocity_reference() -> None:
     # Seen from the plant, a multisine v at the velocity reference is the multisine Cvel·v at the plant input.
     spectrum = np.zeros(201, dtype=complex)
     spectrum[list(LINES.bins)] = np.fft.rfft(w)[list(LINES.bins)] * inner
-    u, y = Drive().run(np.fft.irfft(spectrum, 400), periods=2)
+    u, y = TwoMassLoop().run(np.fft.irfft(spectrum, 400), periods=2)
     block = Block(np.array([np.tile(w, 2), u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
     loop = Loop(LOOP.feedback, entry=VELOCITY)
     assert error(last(block, estimator="indirect", loop=loop)) < 5e-6

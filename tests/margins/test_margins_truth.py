@@ -14,7 +14,7 @@ from livebode.core import PID, FitError, Lines, LivebodeError, Loop, Responses, 
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import Margins, OpenLoop, against_lines, margins
 from tests.support.errors import refused
-from tests.support.loops import BELT, MODEL, Case, parameters, values
+from tools.loops import BELT, MODEL, Case, parameters, values
 
 LINES = Lines.parse("20:140:5", rate_hz=4000, window=800)
 BAND_HZ = (20.0, 140.0)

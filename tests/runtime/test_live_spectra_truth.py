@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from examples.kernel_drive import KernelDrive
 from livebode.configuration.axis import Axis
 from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
@@ -25,6 +24,7 @@ from livebode.records import Run
 from livebode.runtime.watching import make_watching
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
+from livebode.sources.live.kernel_drive import KernelDrive
 from tests.cli.test_learn_truth import _small
 from tests.runtime.test_live_run_truth import started, table
 from tests.sources.test_live_contract import fed

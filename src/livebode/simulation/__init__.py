@@ -10,6 +10,7 @@ from livebode.simulation.motion import Motion, Standstill, Strokes
 from livebode.simulation.settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.source import SimulatedAxis
 from livebode.simulation.truth import Truth
+from livebode.simulation.two_mass_loop import TwoMassLoop, TwoMassPlant
 
 __all__ = [
     "Backlash",
@@ -36,5 +37,7 @@ __all__ = [
     "Strokes",
     "TensionLoss",
     "Truth",
+    "TwoMassLoop",
+    "TwoMassPlant",
     "linear",
 ]
