@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.loop_costs import costs
 from livebode.core import PID, Block, Cascade, Lines, Loop, Response
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
@@ -57,13 +56,6 @@ def test_float32_is_off_by_no_more_than_its_kernel_promises(record: Block, offse
 def test_indirect_is_the_sampled_plant(record: Block) -> None:
     # What remains is the image of the position loop, which runs at half the rate.
     assert error(last(record, estimator="indirect", loop=LOOP)) < 5e-6
-
-
-def test_every_wrong_word_about_the_loop_costs() -> None:
-    cost = costs()
-    assert cost.pop("as it is") < 5e-6
-    assert min(cost.values()) > 1e-4
-    assert cost["one tick of delay too many"] > 0.05
 
 
 @pytest.mark.parametrize("estimator", ["joint", "indirect"])

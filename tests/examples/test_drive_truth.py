@@ -17,8 +17,8 @@ import pytest
 from livebode import Lines, SlidingDFT, multisine
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.spectra_batch import SpectraBatch
-from tests.runtime.test_live_run_truth import started, table
 from tests.support.command import livebode, write_parquet
+from tests.support.live_runs import started, table
 from tests.support.peers.peer import PATIENCE_S, free_port
 from tests.support.targets import need_tools
 from tools.firmware import M4F, ROOT, run
