@@ -1,7 +1,16 @@
+// @ts-check
 // The frozen reference: a response that remains in the plot.
+/** @import { Page } from "./messages.js" */
+
 export const REFERENCE_GONE =
   "A new run with other lines or another quantity has started: the frozen reference was released.";
 
+/**
+ * @param {Page} page
+ * @param {{bode: import("./bode.js").Bode, link: import("./link.js").Link}} parts
+ * @param {HTMLElement} button
+ * @param {() => void} legend
+ */
 export function freezing(page, { bode, link }, button, legend) {
   function freeze() {
     if (page.frozen) {
@@ -22,6 +31,7 @@ export function freezing(page, { bode, link }, button, legend) {
     frozen(false);
   }
 
+  /** @param {boolean} is */
   function frozen(is) {
     page.frozen = is;
     button.textContent = is ? "Unfreeze" : "Freeze";
