@@ -4,7 +4,6 @@ import { Bode } from "./bode.js";
 import { setClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
-import { freezing, REFERENCE_GONE } from "./freezing.js";
 import { health } from "./health.js";
 import { Link } from "./link.js";
 import { byId as $, choose, element, segments } from "./make.js";
@@ -25,6 +24,7 @@ import { named } from "./words.js";
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
+const REFERENCE_GONE = "A new run with other lines or another quantity has started: the frozen reference was released.";
 /** @type {[name: Curves, words: string, line: string][]} */
 const LEGEND = [
   ["measured", "measured ±3σ", ""],
@@ -281,6 +281,34 @@ function legend() {
   );
 }
 
+// Freeze the response that is shown as a reference, or release the frozen one.
+function freeze() {
+  if (page.frozen) {
+    letGo();
+    return;
+  }
+  const timeS = bode.curves.measured?.frame.timeS[0];
+  if (timeS === undefined) return;
+  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
+  frozen(true);
+}
+
+function letGo() {
+  link.forget("freeze");
+  link.wish({ kind: "unfreeze" });
+  bode.drop("reference");
+  page.dirty.add("bode");
+  frozen(false);
+}
+
+/** @param {boolean} is */
+function frozen(is) {
+  page.frozen = is;
+  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
+  $("freeze").classList.toggle("primary", is);
+  legend();
+}
+
 /** @param {number} now */
 function draw(now) {
   requestAnimationFrame(draw);
@@ -306,7 +334,6 @@ function draw(now) {
 }
 
 const { fill, showMoment, goLive, drawRows } = past(page, { bode, tracking, timeline, link }, { complain, status });
-const { freeze, letGo } = freezing(page, { bode, link }, $("freeze"), legend);
 controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, events, timeline };
 requestAnimationFrame(draw);
