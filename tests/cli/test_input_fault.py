@@ -156,7 +156,7 @@ def test_configurations_that_cannot_be_used(tmp_path: Path, text: str, says: tup
         assert part in sentence
 
 
-def test_an_existing_directory_is_kept(log: Path, tmp_path: Path) -> None:
+def test_an_existing_directory_is_not_overwritten(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     assert livebode("run", log, *JOINT, *GRID, "--out", out).code == 0
     before = {p.name: p.read_bytes() for p in out.iterdir()}
@@ -245,7 +245,9 @@ def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signa
         ),
     ],
 )
-def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: str) -> None:
+def test_closed_pipes_and_unusual_terminals_end_without_a_traceback(
+    log: Path, tmp_path: Path, command: str, says: str
+) -> None:
     livebode_path = Path(sys.executable).with_name("livebode")
     line = command.format(livebode=livebode_path, log=log, out=tmp_path / "run")
     done = subprocess.run(["bash", "-o", "pipefail", "-c", line], capture_output=True, text=True, check=False)
@@ -254,7 +256,7 @@ def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: 
     assert says in done.stderr
 
 
-def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:
+def test_an_internal_error_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:
     monkeypatch.setattr("livebode.runtime.recording.make_follower", lambda *_: 1 / 0)
     result = livebode("run", log, *JOINT, *GRID, "--out", tmp_path / "run")
     assert result.code == 1

@@ -181,7 +181,7 @@ def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.Monkey
     assert connections_max() == most
 
 
-def test_faults_of_the_server_are_told_once_a_minute() -> None:
+def test_internal_errors_of_the_server_are_reported_once_a_minute() -> None:
     told = list[str]()
     faults = Faults(told.append)
     for _ in range(1000):

@@ -172,7 +172,7 @@ def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> N
         assert tab.wrong == []
 
 
-def test_the_whole_keyboard(browser: Browser, whole: Path) -> None:
+def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -398,7 +398,7 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
         assert tab.wrong == []
 
 
-def test_an_answer_to_an_earlier_wish_undoes_no_choice_of_an_axis(
+def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
     browser: Browser, whole: Path, tmp_path: Path
 ) -> None:
     with two_axes(browser, whole, tmp_path) as tab:

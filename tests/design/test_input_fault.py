@@ -223,7 +223,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("excitation", "code", "argument"), WRONG)
-def test_a_wish_that_makes_no_sense_is_refused(excitation, code, argument):
+def test_a_contradictory_specification_is_refused(excitation, code, argument):
     asked = Experiment.of({"excitation": completed(excitation), "belt": {}}, "here")
     error = refusal(lambda: choose(asked.wish(), MACHINE))
     assert (error.code, error.facts.get("argument")) == (code, argument), error
@@ -357,7 +357,7 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
     assert "is not TOML" in livebode("design", broken).err
 
 
-def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experiment, tmp_path):
+def test_only_the_files_of_a_previous_design_are_replaced(experiment, tmp_path):
     out = tmp_path / "design"
     assert livebode("design", experiment, "--out", out).code == 0
     assert "exists already" in livebode("design", experiment, "--out", out).err

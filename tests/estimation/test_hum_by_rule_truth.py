@@ -170,7 +170,7 @@ def test_hum_is_shown_where_the_excitation_is_not_recognised(tmp_path: Path) -> 
     assert "The excitation is not recognised" in shown.out
 
 
-def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) -> None:
+def test_inspect_reports_that_hum_was_not_found_or_could_not_be_judged(tmp_path: Path) -> None:
     quiet = recording(tmp_path / "quiet.parquet", 4.0, 0.0, level=0.0)
     assert "no hum of the mains is visible in 4 s" in livebode("inspect", quiet, *LINES, *SIGNALS).out
     excited = recording(tmp_path / "excited.parquet", 0.5, 3.0)

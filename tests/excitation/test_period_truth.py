@@ -62,7 +62,7 @@ def test_zoo_of_multisines_with_offset_and_drift(period, count, periods, snr_db,
 @pytest.mark.parametrize(
     ("snr_db", "periods", "least"), [(40, 2, 95), (20, 3, 95), (10, 5, 95), (0, 10, 90), (0, 50, 99)]
 )
-def test_seven_lines_in_noise(snr_db, periods, least):
+def test_the_period_of_seven_lines_is_found_in_noise(snr_db, periods, least):
     """Out of 100 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
     rng = np.random.default_rng(snr_db + periods)
     right = 0
@@ -95,7 +95,7 @@ def test_square_wave_and_its_odd_lines(period):
         assert found.crest_factor == pytest.approx(1)
 
 
-def test_repeated_chirp():
+def test_the_period_of_a_repeated_chirp_is_found():
     chirp = signal.chirp(np.arange(4000) / 4000, 5, 1, 250)
     assert recognise(noisy(np.random.default_rng(0), np.tile(chirp, 4), 20), 4000).period == 4000
 
@@ -108,7 +108,7 @@ def test_one_sample_less_than_designed(design):
     assert recognise(noisy(rng, np.tile(period, 10), 10), 1000).period == design - 1
 
 
-def test_start_up_and_end():
+def test_the_period_is_found_between_silence_at_the_start_and_at_the_end():
     rng = np.random.default_rng(3)
     x = np.r_[np.zeros(7777), np.tile(SEVEN, 60), np.zeros(3333)]
     exact = recognise(x + 2.0, 4000)
@@ -120,7 +120,7 @@ def test_start_up_and_end():
     assert abs(rough.stop - 19777) <= 20
 
 
-def test_a_pause_is_outlying():
+def test_periods_with_a_pause_are_outliers():
     x = np.tile(SEVEN, 50)
     x[4000:5000] = 0.0
     found = recognise(noisy(np.random.default_rng(0), x, 30), 4000)
@@ -197,7 +197,7 @@ def test_no_period_is_claimed_where_there_is_none(kind):
     assert claimed <= 1
 
 
-def test_less_than_two_periods_is_said_so():
+def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
     """Dense multisines over 1.2 to 1.9 periods: refused, at least 45 of 50 with their true period in the sentence."""
     rng = np.random.default_rng(5)
     named = 0

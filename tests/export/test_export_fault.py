@@ -48,7 +48,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )
-def test_what_cannot_be(run: Path, tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
+def test_impossible_options_of_export_are_refused_in_one_sentence(
+    run: Path, tmp_path: Path, options: tuple[str, ...], sentence: str
+) -> None:
     done = livebode("export", run, *options, "--out", tmp_path / "a")
     assert (done.code, done.out) == (2, "")
     assert sentence in done.err
@@ -138,7 +140,7 @@ def test_too_many_values_for_what_is_held_at_once(tmp_path: Path, monkeypatch: p
         write(tmp_path / "a", parts)
 
 
-def test_nothing_to_export(tmp_path: Path) -> None:
+def test_a_run_without_responses_is_refused(tmp_path: Path) -> None:
     for write in (write_csv, write_mat, write_netcdf):
         with refused(RecordError, "no-responses"):
             write(tmp_path / "a", iter([]))
@@ -152,7 +154,7 @@ def test_nothing_to_export(tmp_path: Path) -> None:
         write_uff(tmp_path / "a", [invalid])
 
 
-def test_what_stood_there_still_stands_when_writing_fails(tmp_path: Path) -> None:
+def test_an_existing_file_is_unchanged_when_writing_fails(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("mine")
 

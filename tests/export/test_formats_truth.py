@@ -69,7 +69,9 @@ def test_csv_is_read_by_livebode_itself(tmp_path: Path) -> None:
 
 @SOME
 @given(any_responses())
-def test_xarray_and_netcdf(tmp_path_factory: pytest.TempPathFactory, responses: Responses) -> None:
+def test_netcdf_is_read_back_by_xarray_as_the_responses(
+    tmp_path_factory: pytest.TempPathFactory, responses: Responses
+) -> None:
     path = tmp_path_factory.mktemp("netcdf") / "a.nc"
     assert write_netcdf(path, cut(responses, 1), ABOUT).rows == len(responses)
     memory = to_xarray(responses, ABOUT)

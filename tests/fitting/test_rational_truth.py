@@ -78,13 +78,13 @@ def test_any_order_and_numerator_order() -> None:
         )
 
 
-def test_a_fit_of_too_low_an_order_says_so_by_epsilon() -> None:
+def test_a_fit_of_too_low_an_order_has_a_large_epsilon() -> None:
     found = fit_rational(noisy(held(), LINES, 1e-3, 1), order=1, method="maximum likelihood")
     assert found.epsilon[0] > 0.1
     assert found.chi2[0] > 100 * found.dof[0]
 
 
-def test_what_cannot_be_is_refused_and_what_is_missing_is_no_response() -> None:
+def test_impossible_orders_are_refused_and_lines_without_a_response_are_left_out() -> None:
     good = noisy(held(), LINES, 1e-3, 2)
     for argument, options in (
         ("order", {"order": 0}),

@@ -24,7 +24,7 @@ def test_attributes_are_read_only():
 
 
 @pytest.mark.parametrize(("dtype", "result"), [("float64", np.complex128), ("float32", np.complex64)])
-def test_shapes_and_types(dtype, result):
+def test_outputs_have_the_shape_and_type_of_the_configuration(dtype, result):
     one, two = SlidingDFT(10, [1, 2, 3], dtype=dtype), SlidingDFT(10, [1, 2, 3], 2, dtype)
     assert one.process(np.zeros(25), 10).shape == (2, 3)
     assert one.process(np.zeros((1, 25)), 10).shape == (1, 3, 3)

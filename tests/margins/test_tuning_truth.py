@@ -93,7 +93,7 @@ def test_a_model_without_a_resonance_has_nothing_to_filter() -> None:
     assert "no resonance" in tuning(fits, loop, BAND_HZ).sentence
 
 
-def test_bad_wishes_are_refused() -> None:
+def test_impossible_specifications_are_refused() -> None:
     with refused(UsageError, "out-of-range", argument="peak_sensitivity", value=1.0):
         tuning(FITS, Case(BELT).open, BAND_HZ, peak_sensitivity=1.0)
     with refused(UsageError, "out-of-range", argument="frequency_hz", value=3000.0, rate_hz=RATE_HZ):

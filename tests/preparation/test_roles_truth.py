@@ -72,7 +72,7 @@ def test_right_roles_are_not_suspected(machine: str) -> None:
     ],
     ids=["exchanged", "a position as excitation", "ten times the gain", "a tenth of the gain"],
 )
-def test_wrong_roles_are_certain(machine: str, wrong: dict, words: str) -> None:
+def test_wrong_roles_are_certainly_detected(machine: str, wrong: dict, words: str) -> None:
     found = suspected(recorded(machine), **RIGHT | wrong)
     assert any(one.certain and words in one.message for one in found), found
 
@@ -137,7 +137,7 @@ def test_wrong_roles_end_with_2(tmp_path: Path, arguments: tuple, words: str) ->
     assert not (tmp_path / "run").exists()
 
 
-def test_accepted_roles_run_and_the_record_says_what_was_suspected(tmp_path: Path) -> None:
+def test_accepted_roles_run_and_the_record_contains_the_suspicion(tmp_path: Path) -> None:
     columns = signals(samples=4000)
     columns["copy"] = columns["w"]
     arguments = ("--excitation", "w", "--input", "u", "--output", "copy", "--accept-roles")

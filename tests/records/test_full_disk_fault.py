@@ -68,7 +68,7 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
     check_pause(done.stdout.split())
 
 
-def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
+def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
     # It is lost where memory holds no more; events are not.
     limits = Limits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -165,7 +165,7 @@ def size_of(run: Path) -> int:
     return size
 
 
-def test_a_budget_is_kept_and_events_stay(tmp_path: Path) -> None:
+def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> None:
     # Segments of 0.8 MB, as random numbers do not compress; 40 of samples and of responses each are 64 MB.
     budget, rng = 8 << 20, np.random.default_rng(0)
     limits = Limits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)

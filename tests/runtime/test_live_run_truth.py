@@ -102,7 +102,7 @@ def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
         ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
     ],
 )
-def test_sources_that_cannot_be(tmp_path, source, message):
+def test_impossible_sources_are_refused_without_repeating_secrets(tmp_path, source, message):
     result = livebode("run", axis(tmp_path, source), "--out", tmp_path / "live")
     assert result.code == 2
     assert message in result.err

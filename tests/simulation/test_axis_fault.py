@@ -117,7 +117,7 @@ class Wobble(OverTime):
         condition.stiffness *= 1 - self.depth * self.share(time_s) * np.sin(2 * np.pi * time_s) ** 2
 
 
-def test_a_fault_of_ones_own() -> None:
+def test_a_fault_defined_by_a_user_acts_on_the_machine() -> None:
     truth = SimulatedAxis(BeltAxis(faults=(Wobble(start_s=0.1, depth=0.2),), seconds=0.5)).run()[1]
     assert truth.stiffness_n_per_m[[0, 1000]] == pytest.approx([5e5, 4e5])
 
@@ -199,7 +199,7 @@ def test_the_encoder_counts_and_its_velocity_carries_the_steps() -> None:
     assert np.allclose(block["velocity"][1:], np.diff(block["position"]) * RATE_HZ, atol=1e-9)
 
 
-def test_noise_is_white_and_as_strong_as_said() -> None:
+def test_noise_is_white_and_has_the_specified_sigma() -> None:
     axis = BeltAxis(sensor=Sensor(noise_rad_per_s=0.1), seconds=10.0, seed=5)
     block, truth = SimulatedAxis(axis).run()
     noise = block["velocity"] - truth.states[1]
@@ -291,7 +291,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("make", "code", "argument"), BAD)
-def test_what_cannot_be_is_refused_before_the_start(make: object, code: str, argument: str | None) -> None:
+def test_impossible_machines_are_refused_before_the_start(make: object, code: str, argument: str | None) -> None:
     with pytest.raises(LivebodeError) as caught:
         make()
     assert (caught.value.code, caught.value.facts.get("argument")) == (code, argument)

@@ -96,7 +96,7 @@ def test_a_misspelt_channel_names_the_nearest(module, tmp_path):
 
 
 @pytest.mark.parametrize("module", [module for module in TIMED if module != "mdf"])  # which always has time
-def test_neither_time_nor_rate(module, tmp_path):
+def test_a_recording_without_time_and_rate_is_refused(module, tmp_path):
     path = write(module, tmp_path, signals())
     with refused(RecordingError, "rate-missing", argument="rate_hz", path=str(path)):
         open_log(path)

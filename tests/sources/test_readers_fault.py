@@ -86,7 +86,7 @@ def text(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
         ("t;u\n0;1.234,5\n1;2.345,6\n", "channel-missing", {}),
     ],
 )
-def test_tables_that_are_refused(tmp_path, content, code, facts):
+def test_unreadable_tables_are_refused_with_their_reason(tmp_path, content, code, facts):
     path = text(tmp_path, content)
     with refused(RecordingError, code, path=str(path), **facts):
         drain(path)
@@ -181,7 +181,7 @@ def test_a_file_that_the_system_does_not_give(tmp_path, monkeypatch, number, rea
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_truncated_anywhere(module, tmp_path):
+def test_a_file_truncated_anywhere_is_read_or_refused(module, tmp_path):
     given = signals(200) if module == "sinumerik" else with_time(signals(200))
     whole = write(module, tmp_path, given).read_bytes()
     for keep in range(1, len(whole) - 3, max(1, len(whole) // 40)):
@@ -190,12 +190,12 @@ def test_truncated_anywhere(module, tmp_path):
 
 
 @pytest.mark.parametrize("module", ["parquet", "arrow", "npz", "hdf5", "matlab"])
-def test_no_rows(module, tmp_path):
+def test_a_table_without_rows_is_refused(module, tmp_path):
     error = refusal(write(module, tmp_path, {"u": np.empty(0), "v": np.empty(0)}), rate_hz=1)
     assert error.code in ("recording.channel-missing", "recording.empty")
 
 
-def test_duplicate_names_in_parquet(tmp_path):
+def test_duplicate_names_in_parquet_are_refused(tmp_path):
     pq.write_table(pa.table([[1.0, 2.0], [3.0, 4.0]], names=["u", "u"]), tmp_path / "a.parquet")
     with refused(RecordingError, "channel-duplicated", channel="u", columns=[1, 2]):
         drain(tmp_path / "a.parquet", rate_hz=1)
@@ -284,7 +284,7 @@ def test_xml_that_declares_entities_or_is_something_else(tmp_path):
         ({"channels": ["nothing"]}, RecordingError, "channel-unknown", {"channel": "nothing"}),
     ],
 )
-def test_options_that_are_refused(tmp_path, options, kind, code, facts):
+def test_unsuitable_options_of_a_reader_are_refused(tmp_path, options, kind, code, facts):
     path = write("npz", tmp_path, signals())
     with refused(kind, code, **facts):
         drain(path, **options)
@@ -300,7 +300,7 @@ def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
         log.blocks("input")
 
 
-def test_hdf5_without_its_library(tmp_path, monkeypatch):
+def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
     path = write("hdf5", tmp_path, signals())
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(ExtraError) as caught:

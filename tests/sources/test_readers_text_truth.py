@@ -67,7 +67,7 @@ def test_preamble_as_wide_as_the_table(tmp_path):
     assert samples(log, "t", "u").tolist() == [[0, 0.001], [1, 2]]
 
 
-def test_what_excel_writes_above_a_table(tmp_path):
+def test_the_separator_line_of_excel_is_read(tmp_path):
     log = opened(tmp_path, "sep=;\nt;u\n0;1\n0,5;2\n")
     assert (log.rate_hz, samples(log, "u").tolist()) == (2, [[1, 2]])
 
