@@ -59,7 +59,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
     assert set(FORMATS) == {"csv", "mat", "netcdf", "uff"}
 
 
-def test_one_response_and_the_mean(run: Path, tmp_path: Path) -> None:
+def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path) -> None:
     batches = Run.open(run).batches
     for options, expected in (
         (("--at", "1.0"), at(batches(), 1.0)),

@@ -75,7 +75,7 @@ def test_lines_and_window_are_found(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("log")
-def test_a_configuration_file_and_options_over_it(tmp_path: Path) -> None:
+def test_options_override_the_configuration_file(tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text(
         """

@@ -168,7 +168,7 @@ def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> N
     assert len(access._told) <= 1024
 
 
-def test_sessions_end_and_are_few() -> None:
+def test_login_sessions_expire_and_their_number_is_limited() -> None:
     now = [0.0]
     access = Access(Serving("127.0.0.1", 0, token=TOKEN), lambda _: None, clock=lambda: now[0])
     first = access.login(TOKEN, "::1")
@@ -236,9 +236,7 @@ def test_impossible_settings_of_the_server_are_refused(
         ({"token_env": "token", "token_file": "/no/such"}, "both"),
     ],
 )
-def test_a_token_that_is_not_there_is_not_served(
-    monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str
-) -> None:
+def test_a_missing_token_is_refused(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str) -> None:
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(LivebodeError, match=re.escape(word)) as caught:

@@ -102,7 +102,7 @@ def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_
     assert places.take(operators[-1])
 
 
-def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
+def test_a_client_that_does_not_read_delays_no_other(watched: Watched) -> None:
     """A socket that is never read fills up; the machine goes on, another browser sees it, memory stays bounded."""
     mine = cookie(watched, TOKEN)
     request = (

@@ -105,7 +105,7 @@ def test_a_quantity_that_is_not_available_has_a_reason() -> None:
         quantities.of_responses(made(1, LINES), "sensitivity")
 
 
-def test_nobody_looks_and_memory_stays_bounded() -> None:
+def test_memory_is_bounded_and_losses_are_counted_when_nobody_reads() -> None:
     """A dashboard that never takes anything: the newest is kept, the rest given up, and counted."""
     hub, many = Hub("axis"), made(64, LINES)
     batches = 3 * VALUES_MAX // many.value.size
@@ -141,7 +141,7 @@ def test_delay_is_from_arrival_to_published() -> None:
     assert (hub.samples, hub.gaps) == (80, 1)
 
 
-def test_recent_keeps_the_newest_and_not_too_dense() -> None:
+def test_recent_responses_are_the_newest_and_thinned() -> None:
     recent, hop = Recent(), 20
     for start in range(0, 40_000, 500):
         rows = made(500, Lines((2, 3), 60, 1000.0), hop=hop, seed=start)

@@ -93,7 +93,7 @@ def test_a_restored_tracker_continues_with_the_same_bits(options: dict, at: list
     assert_same(Responses.join(parts), expected)
 
 
-def test_one_sample_at_a_time() -> None:
+def test_single_samples_give_the_same_as_one_block() -> None:
     block = record(3)
     tracker = new({})
     parts = [tracker.process(block.cut(i, i + 1)) for i in range(len(block))]

@@ -85,7 +85,7 @@ def test_frequencies_and_amplitudes_of_hum_are_found_in_a_recording_without_exci
     assert three.amplitude == pytest.approx({"y": 0.1}, rel=0.08)
 
 
-def test_noise_of_any_slope_is_no_hum() -> None:
+def test_noise_of_any_slope_is_not_reported_as_hum() -> None:
     """200 recordings of 20 multiples, each taken for hum by chance less than once in 1e8."""
     rng = np.random.default_rng(5)
     for pole in (-0.9, 0.0, 0.9, 0.999):

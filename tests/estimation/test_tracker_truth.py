@@ -78,7 +78,7 @@ def test_quantities_satisfy_their_definitions(record: Block, loop: Loop) -> None
     assert np.allclose(measured["closed loop"] + measured["sensitivity"], 1, atol=1e-12)
 
 
-def test_excitation_at_the_velocity_reference() -> None:
+def test_an_excitation_at_the_velocity_reference_gives_the_plant() -> None:
     w = multisine(LINES)
     inner = VELOCITY.response(LINES.frequency_hz)
     # Seen from the plant, a multisine v at the velocity reference is the multisine Cvel·v at the plant input.

@@ -81,7 +81,7 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
     )
 
 
-def test_sigmas_that_are_far_too_small_are_made_good_by_epsilon() -> None:
+def test_epsilon_corrects_sigmas_that_are_far_too_small() -> None:
     """Noise of 3 % that is said to be 0.1 %: ε finds the 3 %, and the bounds hold."""
     found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
     assert np.median(found.epsilon) == pytest.approx(0.03, rel=0.05)

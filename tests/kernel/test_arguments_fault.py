@@ -154,7 +154,7 @@ def test_a_bad_output_array_is_refused(out, sentence):
     assert dft.count == 0
 
 
-def test_out_apart_from_the_input():
+def test_an_output_array_that_shares_memory_with_the_input_is_refused():
     memory = np.zeros(64)
     with pytest.raises(ValueError, match="shares memory with x"):
         SlidingDFT(8, [1]).process(memory[6:10], out=memory[:8].view(complex).reshape(4, 1))

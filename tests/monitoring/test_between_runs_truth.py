@@ -90,7 +90,7 @@ def test_a_direction_chosen_by_the_noise_exceeds_its_bound_no_more_often_than_st
     )
 
 
-def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_others() -> None:
+def test_projected_evidence_is_independent_of_the_offset() -> None:
     seen = windows(np.random.default_rng(3), np.array([0.02, 0.0, 0.0, 0.03]), 2000)
     between = BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.0)
     score, information = between.projected(seen.score, seen.information, SMALLEST)

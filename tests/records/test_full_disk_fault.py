@@ -44,7 +44,7 @@ def check_pause(kinds: list[str]) -> None:
     assert len(closing) + 2 == len(kinds)
 
 
-def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
+def test_a_file_at_its_size_limit_pauses_the_record(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     said, say = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(say, tmp_path / "run"))
@@ -54,7 +54,7 @@ def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
     check_pause(said.recv())
 
 
-def test_a_disk_that_is_full(tmp_path: Path) -> None:
+def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
     mount = f"mount -t tmpfs -o size=2m none {tmp_path}"
     allowed = subprocess.run(["unshare", "-Urm", "sh", "-c", mount], capture_output=True, text=True, check=False)
     if allowed.returncode:

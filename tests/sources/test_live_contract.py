@@ -125,7 +125,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
 
 
 @pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.reconnects], indirect=True)
-def test_a_broken_connection_comes_back_by_itself(peer):
+def test_a_broken_connection_is_connected_again(peer):
     given = batches(60)
 
     def script() -> None:

@@ -71,7 +71,7 @@ def settings(broker: Mosquitto, pki: Path, **changes: object) -> dict[str, objec
     return {key: value for key, value in given.items() if value is not None}
 
 
-def test_mqtt_with_certificates_and_a_password(broker, pki):
+def test_mqtt_with_certificates_and_a_password_delivers_the_samples(broker, pki):
     given = batches(20)
     context = ssl.create_default_context(cafile=pki / "authority.crt")
     context.load_cert_chain(pki / "client.crt", pki / "client.key")
@@ -197,7 +197,7 @@ def test_secrets_stay_out_of_the_configuration_that_is_recorded(tmp_path, monkey
         ),
     ],
 )
-def test_secrets_that_are_not_there(given, code, facts):
+def test_missing_secrets_are_refused_without_repeating_their_names(given, code, facts):
     with refused(ConfigError, code, **facts):
         open_source(SourceSettings(url="mqtt://127.0.0.1:1/t", **given))
     with pytest.raises(ConfigError) as caught:  # in place of a name may be the password

@@ -103,14 +103,14 @@ def test_a_recording_without_time_and_rate_is_refused(module, tmp_path):
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_a_rate_that_the_file_contradicts(module, tmp_path):
+def test_a_rate_that_contradicts_the_file_is_refused(module, tmp_path):
     path = write(module, tmp_path, with_time(signals()))
     with refused(RecordingError, "rate-conflict", argument="rate_hz", rate_hz=4000.0, given_hz=4100):
         open_log(path, rate_hz=4100)
 
 
 @pytest.mark.parametrize("module", TIMED)
-def test_time_none_ignores_the_column(module, tmp_path):
+def test_time_none_ignores_the_time_column(module, tmp_path):
     log = open_log(write(module, tmp_path, with_time(signals())), rate_hz=4100, time="none")
     assert (log.rate_hz, log.rate_origin, log.timing) == (4100, "given", None)
 

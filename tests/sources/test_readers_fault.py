@@ -103,13 +103,13 @@ def test_text_far_down_is_found_with_its_line(tmp_path):
         drain(text(tmp_path, "t,u\n" + "\n".join(lines)))
 
 
-def test_bytes_that_are_no_utf8_in_a_ragged_row(tmp_path):
+def test_a_ragged_row_with_invalid_utf8_is_refused(tmp_path):
     rows = "".join(f"{k},1\n" for k in range(100_000)).encode()
     with refused(RecordingError, "line-ragged", line=100_002):
         drain(text(tmp_path, b"t,u\n" + rows + b"\xff\xfe,1,2\n"), rate_hz=1)
 
 
-def test_a_very_long_line_far_down(tmp_path):
+def test_an_overlong_line_is_refused_with_its_number(tmp_path):
     rows = "".join(f"{k},1\n" for k in range(100_000))
     with refused(RecordingError, "line-too-long", line=100_002, limit_bytes=1 << 20):
         drain(text(tmp_path, f"t,u\n{rows}1,{'2' * 9_000_000}\n"), rate_hz=1)
@@ -156,7 +156,7 @@ def test_a_recording_left_early_takes_no_bytes_from_the_file_opened_next(tmp_pat
     assert (finished.returncode, finished.stderr) == (0, "")
 
 
-def test_paths_that_are_no_recordings(tmp_path):
+def test_paths_that_are_not_recordings_are_refused(tmp_path):
     assert refusal(tmp_path / "none.csv").code == "recording.not-found"
     os.mkfifo(tmp_path / "pipe.csv")
     assert refusal(tmp_path / "pipe.csv").code == "recording.not-a-file"
@@ -169,7 +169,7 @@ def test_paths_that_are_no_recordings(tmp_path):
 
 
 @pytest.mark.parametrize(("number", "reason"), [(errno.EACCES, "Permission denied"), (errno.EIO, "Input/output error")])
-def test_a_file_that_the_system_does_not_give(tmp_path, monkeypatch, number, reason):
+def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch, number, reason):
     def fail(*_: object, **__: object) -> None:
         raise OSError(number, os.strerror(number))
 
@@ -201,7 +201,7 @@ def test_duplicate_names_in_parquet_are_refused(tmp_path):
         drain(tmp_path / "a.parquet", rate_hz=1)
 
 
-def test_an_archive_with_a_password_and_one_with_pickles(tmp_path):
+def test_archives_with_a_password_or_pickles_are_refused(tmp_path):
     path = write("npz", tmp_path, signals())
     raw = bytearray(path.read_bytes())
     at = raw.find(b"PK\x01\x02")
@@ -219,7 +219,7 @@ def test_an_archive_with_a_password_and_one_with_pickles(tmp_path):
     assert "not real numbers" in pickled.message
 
 
-def test_sizes_that_are_declared_and_not_there(tmp_path):
+def test_declared_sizes_without_data_are_refused(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("huge", (2**50,), dtype="f8", chunks=(1024,))
     huge = refusal(tmp_path / "a.h5", rate_hz=1)
@@ -237,7 +237,7 @@ def test_sizes_that_are_declared_and_not_there(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [0, 10, 14, 40, 0x7F00])
-def test_an_element_type_that_matlab_does_not_have(tmp_path, kind):
+def test_an_unknown_element_type_in_a_mat_file_is_refused(tmp_path, kind):
     """SciPy looks such a type up behind the end of its table, which ends the process."""
     scipy.io.savemat(tmp_path / "a.mat", {"x": np.arange(100.0) + 0.5})
     tag = struct.pack("<II", 9, 800)
@@ -259,7 +259,7 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
     assert [skipped.name for skipped in log.skipped] == ["raw"]
 
 
-def test_xml_that_declares_entities_or_is_something_else(tmp_path):
+def test_xml_with_entities_or_other_content_is_refused(tmp_path):
     bomb = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "c">]><ResponseTestCustom>&b;</ResponseTestCustom>'
     assert refusal(text(tmp_path, bomb, "a.xml")).code == "recording.declaration-refused"
     other = refusal(text(tmp_path, "<html><body/></html>", "b.xml"))
@@ -290,7 +290,7 @@ def test_unsuitable_options_of_a_reader_are_refused(tmp_path, options, kind, cod
         drain(path, **options)
 
 
-def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
+def test_a_channel_requested_twice_or_as_a_bare_string_is_refused(tmp_path):
     log = open_log(write("npz", tmp_path, signals()), rate_hz=1)
     with refused(UsageError, "duplicate", argument="channels", value="input"):
         log.blocks(["input", "input"])

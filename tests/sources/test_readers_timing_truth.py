@@ -38,7 +38,7 @@ def test_the_rate_of_a_float32_time_column_is_exact(tmp_path):
     assert opened(tmp_path, (np.arange(100_000) / 4000).astype(np.float32)).rate_hz == 4000
 
 
-def test_a_rate_that_is_truly_not_round_stays_so(tmp_path):
+def test_a_rate_that_is_not_round_is_not_rounded(tmp_path):
     rate_hz = 1000.0371
     assert opened(tmp_path, np.arange(50_000) / rate_hz).rate_hz == pytest.approx(rate_hz, rel=1e-12)
 
@@ -136,7 +136,7 @@ def test_time_columns_that_are_not_a_clock_are_refused(tmp_path, spoil, code, fa
         opened(tmp_path, spoil(np.arange(1000) / 4000))
 
 
-def test_a_rate_beside_the_column(tmp_path):
+def test_a_rate_in_the_metadata_is_used(tmp_path):
     table = pa.table({"u": np.arange(10.0)}).replace_schema_metadata({"rate_hz": "4000"})
     pq.write_table(table, tmp_path / "a.parquet")
     log = open_log(tmp_path / "a.parquet")

@@ -89,7 +89,9 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
         ([[1.0, 2.0]], {}, "wrong-shape", {"argument": "period", "shape": [1, 2]}),
     ],
 )
-def test_an_excitation_that_no_block_can_play(period, given: dict[str, float], code: str, facts: dict) -> None:
+def test_an_excitation_that_no_block_can_play_is_refused(
+    period, given: dict[str, float], code: str, facts: dict
+) -> None:
     with refused(UsageError, code, **facts):
         multisine(period, **({"rate_hz": 1e3, "limit": 2.0} | given))
 

@@ -113,7 +113,7 @@ def test_a_wrong_model_fails_and_a_slightly_wrong_one_is_reported() -> None:
     assert any(v.verdict == "small error" for v in slight)
 
 
-def test_hardly_any_noise_makes_no_failure_of_a_fit_of_99_percent() -> None:
+def test_a_fit_of_99_percent_does_not_fail_for_lack_of_noise() -> None:
     """Resonance 0.07 % off and a hundredth of the noise: r is near 1, and the model misses 1 % all the same."""
     a, b = TwoMassPlant().discrete()
     u, state, y = np.resize(W, 2000), np.zeros(4), np.empty(2000)
