@@ -25,6 +25,7 @@ from livebode.simulation import (
     SoftSpot,
     Standstill,
     Strokes,
+    StrokeSequence,
     TensionLoss,
 )
 from livebode.simulation.faults import Condition, OverTime
@@ -279,6 +280,10 @@ BAD = [
     (lambda: Sensor(noise_rad_per_s=-0.1), "usage.out-of-range", "noise_rad_per_s"),
     (lambda: Strokes(start_m=1.0, end_m=1.0), "usage.conflict", "end_m"),
     (lambda: Strokes(jerk_m_per_s3=0.0), "usage.out-of-range", "jerk_m_per_s3"),
+    (lambda: StrokeSequence(turning_points_m=(0.4, 1.0), speeds_m_per_s=()), "usage.wrong-shape", "turning_points_m"),
+    (lambda: StrokeSequence(turning_points_m=(1.0, 1.0), speeds_m_per_s=(0.1,)), "usage.conflict", "end_m"),
+    (lambda: BeltAxis(motion=StrokeSequence(turning_points_m=(0.4, 1.9), speeds_m_per_s=(0.1,))),
+     "usage.out-of-range", "end_m"),
     (lambda: TensionLoss(loss=1.0), "usage.out-of-range", "loss"),
     (lambda: TensionLoss(loss=0.1, start_s=-1.0), "usage.out-of-range", "start_s"),
     (lambda: Backlash(gap_m=0.0), "usage.out-of-range", "gap_m"),

@@ -22,6 +22,7 @@ from livebode.simulation import (
     SoftSpot,
     Standstill,
     Strokes,
+    StrokeSequence,
     TensionLoss,
 )
 from tests.support.axes import MULTISINE, RATE_HZ, fast_stroke
@@ -194,6 +195,18 @@ def test_strokes_keep_to_their_limits_and_come_back(motion: Strokes, backwards: 
     # The way is the integral of the speed: exact to the trapezoidal rule's error at corners.
     way = np.cumsum((around[1:] + around[:-1]) / 2) / RATE_HZ + motion.start_m
     assert np.abs(way - np.append(position[1:], position[0])).max() < motion.acceleration_m_per_s2 / RATE_HZ**2
+
+
+def test_a_sequence_of_strokes_continues_each_stroke_where_the_one_before_it_ended() -> None:
+    points, speeds = (0.7, 1.6, 0.25, 0.9), (0.38, 0.1, 1.2)
+    motion = StrokeSequence(turning_points_m=points, speeds_m_per_s=speeds)
+    position, speed = motion.cycle(RATE_HZ)
+    edges = np.rint(motion.edges_s(RATE_HZ) * RATE_HZ).astype(int)
+    assert position[edges[:-1]].tolist() == list(points[:-1])
+    assert position[-1] == pytest.approx(points[-1], abs=1e-4)
+    fastest = [np.abs(speed[a:b]).max() for a, b in itertools.pairwise(edges)]
+    assert fastest == pytest.approx(list(speeds))
+    assert np.abs(np.diff(position) * RATE_HZ - (speed[1:] + speed[:-1]) / 2).max() < 4.0 / RATE_HZ
 
 
 def vars_of(motion: Strokes) -> dict[str, float]:
