@@ -1,0 +1,72 @@
+"""Recognition: an English sentence of a record, in the language in use.
+
+A record has each message as one English sentence. The templates in `recorded` find the values in it, so that report and
+page can show it in another language, also from records of earlier versions. What no template fits remains English.
+`static/recognition.js` is the same for the page.
+"""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from functools import cache
+
+from livebode.language.catalogue import Catalogue, catalogue
+from livebode.language.spoken import date, numerals, used
+
+_NUMBER = re.compile(r"[-+−]?\d[\d,]*(\.\d+)?(e[-+]?\d+)?")
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d) ?(\S*)")
+_PLACE = re.compile(r"\{(\w+)\}")
+_SENTENCES = re.compile(r"(?<=[.;]) ")
+
+
+def recognised(text: str) -> str:
+    """The sentence in the language in use; unchanged where no template fits.
+
+    >>> from livebode.language import spoken
+    >>> with spoken("de"):
+    ...     recognised("12 samples were lost")
+    '12 Abtastwerte verloren'
+    """
+    language = used()
+    if not language.messages:
+        return text
+    if (found := _whole(text, language)) is not None:
+        return found
+    pieces = _SENTENCES.split(text)
+    known = [_whole(piece, language) for piece in pieces]
+    return " ".join(piece if new is None else new for piece, new in zip(pieces, known))
+
+
+def _whole(text: str, language: Catalogue) -> str | None:
+    own = language.messages.get(text)
+    if isinstance(own, str):
+        return own
+    for pattern, names, translation in _templates(language.code):
+        if (match := pattern.fullmatch(text)) is not None:
+            return _filled(translation, {name: _value(value) for name, value in zip(names, match.groups())})
+    return None
+
+
+def _filled(translation: str, values: dict[str, str]) -> str:
+    return _PLACE.sub(lambda place: values[place[1]], translation)
+
+
+def _value(text: str) -> str:
+    if _NUMBER.fullmatch(text):
+        return numerals(text)
+    if (found := _DATE.fullmatch(text)) is not None:
+        return date(datetime.fromisoformat(found[1])).replace("%Z", "").rstrip() + f" {found[2]}".rstrip()
+    return recognised(text)
+
+
+@cache
+def _templates(code: str) -> list[tuple[re.Pattern[str], list[str], str]]:
+    """Pattern, names of the values and translation of each template, the most literal first."""
+    found = sorted(catalogue(code).recorded, key=lambda pair: -len(_PLACE.sub("", pair[0])))
+    return [(_pattern(english), _PLACE.findall(english), translation) for english, translation in found]
+
+
+def _pattern(template: str) -> re.Pattern[str]:
+    literals = _PLACE.split(template)[::2]
+    return re.compile("(.+?)".join(map(re.escape, literals)), re.DOTALL)
