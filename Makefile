@@ -48,19 +48,19 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.dashboard
 
-peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
+peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers
 
-studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
+studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/explanation/studies.md
 	$(BIN)/python -m studies
 
 repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
 	$(BIN)/python -m studies.repeating
 
-fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/fits.md)
+fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/explanation/fits.md)
 	$(BIN)/python -m studies.fit_bounds
 
-monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
+monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/how-to/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
 temperature: $(BUILT) ## a belt that softens with temperature: alarms and detection with and without a sensor (10 min)

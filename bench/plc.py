@@ -1,6 +1,6 @@
 """Cost of the generated function blocks on a PLC: LREAL operations per sample, counted at run time, and memory.
 
-`python -m bench.plc` prints the tables of docs/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
+`python -m bench.plc` prints the tables of docs/how-to/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
 change of LREAL numbers.
 """
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.session.axis import Axis
+from livebode.configuration.axis import Axis
 from livebode.sources.live.ring import FILETIME_1970, HEADER, read_ring
 from livebode.structured_text import ring_block, ring_type
 from tests.command import livebode
@@ -46,7 +46,7 @@ def test_the_example_runs_and_its_configuration_names_the_rings_columns() -> Non
 
 
 def test_the_page_on_live_sources_shows_the_ring_that_is_generated_and_read() -> None:
-    page = (ROOT / "docs/live.md").read_text()
+    page = (ROOT / "docs/how-to/live.md").read_text()
     ring_text, main = re.findall(r"```iecst\n(.*?)```", page, re.S)
     source = tomllib.loads(re.search(r"```toml\n(\[source\]\nurl = \"ads:.*?)```", page, re.S).group(1))["source"]
     names = [heading.split(" [")[0] for heading in source["channels"]]

@@ -109,7 +109,7 @@ def test_growing_play_disturbs_the_response_more_and_more() -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Wobble(OverTime):
-    """A fault of a user's own, as in docs/axis.md."""
+    """A fault of a user's own, as in docs/reference/axis.md."""
 
     depth: float
 

@@ -16,11 +16,11 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
+from livebode.configuration.axis import Axis, ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, ServerError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access
 from livebode.dashboard.guard import Guard
-from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium
 from tests.dashboards import Watched
 from tests.guarded import TOKEN, VIEWER, ask, cookie, guarded, login, origin, port_of
@@ -263,7 +263,7 @@ def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path,
 
 
 def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "dashboard.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "dashboard.md").read_text()
     command = re.search(r"^    (.*token_urlsafe.*)$", text, re.MULTILINE).group(1)
     path = tmp_path / "token"
     command = command.replace("/etc/livebode/token", str(path)).replace("python ", f"{sys.executable} ")

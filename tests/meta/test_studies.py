@@ -53,7 +53,7 @@ def test_a_short_version_runs_draws_and_writes(name: str, tmp_path: Path) -> Non
 def test_the_committed_page_is_that_of_the_committed_numbers(name: str, tmp_path: Path) -> None:
     assert (ROOT / "docs" / "images" / "studies" / f"{name}.png").exists()
     write_page(STUDIES, ROOT / "docs" / "images" / "studies", tmp_path / "page.md")
-    assert (tmp_path / "page.md").read_text() == (ROOT / "docs" / "studies.md").read_text()
+    assert (tmp_path / "page.md").read_text() == (ROOT / "docs" / "explanation" / "studies.md").read_text()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 from livebode.core import Lines, RecordingError
 from livebode.design import Waveform, write
 from livebode.excitation import multisine
-from livebode.session.designed import read_designed
+from livebode.experiments.designed import read_designed
 from livebode.structured_text import multisine as block_text
 from tests.command import livebode
 from tests.structured_text import Machine
@@ -68,7 +68,7 @@ def test_the_plc_plays_the_bits_of_the_design_with_its_ramp(ramp_s, periods: int
 
 
 def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> None:
-    """FB_excitation in FB_Multisine's place, as docs/plc.md says: MAIN runs, and w is the same."""
+    """FB_excitation in FB_Multisine's place, as docs/how-to/plc.md says: MAIN runs, and w is the same."""
     assert plc(tmp_path, "--excitation", tmp_path / "excitation.npz").code == 0
     write(tmp_path / "excitation.st", Waveform(LINES, PERIOD), "excitation")
     texts = {path.name: path.read_text() for path in (tmp_path / "plc").iterdir()}
