@@ -8,6 +8,7 @@ draw a path, an image and a text. This one draws on ReportLab's canvas, so lines
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +18,10 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_mixed import MixedModeRenderer
 from reportlab.lib.utils import ImageReader
 from reportlab.pdfbase import pdfmetrics
+from reportlab.pdfbase.cidfonts import UnicodeCIDFont
 from reportlab.pdfbase.ttfonts import TTFont
 
-from livebode.report.style import LIGHT, drawing, quiet_about_letters
+from livebode.report.style import LIGHT, drawing, quiet_about_letters, wide_letters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
 
 PLAIN, BOLD, FIXED = "DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"
+WIDE = "STSong-Light"
+"""Chinese letters: a font that every PDF reader provides, so the file does not contain it."""
+_LACKING = 0.4  # of the size, by which Matplotlib measures a wide letter too narrow
+_WIDE_RUN = re.compile("([\u2e80-\u9fff\uf900-\ufaff\uff00-\uffef]+)")
 _RASTER_DPI = 220  # of maps, whose cells are pixels in any case
 _CAPS = {"butt": 0, "round": 1, "projecting": 2}
 _JOINS = {"miter": 0, "round": 1, "bevel": 2}
@@ -39,6 +45,17 @@ def register_fonts() -> None:
     for name in (PLAIN, BOLD, FIXED):
         if name not in pdfmetrics.getRegisteredFontNames():
             pdfmetrics.registerFont(TTFont(name, folder / f"{name}.ttf"))
+    if WIDE not in pdfmetrics.getRegisteredFontNames():
+        pdfmetrics.registerFont(UnicodeCIDFont(WIDE))
+
+
+def runs(text: str) -> list[tuple[str, bool]]:
+    """The text in runs of one font each; whether it is the one of the wide letters.
+
+    >>> runs("Ms 灵敏度 2")
+    [('Ms ', False), ('灵敏度', True), (' 2', False)]
+    """
+    return [(run, i % 2 == 1) for i, run in enumerate(_WIDE_RUN.split(text)) if run]
 
 
 def draw_on(canvas: Canvas, figure: Figure) -> None:
@@ -125,9 +142,17 @@ class _OnCanvas(RendererBase):
         canvas.translate(x, y)
         canvas.rotate(angle)
         bold = prop.get_weight() in ("bold", "semibold", 600, 700)
-        canvas.setFont(BOLD if bold else PLAIN, prop.get_size_in_points())
-        canvas.drawString(0, 0, s)
+        size, at = prop.get_size_in_points(), 0.0
+        for text, wide in runs(s):
+            font = WIDE if wide else BOLD if bold else PLAIN
+            canvas.setFont(font, size)
+            canvas.drawString(at, 0, text)
+            at += pdfmetrics.stringWidth(text, font, size)
         canvas.restoreState()
+
+    def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
+        width, height, descent = super().get_text_width_height_descent(s, prop, ismath)
+        return width + _LACKING * wide_letters(s) * prop.get_size_in_points(), height, descent
 
     def _clip(self, gc: Any) -> None:
         canvas = self._canvas
