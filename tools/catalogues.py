@@ -14,6 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from babel.core import Locale
 from babel.messages.catalog import Catalog
 from babel.messages.extract import extract
 from babel.messages.pofile import read_po, write_po
@@ -98,8 +99,7 @@ def catalogues() -> dict[str, Catalog]:
 
 def updated(old: Catalog) -> Catalog:
     """The catalogue with the sentences of the source, and its translations of them."""
-    new = Catalog(locale=old.locale, fuzzy=False, charset="utf-8")
-    new.mime_headers = old.mime_headers
+    new = Catalog(locale=old.locale_identifier, fuzzy=False, charset="utf-8")
     for key, (files, recorded) in extracted().items():
         before = old.get(key if isinstance(key, str) else key[0])
         string: Any = before.string if before is not None and isinstance(before.id, str) == isinstance(key, str) else ""
@@ -112,23 +112,34 @@ def po_text(of: Catalog) -> bytes:
     """The file for translators, sorted by the English sentence."""
     file = BytesIO()
     write_po(file, of, width=110, omit_header=True, sort_output=True, include_lineno=False)
-    header = "".join(f'"{name}: {value}\\n"\n' for name, value in headers(of).items())
-    return f'msgid ""\nmsgstr ""\n{header}\n'.encode() + file.getvalue()
+    header = (
+        f'msgid ""\nmsgstr ""\n"Language: {of.locale_identifier}\\n"\n"Content-Type: text/plain; charset=utf-8\\n"\n'
+        f'"Plural-Forms: {of.plural_forms}\\n"\n\n'
+    )
+    return header.encode() + file.getvalue()
 
 
-def headers(of: Catalog) -> dict[str, str]:
-    """The headers that a language needs."""
-    every = dict(of.mime_headers)
-    names = ("Content-Type", "Language", "Plural-Forms", "X-Name", "X-Decimal", "X-Group", "X-Date")
-    return {name: every[name] for name in names}
+def own_name(locale: Locale) -> str:
+    """Name of the language in itself, with its script where there are several."""
+    names = locale.languages
+    return str(names.get(f"{locale.language}_{locale.script}") or names[locale.language])
+
+
+def date_format(locale: Locale) -> str:
+    """Its usual numeric date with time and zone, for `strftime`; ISO 8601 where the usual one has names."""
+    pattern = str(locale.date_formats["medium"].pattern)
+    if "MMM" in pattern:
+        pattern = "y-MM-dd"
+    for letters, directive in (("d+", "%d"), ("M+", "%m"), ("y+", "%Y")):
+        pattern = re.sub(letters, directive, pattern)
+    return f"{pattern} %H:%M:%S %Z"
 
 
 def run_time(of: Catalog) -> dict[str, Any]:
     """What Python and page read."""
-    head = headers(of)
-    rule = re.search(r"plural=(.*?);?$", head["Plural-Forms"])
-    assert rule is not None
-    form = gettext.c2py(rule[1])
+    locale = of.locale
+    assert locale is not None
+    form, symbols = gettext.c2py(of.plural_expr), locale.number_symbols["latn"]
     messages, recorded = {}, []
     for message in of:
         if not message.id:
@@ -140,8 +151,8 @@ def run_time(of: Catalog) -> dict[str, Any]:
         else:
             messages[message.id[0]] = list(message.string)
     return {
-        "code": head["Language"], "name": head["X-Name"], "decimal": head["X-Decimal"],
-        "group": head["X-Group"].strip('"'), "date": head["X-Date"],
+        "code": of.locale_identifier.replace("_", "-"), "name": own_name(locale), "decimal": symbols["decimal"],
+        "group": symbols["group"], "date": date_format(locale),
         "plural": "".join(str(form(n)) for n in range(200)), "messages": messages, "recorded": recorded,
     }  # fmt: skip
 

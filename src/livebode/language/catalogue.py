@@ -78,5 +78,5 @@ def catalogue(code: str) -> Catalogue:
         return ENGLISH
     if code not in available():
         raise KeyError(code)
-    read = json.loads((files("livebode.language") / "catalogues" / f"{code}.json").read_text("utf-8"))
+    read = json.loads((files("livebode.language") / "catalogues" / f"{code.replace('-', '_')}.json").read_text("utf-8"))
     return Catalogue(**read | {"recorded": tuple(map(tuple, read["recorded"]))})

@@ -14,10 +14,11 @@ from functools import cache
 from livebode.language.catalogue import Catalogue, catalogue
 from livebode.language.spoken import date, numerals, used
 
-_NUMBER = re.compile(r"[-+−]?\d[\d,]*(\.\d+)?(e[-+]?\d+)?")
+_SIZE = r"[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
+_NUMBER = re.compile(rf"{_SIZE}(?: ± {_SIZE}| … {_SIZE})?(?: ?(?:s|ms|Hz|dB|°|%))?")
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d) ?(\S*)")
 _PLACE = re.compile(r"\{(\w+)\}")
-_SENTENCES = re.compile(r"(?<=[.;]) ")
+_PIECES = re.compile(r"(?<=\.) "), re.compile(r"(?<=;) ")
 
 
 def recognised(text: str) -> str:
@@ -31,11 +32,24 @@ def recognised(text: str) -> str:
     language = used()
     if not language.messages:
         return text
+    return _known(text, language) or _by_pieces(text, language, _PIECES)
+
+
+def _by_pieces(text: str, language: Catalogue, cuts: tuple[re.Pattern[str], ...]) -> str:
+    """Sentence by sentence; those that are unknown clause by clause."""
+    if not cuts:
+        return text
+    pieces = cuts[0].split(text)
+    return " ".join(_known(piece, language) or _by_pieces(piece, language, cuts[1:]) for piece in pieces)
+
+
+def _known(text: str, language: Catalogue) -> str | None:
+    """The sentence, with or without the mark at its end."""
     if (found := _whole(text, language)) is not None:
         return found
-    pieces = _SENTENCES.split(text)
-    known = [_whole(piece, language) for piece in pieces]
-    return " ".join(piece if new is None else new for piece, new in zip(pieces, known))
+    if text.endswith((".", ";")) and (found := _whole(text[:-1], language)) is not None:
+        return found + language.singular(text[-1])
+    return None
 
 
 def _whole(text: str, language: Catalogue) -> str | None:

@@ -55,7 +55,8 @@ def comparison_figure(
         first = figure.add_subplot(grid[0])
         panels = [first, *(figure.add_subplot(grid[i], sharex=first) for i in (1, 2, 3))]
         lines = trn("{n} line", "{n} lines", len(f))
-        facts = f"{words.quantity(before)} · {lines} · {tr('{count} differ', count=int(differs.sum()))}"
+        different = tr("{count} differ", count=int(differs.sum()))
+        facts = f"{words.quantity(before)} · {lines} · {different}"
         heading(figure, look, tr("Before and after"), facts, 0.085)
         turn = unwrapped(np.degrees(np.angle(before.value)), np.zeros(len(f), dtype=bool))
         drawn = [

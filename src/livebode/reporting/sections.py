@@ -90,7 +90,7 @@ def parameters(of: Material) -> Section | str:
         now = newest.get(name)
         mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
-        rows.append((recognised(name.replace("_", " ")), *mean, *late, units.get(name) or (now.unit if now else "")))
+        rows.append((recognised(name.replace("_", " ")), *mean, *late, recognised(units.get(name) or (now.unit if now else ""))))
     note = tr("± covers 95 % if the model is complete.")
     if of.fit:
         note = tr("Of the mean: {bounds}.", bounds=recognised(of.fit.about_bounds))
