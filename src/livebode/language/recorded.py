@@ -276,7 +276,7 @@ SENTENCES = (
 NAMES = (
     ".", ";", "the belt's stiffness", "the moved mass", "the belt's damping", "the motor's inertia",
     "belt's stiffness", "moved mass", "belt's damping", "motor's inertia", "mode", "mode gain", "lag", "compliance",
-    "rad/s² per unit of input", "none", "before", "after", "samples were lost", "samples were repeated",
+    "rad/s² per unit of input", "deg", "none", "before", "after", "samples were lost", "samples were repeated",
     "friction, backlash or sensor steps; increase the excitation, or move the axis", "estimators", "windows",
     "differencing", "the sender", "model", "tables", "machine", "one in 30 days of motion", "reference", "controller",
     "torque", "torque reference", "velocity reference", "position reference", "suggested", "none needed", "refused",

@@ -79,7 +79,7 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
 
 def _label(name: str, unit: str) -> str:
     text = recognised(name.replace("_", " "))
-    return tr("{name} in {unit}", name=text, unit=unit) if unit else text
+    return tr("{name} in {unit}", name=text, unit=recognised(unit)) if unit else text
 
 
 def _limits(axes: Axes, value: Floats, half: Floats) -> None:

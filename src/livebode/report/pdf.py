@@ -30,7 +30,8 @@ from livebode.core.document import Document, Listing, Paragraph, Part, Picture, 
 from livebode.language import recognised
 from livebode.report.figures import WIDTH_IN, drawn
 from livebode.report.html import readable
-from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, WIDE, draw_on, register_fonts, runs
+from livebode.report.pdf_figure import draw_on, draw_string
+from livebode.report.pdf_fonts import BOLD, FIXED, PLAIN, register_fonts, runs, wide_font
 from livebode.report.style import LIGHT, columns
 
 _MARGIN = 16 * mm
@@ -102,9 +103,8 @@ class _Numbered(Canvas):  # type: ignore[misc]
 
 
 def _foot(canvas: Canvas, text: str) -> None:
-    canvas.setFont(PLAIN, 7.5)
     canvas.setFillColor(HexColor(LIGHT.muted))
-    canvas.drawString(_MARGIN, 10 * mm, text)
+    draw_string(canvas, 10 * mm, text, PLAIN, 7.5, x=_MARGIN)
 
 
 class _Drawing(Flowable):  # type: ignore[misc]
@@ -157,7 +157,7 @@ def _words(text: str, style: ParagraphStyle) -> Words:
     parts = [(escape(run, quote=False), wide) for run, wide in runs(readable(text))]
     if any(wide for _, wide in parts):
         style = style.clone(style.name, wordWrap="CJK")
-    return Words("".join(f'<font name="{WIDE}">{run}</font>' if wide else run for run, wide in parts), style)
+    return Words("".join(f'<font name="{wide_font()}">{run}</font>' if wide else run for run, wide in parts), style)
 
 
 def _cell(text: str, style: ParagraphStyle, width: float) -> Words:

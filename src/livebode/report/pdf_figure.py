@@ -8,19 +8,15 @@ draw a path, an image and a text. This one draws on ReportLab's canvas, so lines
 from __future__ import annotations
 
 import io
-import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_mixed import MixedModeRenderer
 from reportlab.lib.utils import ImageReader
 from reportlab.pdfbase import pdfmetrics
-from reportlab.pdfbase.cidfonts import UnicodeCIDFont
-from reportlab.pdfbase.ttfonts import TTFont
 
+from livebode.report.pdf_fonts import BOLD, PLAIN, runs, wide_font
 from livebode.report.style import LIGHT, drawing, quiet_about_letters, wide_letters
 
 if TYPE_CHECKING:
@@ -28,34 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.path import Path as Curve
     from reportlab.pdfgen.canvas import Canvas
 
-PLAIN, BOLD, FIXED = "DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"
-WIDE = "STSong-Light"
-"""Chinese letters: a font that every PDF reader provides, so the file does not contain it."""
 _LACKING = 0.4  # of the size, by which Matplotlib measures a wide letter too narrow
-_WIDE_RUN = re.compile("([\u2e80-\u9fff\uf900-\ufaff\uff00-\uffef]+)")
 _RASTER_DPI = 220  # of maps, whose cells are pixels in any case
 _CAPS = {"butt": 0, "round": 1, "projecting": 2}
 _JOINS = {"miter": 0, "round": 1, "bevel": 2}
 _MOVE, _LINE, _CURVE3, _CURVE4, _CLOSE = 1, 2, 3, 4, 79
-
-
-def register_fonts() -> None:
-    """Register Matplotlib's fonts, which contain the required symbols, with ReportLab."""
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    for name in (PLAIN, BOLD, FIXED):
-        if name not in pdfmetrics.getRegisteredFontNames():
-            pdfmetrics.registerFont(TTFont(name, folder / f"{name}.ttf"))
-    if WIDE not in pdfmetrics.getRegisteredFontNames():
-        pdfmetrics.registerFont(UnicodeCIDFont(WIDE))
-
-
-def runs(text: str) -> list[tuple[str, bool]]:
-    """The text in runs of one font each; whether it is the one of the wide letters.
-
-    >>> runs("Ms 灵敏度 2")
-    [('Ms ', False), ('灵敏度', True), (' 2', False)]
-    """
-    return [(run, i % 2 == 1) for i, run in enumerate(_WIDE_RUN.split(text)) if run]
 
 
 def draw_on(canvas: Canvas, figure: Figure) -> None:
@@ -142,12 +115,7 @@ class _OnCanvas(RendererBase):
         canvas.translate(x, y)
         canvas.rotate(angle)
         bold = prop.get_weight() in ("bold", "semibold", 600, 700)
-        size, at = prop.get_size_in_points(), 0.0
-        for text, wide in runs(s):
-            font = WIDE if wide else BOLD if bold else PLAIN
-            canvas.setFont(font, size)
-            canvas.drawString(at, 0, text)
-            at += pdfmetrics.stringWidth(text, font, size)
+        draw_string(canvas, 0, s, BOLD if bold else PLAIN, prop.get_size_in_points())
         canvas.restoreState()
 
     def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
@@ -163,6 +131,15 @@ class _OnCanvas(RendererBase):
         path, transform = gc.get_clip_path()
         if path is not None:
             canvas.clipPath(_shape(canvas, path.iter_segments(transform)), stroke=0, fill=0)
+
+
+def draw_string(canvas: Canvas, y: float, text: str, font: str, size: float, x: float = 0.0) -> None:
+    """Draw one line of text with the fonts that its letters need."""
+    for run, wide in runs(text):
+        name = wide_font() if wide else font
+        canvas.setFont(name, size)
+        canvas.drawString(x, y, run)
+        x += pdfmetrics.stringWidth(run, name, size)
 
 
 def _alpha(gc: Any, colour: Any) -> float:

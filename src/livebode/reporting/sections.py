@@ -90,7 +90,9 @@ def parameters(of: Material) -> Section | str:
         now = newest.get(name)
         mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
-        rows.append((recognised(name.replace("_", " ")), *mean, *late, recognised(units.get(name) or (now.unit if now else ""))))
+        rows.append(
+            (recognised(name.replace("_", " ")), *mean, *late, recognised(units.get(name) or (now.unit if now else "")))
+        )
     note = tr("± covers 95 % if the model is complete.")
     if of.fit:
         note = tr("Of the mean: {bounds}.", bounds=recognised(of.fit.about_bounds))
@@ -150,11 +152,11 @@ def margins(of: Material) -> Section | str:
         value, at = found.value[0, i], found.frequency_hz[0, i]
         if isnan(at):
             size = tr("any amount") if isinf(value) else tr("none")
-            rows.append((recognised(WORDS[name]), size, "", unit, "", tr("no crossing")))
+            rows.append((recognised(WORDS[name]), size, "", recognised(unit), "", tr("no crossing")))
             continue
         between = found.place[0, i] == "interpolated"
         mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
-        rows.append((recognised(WORDS[name]), *with_bound(value, bound[i]), unit, number(at, ".4g"), mark))
+        rows.append((recognised(WORDS[name]), *with_bound(value, bound[i]), recognised(unit), number(at, ".4g"), mark))
     headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
     table = Table(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
     caption = tr(
