@@ -5,6 +5,7 @@ files that Python and the page read at run time. Terminal, log, record and JSON 
 """
 
 from livebode.language.catalogue import ENGLISH, Catalogue, available, catalogue
+from livebode.language.negotiation import for_page, negotiated
 from livebode.language.recognition import recognised
 from livebode.language.spoken import date, listed, marked, number, numerals, spoken, tr, trn, used
 
@@ -14,8 +15,10 @@ __all__ = [
     "available",
     "catalogue",
     "date",
+    "for_page",
     "listed",
     "marked",
+    "negotiated",
     "number",
     "numerals",
     "recognised",
