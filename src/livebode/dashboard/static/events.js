@@ -88,7 +88,8 @@ export class Events {
     const open = list.filter((n) => alarm(n) && n.seen < n.count).length;
     this.open = open;
     this.count.hidden = !open;
-    this.count.textContent = `⚠ ${trn("{n} alarm", "{n} alarms", open)}`;
+    const alarms = trn("{n} alarm", "{n} alarms", open);
+    this.count.textContent = `⚠ ${alarms}`;
     const shown = list.filter((n) => !this.only.checked || alarm(n)).slice(0, SHOWN_MAX);
     const kept = document.activeElement?.getAttribute("data-event");
     this.host.replaceChildren(
