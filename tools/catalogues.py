@@ -1,6 +1,7 @@
 """The catalogues of report and dashboard: extracts the English sentences, and writes what is read at run time.
 
-``make catalogues`` updates `src/livebode/language/catalogues/*.po` from the source, and writes the JSON files from them.
+``make catalogues`` updates `src/livebode/language/catalogues/*.po` from the source, and writes the JSON files from
+them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import gettext
 import json
 import re
 import sys
+from functools import cache
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
@@ -26,12 +28,14 @@ PACKAGE = ROOT / "src/livebode"
 FOLDER = PACKAGE / "language/catalogues"
 STATIC = PACKAGE / "dashboard/static"
 _KEYWORDS = {"tr": None, "marked": None, "trn": (1, 2)}
+_CALL = re.compile(r"\b(?:trn?|marked)\(")
 _SHOWN = ("title", "aria-label", "placeholder", "alt")
 _RECORDED = "recorded sentence"
 _NO_WORDS = re.compile(r"[\W\d_]*|livebode", re.ASCII)
 Key = str | tuple[str, str]
 
 
+@cache
 def extracted() -> dict[Key, tuple[set[str], bool]]:
     """Every sentence of the source, with the files that have it, and whether it is the template of a recorded one."""
     found: dict[Key, tuple[set[str], bool]] = {}
@@ -57,6 +61,8 @@ def extracted() -> dict[Key, tuple[set[str], bool]]:
 
 
 def _called(kind: str, path: Path) -> list[Key]:
+    if not _CALL.search(path.read_text("utf-8")):
+        return []
     with path.open("rb") as file:
         rows = extract(kind, file, _KEYWORDS, options={"encoding": "utf-8"})
         return [message if isinstance(message, str) else (message[0], message[1]) for _, message, _, _ in rows]

@@ -11,7 +11,7 @@ import re
 from datetime import datetime
 from functools import cache
 
-from livebode.language.catalogue import Catalogue, catalogue
+from livebode.language.catalogue import Catalogue
 from livebode.language.spoken import date, numerals, used
 
 _SIZE = r"[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
@@ -56,7 +56,7 @@ def _whole(text: str, language: Catalogue) -> str | None:
     own = language.messages.get(text)
     if isinstance(own, str):
         return own
-    for pattern, names, translation in _templates(language.code):
+    for pattern, names, translation in _templates(language):
         if (match := pattern.fullmatch(text)) is not None:
             return _filled(translation, {name: _value(value) for name, value in zip(names, match.groups())})
     return None
@@ -75,9 +75,9 @@ def _value(text: str) -> str:
 
 
 @cache
-def _templates(code: str) -> list[tuple[re.Pattern[str], list[str], str]]:
+def _templates(language: Catalogue) -> list[tuple[re.Pattern[str], list[str], str]]:
     """Pattern, names of the values and translation of each template, the most literal first."""
-    found = sorted(catalogue(code).recorded, key=lambda pair: -len(_PLACE.sub("", pair[0])))
+    found = sorted(language.recorded, key=lambda pair: -len(_PLACE.sub("", pair[0])))
     return [(_pattern(english), _PLACE.findall(english), translation) for english, translation in found]
 
 

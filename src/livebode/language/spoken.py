@@ -21,14 +21,14 @@ def used() -> Catalogue:
 
 
 @contextmanager
-def spoken(code: str) -> Iterator[None]:
-    """Within, and in this thread only, sentences are in this language.
+def spoken(language: str | Catalogue) -> Iterator[None]:
+    """Within, and in this thread only, sentences are in this language, given by its code or as a catalogue.
 
     >>> with spoken("de"):
     ...     tr("Report of a run"), number(1234.5, ",.1f")
     ('Bericht eines Laufs', '1.234,5')
     """
-    before = _USED.set(catalogue(code))
+    before = _USED.set(language if isinstance(language, Catalogue) else catalogue(language))
     try:
         yield
     finally:
