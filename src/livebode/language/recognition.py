@@ -18,7 +18,8 @@ _SIZE = r"[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"{_SIZE}(?: ± {_SIZE}| … {_SIZE})?(?: ?(?:s|ms|Hz|dB|°|%))?")
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d) ?(\S*)")
 _PLACE = re.compile(r"\{(\w+)\}")
-_PIECES = re.compile(r"(?<=\.) "), re.compile(r"(?<=;) ")
+_CUTS = re.compile(r"(?<=\.) "), re.compile(r"(?<=;) ")
+_SENTENCES = re.compile(r"[.;] ")
 
 
 def recognised(text: str) -> str:
@@ -32,32 +33,41 @@ def recognised(text: str) -> str:
     language = used()
     if not language.messages:
         return text
-    return _known(text, language) or _by_pieces(text, language, _PIECES)
-
-
-def _by_pieces(text: str, language: Catalogue, cuts: tuple[re.Pattern[str], ...]) -> str:
-    """Sentence by sentence; those that are unknown clause by clause."""
-    if not cuts:
-        return text
-    pieces = cuts[0].split(text)
-    return " ".join(_known(piece, language) or _by_pieces(piece, language, cuts[1:]) for piece in pieces)
-
-
-def _known(text: str, language: Catalogue) -> str | None:
-    """The sentence, with or without the mark at its end."""
-    if (found := _whole(text, language)) is not None:
+    if (found := _translated(text, language)) is not None:
         return found
-    if text.endswith((".", ";")) and (found := _whole(text[:-1], language)) is not None:
-        return found + language.singular(text[-1])
-    return None
+    cut = next((cut for cut in _CUTS if cut.search(text)), None)
+    return text if cut is None else " ".join(recognised(piece) for piece in cut.split(text))
 
 
-def _whole(text: str, language: Catalogue) -> str | None:
+def _translated(text: str, language: Catalogue) -> str | None:
+    """All of it: as one sentence, sentence by sentence, clause by clause, or as a sentence that quotes others."""
+    if (found := _known(text, language, quoting=False)) is not None:
+        return found
+    for cut in _CUTS:
+        if cut.search(text):
+            pieces = [_translated(piece, language) for piece in cut.split(text)]
+            if None not in pieces:
+                return " ".join(piece for piece in pieces if piece is not None)
+    return _known(text, language, quoting=True)
+
+
+def _known(text: str, language: Catalogue, *, quoting: bool) -> str | None:
+    """The sentence, with or without the mark at its end."""
+    own = language.messages.get(text)
+    if isinstance(own, str):
+        return own
+    bare = text[:-1] if text.endswith((".", ";")) else text
+    found = _whole(bare, language, quoting)
+    return found if found is None or bare == text else found + language.singular(text[-1])
+
+
+def _whole(text: str, language: Catalogue, quoting: bool) -> str | None:
     own = language.messages.get(text)
     if isinstance(own, str):
         return own
     for pattern, names, translation in _templates(language):
-        if (match := pattern.fullmatch(text)) is not None:
+        match = pattern.fullmatch(text)
+        if match is not None and (quoting or not any(map(_SENTENCES.search, match.groups()))):
             return _filled(translation, {name: _value(value) for name, value in zip(names, match.groups())})
     return None
 

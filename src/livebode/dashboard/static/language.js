@@ -6,6 +6,7 @@
  * @typedef {object} Catalogue
  * @property {string} code BCP 47
  * @property {string} decimal
+ * @property {string} date for strftime
  * @property {string} plural digit n is the plural form for n < 200; from there on they repeat every hundred
  * @property {Record<string, string | string[]>} messages
  * @property {[english: string, translation: string][]} recorded
@@ -13,7 +14,15 @@
  */
 
 /** @type {Catalogue} */
-const ENGLISH = { code: "en", decimal: ".", plural: "", messages: {}, recorded: [], languages: { en: "English" } };
+const ENGLISH = {
+  code: "en",
+  decimal: ".",
+  date: "%Y-%m-%d %H:%M:%S %Z",
+  plural: "",
+  messages: {},
+  recorded: [],
+  languages: { en: "English" },
+};
 const SHOWN = ["title", "aria-label"];
 
 function chosen() {

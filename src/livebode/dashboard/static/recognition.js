@@ -5,6 +5,7 @@ import { filled, language } from "./language.js";
 
 const SIZE = String.raw`[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?`;
 const NUMBER = new RegExp(`^${SIZE}(?: ± ${SIZE}| … ${SIZE})?(?: ?(?:s|ms|Hz|dB|°|%))?$`);
+const DATE = /^(\d{4})-(\d\d)-(\d\d) (\d\d:\d\d:\d\d) ?(\S*)$/;
 const CUTS = [/(?<=\.) /, /(?<=;) /];
 
 /** @param {string} literal */
@@ -18,51 +19,74 @@ const TEMPLATES = language.recorded
   })
   .sort((a, b) => b.literals.join("").length - a.literals.join("").length);
 
-/**
- * @param {string} text
- * @returns {string}
- */
-export const recognised = (text) => (language.code === "en" ? text : (known(text) ?? byPieces(text, CUTS)));
+const RESULTS_MAX = 1000;
+/** @type {Map<string, string>} */
+const results = new Map();
+
+/** @param {string} text */
+export function recognised(text) {
+  if (language.code === "en") return text;
+  if (results.size > RESULTS_MAX) results.clear();
+  const found = results.get(text) ?? looked(text);
+  results.set(text, found);
+  return found;
+}
 
 /**
- * Sentence by sentence; those that are unknown clause by clause.
- *
  * @param {string} text
- * @param {RegExp[]} cuts
  * @returns {string}
  */
-function byPieces(text, [cut, ...more]) {
-  if (!cut) return text;
-  return text
-    .split(cut)
-    .map((piece) => known(piece) ?? byPieces(piece, more))
-    .join(" ");
+function looked(text) {
+  const found = translated(text);
+  if (found !== undefined) return found;
+  const cut = CUTS.find((each) => each.test(text));
+  return cut ? text.split(cut).map(looked).join(" ") : text;
+}
+
+/**
+ * All of it: as one sentence, sentence by sentence, clause by clause, or as a sentence that quotes others.
+ *
+ * @param {string} text
+ * @returns {string | undefined}
+ */
+function translated(text) {
+  const found = known(text, false);
+  if (found !== undefined) return found;
+  for (const cut of CUTS) {
+    if (!cut.test(text)) continue;
+    const pieces = text.split(cut).map(translated);
+    if (pieces.every((piece) => piece !== undefined)) return pieces.join(" ");
+  }
+  return known(text, true);
 }
 
 /**
  * The sentence, with or without the mark at its end.
  *
  * @param {string} text
+ * @param {boolean} quoting whether a value may contain sentences
  * @returns {string | undefined}
  */
-function known(text) {
-  const found = whole(text),
-    mark = text.slice(-1);
-  if (found !== undefined || !/[.;]/.test(mark)) return found;
-  const without = whole(text.slice(0, -1));
-  return without === undefined ? undefined : without + (language.messages[mark] ?? mark);
+function known(text, quoting) {
+  const own = language.messages[text];
+  if (typeof own === "string") return own;
+  const mark = /[.;]$/.exec(text)?.[0] ?? "";
+  const found = whole(mark ? text.slice(0, -1) : text, quoting);
+  return found === undefined ? undefined : found + (language.messages[mark] ?? mark);
 }
 
 /**
  * @param {string} text
+ * @param {boolean} quoting
  * @returns {string | undefined}
  */
-function whole(text) {
+function whole(text, quoting) {
   const own = language.messages[text];
   if (typeof own === "string") return own;
   for (const { pattern, names, translation } of TEMPLATES) {
-    const match = pattern.exec(text);
-    if (match) return filled(translation, Object.fromEntries(names.map((name, i) => [name, value(match[i + 1])])));
+    const match = pattern.exec(text)?.slice(1);
+    if (match && (quoting || !match.some((part) => /[.;] /.test(part))))
+      return filled(translation, Object.fromEntries(names.map((name, i) => [name, value(match[i])])));
   }
   return undefined;
 }
@@ -72,6 +96,18 @@ function whole(text) {
  * @returns {string}
  */
 function value(text) {
-  if (!NUMBER.test(text)) return recognised(text);
+  const date = DATE.exec(text);
+  if (date) return dated(date.slice(1));
+  if (!NUMBER.test(text)) return looked(text);
   return language.decimal === "." ? text : text.replace(/[.,]/g, (sign) => (sign === "." ? language.decimal : "."));
 }
+
+/** @param {string[]} parts */
+const dated = ([year, month, day, time, zone]) =>
+  language.date
+    .replace("%Y", year)
+    .replace("%m", month)
+    .replace("%d", day)
+    .replace("%H:%M:%S", time)
+    .replace("%Z", zone)
+    .trimEnd();
