@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from babel.core import Locale
-from babel.messages.catalog import Catalog
+from babel.messages.catalog import Catalog, Message
 from babel.messages.extract import extract
 from babel.messages.pofile import read_po, write_po
 
@@ -125,6 +125,12 @@ def po_text(of: Catalog) -> bytes:
     return header.encode() + file.getvalue()
 
 
+def translated(message: Message) -> bool:
+    """Whether it has all its forms."""
+    forms = (message.string,) if isinstance(message.string, str) else message.string
+    return bool(forms) and all(forms)
+
+
 def own_name(locale: Locale) -> str:
     """Name of the language in itself, with its script where there are several."""
     names = locale.languages
@@ -133,9 +139,8 @@ def own_name(locale: Locale) -> str:
 
 def date_format(locale: Locale) -> str:
     """Its usual numeric date with time and zone, for `strftime`; ISO 8601 where the usual one has names."""
-    pattern = str(locale.date_formats["medium"].pattern)
-    if "MMM" in pattern:
-        pattern = "y-MM-dd"
+    usual = (str(locale.date_formats[size].pattern) for size in ("medium", "short"))
+    pattern = next((pattern for pattern in usual if "MMM" not in pattern), "y-MM-dd")
     for letters, directive in (("d+", "%d"), ("M+", "%m"), ("y+", "%Y")):
         pattern = re.sub(letters, directive, pattern)
     return f"{pattern} %H:%M:%S %Z"
@@ -148,7 +153,7 @@ def run_time(of: Catalog) -> dict[str, Any]:
     form, symbols = gettext.c2py(of.plural_expr), locale.number_symbols["latn"]
     messages, recorded = {}, []
     for message in of:
-        if not message.id:
+        if not message.id or not translated(message):
             continue
         if _RECORDED in message.auto_comments:
             recorded.append([message.id, message.string])
@@ -173,7 +178,7 @@ def main() -> None:
         new = updated(old)
         (FOLDER / f"{code}.po").write_bytes(po_text(new))
         (FOLDER / f"{code}.json").write_text(json_text(new), "utf-8")
-        lacking = [message.id for message in new if message.id and not any(message.string)]
+        lacking = [message.id for message in new if message.id and not translated(message)]
         missing += len(lacking)
         print(f"{code}: {len(new)} sentences, {len(lacking)} without translation")
         for key in lacking[:20]:

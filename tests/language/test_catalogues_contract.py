@@ -20,7 +20,7 @@ from livebode.margins.margins import NAMES as MARGINS
 from livebode.margins.words import WORDS as MARGIN_WORDS
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import WHAT
-from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, updated
+from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, translated, updated
 
 _PLACE = re.compile(r"\{\w*(?::[^}]*)?\}")
 LANGUAGES = sorted(catalogues())
@@ -38,7 +38,7 @@ def test_each_sentence_is_translated_and_none_is_superfluous(code: str) -> None:
     known = {m.id if isinstance(m.id, str) else m.id[0]: m for m in catalogue if m.id}
     assert not keys().keys() - known.keys(), "missing: run make catalogues"
     assert not known.keys() - keys().keys(), "superfluous: run make catalogues"
-    assert not [key for key, m in known.items() if not all([m.string] if isinstance(m.string, str) else m.string)]
+    assert not [key for key, message in known.items() if not translated(message)], "without translation"
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
