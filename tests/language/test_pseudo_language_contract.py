@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.core import Event
-from livebode.language import Catalogue, catalogue, spoken
+from livebode.language import Catalogue, catalogue, in_language
 from livebode.report.html import to_html
 from livebode.reporting.compare_report import Comparison
 from livebode.reporting.run_report import run_report
@@ -76,7 +76,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def test_a_report_has_no_english_outside_of_its_catalogue(runs: tuple[Path, Path]) -> None:
-    with spoken(pseudo()):
+    with in_language(pseudo()):
         page = to_html(run_report(runs[0], made=datetime.now(UTC)))
     assert '<html lang="eo">' in page
     assert untranslated(visible(page), DATA | {"curr", "velo", "exci", "posi", "instruction"}) == set()
@@ -85,7 +85,7 @@ def test_a_report_has_no_english_outside_of_its_catalogue(runs: tuple[Path, Path
 
 def test_a_comparison_has_no_english_outside_of_its_catalogue(runs: tuple[Path, Path]) -> None:
     comparison = Comparison.of(*runs)
-    with spoken(pseudo()):
+    with in_language(pseudo()):
         page = to_html(comparison.document(datetime.now(UTC)))
     for path in runs:
         page = page.replace(str(path), "")

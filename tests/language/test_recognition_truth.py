@@ -13,7 +13,7 @@ from playwright.sync_api import Browser
 
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.dashboard import Dashboard, Serving
-from livebode.language import catalogue, number, recognised, spoken, tr, trn, used
+from livebode.language import catalogue, current_language, in_language, number, recognised, tr, trn
 from livebode.language.recorded import SENTENCES
 from tests.support.browser import Tab, chromium
 
@@ -26,15 +26,15 @@ def filled(template: str, value: Any = "12.5") -> str:
 
 @pytest.mark.parametrize("code", ["de", "zh-CN"])
 def test_each_template_gives_its_own_translation_with_the_values(code: str) -> None:
-    with spoken(code):
-        for english, translation in used().recorded:
+    with in_language(code):
+        for english, translation in current_language().recorded:
             assert recognised(filled(english)) == filled(translation, number(12.5)), english
 
 
 @given(st.lists(st.sampled_from(SENTENCES), min_size=1, max_size=4))
 def test_several_sentences_are_translated_one_by_one(templates: list[str]) -> None:
     ends = [filled(template).rstrip(".;") + "." for template in templates]
-    with spoken("de"):
+    with in_language("de"):
         every = recognised(" ".join(ends))
         assert every == " ".join(recognised(end) for end in ends)
 
@@ -42,12 +42,12 @@ def test_several_sentences_are_translated_one_by_one(templates: list[str]) -> No
 @given(st.text())
 def test_what_no_template_fits_stays_as_it_is_and_english_is_unchanged(text: str) -> None:
     assert recognised(text) == text
-    with spoken("de"):
+    with in_language("de"):
         assert recognised(f"Ω{text}Ω") == f"Ω{text}Ω"
 
 
 def test_messages_of_an_alarm_a_gap_and_a_group_in_german() -> None:
-    with spoken("de"):
+    with in_language("de"):
         assert recognised(
             "Since 2026-03-01 07:30:05 CET the belt's stiffness around position 0.31 is 10.06 ± 0.07 % less than in "
             "the baseline; a possible alternative: the moved mass is 3.1 ± 0.2 % more."
@@ -68,16 +68,16 @@ def test_messages_of_an_alarm_a_gap_and_a_group_in_german() -> None:
 def test_numbers_dates_and_plural_forms_follow_the_language_and_only_in_its_context() -> None:
     with moments_by(RunClock([(0.0, 1.7e9)])):
         english = moment(12.25)
-        with spoken("de"):
+        with in_language("de"):
             assert number(-1234.5, ",.1f") == "-1.234,5"
             assert (trn("{n:,} gap", "{n:,} gaps", 1), trn("{n:,} gap", "{n:,} gaps", 2)) == ("1 gap", "2 gaps")
             assert trn("{n:,} line", "{n:,} lines", 1001) == "1.001 Linien"
             assert re.fullmatch(r"\d\d\.\d\d\.2023 \d\d:\d\d:\d\d \S+", moment(12.25))
-        with spoken("zh-CN"):
+        with in_language("zh-CN"):
             assert moment(12.25).startswith("2023年11月")
         assert moment(12.25) == english
     assert tr("time in s") == "time in s"
-    with pytest.raises(KeyError), spoken("xx"):
+    with pytest.raises(KeyError), in_language("xx"):
         pass
 
 
@@ -98,5 +98,5 @@ def test_the_page_recognises_what_python_recognises(browser: Browser) -> None:
         )
         assert tab.page.evaluate("document.documentElement.lang") == "de"
         assert tab.wrong == []
-    with spoken("de"):
+    with in_language("de"):
         assert found == [recognised(sentence) for sentence in sentences]

@@ -10,7 +10,7 @@ import typer
 
 from livebode.cli.documents import write_documents
 from livebode.cli.options import Json, Language
-from livebode.language import spoken
+from livebode.language import in_language
 from livebode.records import to_json
 
 
@@ -32,7 +32,7 @@ def compare_command(
     files: list[Path] = []
     remark = ""
     if out is not None:
-        with spoken(language):
+        with in_language(language):
             files, remark = write_documents(found.document(datetime.now(UTC)), out, force=force)
     if as_json:
         print(to_json(found.plain()))

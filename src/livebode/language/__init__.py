@@ -7,23 +7,23 @@ files that Python and the page read at run time. Terminal, log, record and JSON 
 from livebode.language.catalogue import ENGLISH, Catalogue, available, catalogue
 from livebode.language.negotiation import for_page, negotiated
 from livebode.language.recognition import recognised
-from livebode.language.spoken import date, listed, marked, number, numerals, spoken, tr, trn, used
+from livebode.language.translation import current_language, date, in_language, listed, marked, number, numerals, tr, trn
 
 __all__ = [
     "ENGLISH",
     "Catalogue",
     "available",
     "catalogue",
+    "current_language",
     "date",
     "for_page",
+    "in_language",
     "listed",
     "marked",
     "negotiated",
     "number",
     "numerals",
     "recognised",
-    "spoken",
     "tr",
     "trn",
-    "used",
 ]

@@ -12,7 +12,7 @@ from datetime import datetime
 from functools import cache
 
 from livebode.language.catalogue import Catalogue
-from livebode.language.spoken import date, numerals, used
+from livebode.language.translation import current_language, date, numerals
 
 _SIZE = r"[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"{_SIZE}(?: ± {_SIZE}| … {_SIZE})?(?: ?(?:s|ms|Hz|dB|°|%))?")
@@ -25,12 +25,12 @@ _SENTENCES = re.compile(r"[.;] ")
 def recognised(text: str) -> str:
     """The sentence in the language in use; unchanged where no template fits.
 
-    >>> from livebode.language import spoken
-    >>> with spoken("de"):
+    >>> from livebode.language import in_language
+    >>> with in_language("de"):
     ...     recognised("12 samples were lost")
     '12 Abtastwerte verloren'
     """
-    language = used()
+    language = current_language()
     if not language.messages:
         return text
     if (found := _translated(text, language)) is not None:

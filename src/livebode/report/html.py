@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
-from livebode.language import recognised, used
+from livebode.language import current_language, recognised
 from livebode.report.figures import drawn
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import inline_svg
@@ -18,7 +18,7 @@ def to_html(document: Document) -> str:
     facts = "".join(f"<div><dt>{_text(n)}</dt><dd>{_text(v)}</dd></div>" for n, v in document.facts)
     links = "".join(f'<a href="#s{i}">{_text(s.title)}</a> ' for i, s in enumerate(document.sections))
     return (
-        f'<!DOCTYPE html>\n<html lang="{used().code}">\n<head>\n<meta charset="utf-8">\n'
+        f'<!DOCTYPE html>\n<html lang="{current_language().code}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         # Nothing is loaded or executed, even if a text should pass the escaping.
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "

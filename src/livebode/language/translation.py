@@ -15,16 +15,16 @@ from livebode.language.catalogue import ENGLISH, Catalogue, catalogue
 _USED: ContextVar[Catalogue] = ContextVar("language of report and page", default=ENGLISH)
 
 
-def used() -> Catalogue:
+def current_language() -> Catalogue:
     """The language in use."""
     return _USED.get()
 
 
 @contextmanager
-def spoken(language: str | Catalogue) -> Iterator[None]:
+def in_language(language: str | Catalogue) -> Iterator[None]:
     """Within, and in this thread only, sentences are in this language, given by its code or as a catalogue.
 
-    >>> with spoken("de"):
+    >>> with in_language("de"):
     ...     tr("Report of a run"), number(1234.5, ",.1f")
     ('Bericht eines Laufs', '1.234,5')
     """
@@ -46,7 +46,7 @@ def tr(text: str, /, **values: Any) -> str:
     >>> tr("{samples:,} samples at {rate:.1f} Hz", samples=2000, rate=4e3)
     '2,000 samples at 4000.0 Hz'
     """
-    return _FORMATTER.vformat(used().singular(text), (), values)
+    return _FORMATTER.vformat(current_language().singular(text), (), values)
 
 
 def trn(one: str, many: str, number: int, /, **values: Any) -> str:
@@ -55,7 +55,7 @@ def trn(one: str, many: str, number: int, /, **values: Any) -> str:
     >>> trn("{n:,} gap", "{n:,} gaps", 1), trn("{n:,} gap", "{n:,} gaps", 2)
     ('1 gap', '2 gaps')
     """
-    return _FORMATTER.vformat(used().form(one, many, number), (), values | {"n": number})
+    return _FORMATTER.vformat(current_language().form(one, many, number), (), values | {"n": number})
 
 
 def marked(text: str) -> str:
@@ -70,7 +70,7 @@ def number(value: Any, spec: str = "") -> str:
 
 def numerals(text: str) -> str:
     """A formatted English number with the decimal sign and the separator of the language."""
-    language = used()
+    language = current_language()
     return text.translate({ord("."): language.decimal, ord(","): language.group})
 
 
@@ -81,7 +81,7 @@ def listed(items: Iterable[str]) -> str:
 
 def date(moment: datetime) -> str:
     """Local date and time of day with the zone."""
-    return moment.strftime(used().date)
+    return moment.strftime(current_language().date)
 
 
 class _Formatter(string.Formatter):
