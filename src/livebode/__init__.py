@@ -50,7 +50,9 @@ if TYPE_CHECKING:
         stepped_sine,
     )
     from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
+    from livebode.interface import Run, example_axis, example_responses, example_run
     from livebode.kernel import SlidingDFT
+    from livebode.monitoring import Baseline, Monitor
     from livebode.motion import MotionCorrection
     from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
     from livebode.sources import Log, open_log
@@ -71,7 +73,9 @@ _HOME = {
         "stepped_sine",
     ),
     "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
+    "interface": ("Run", "example_axis", "example_responses", "example_run"),
     "kernel": ("SlidingDFT",),
+    "monitoring": ("Baseline", "Monitor"),
     "motion": ("MotionCorrection",),
     "core": (
         "UsageError",
@@ -109,6 +113,7 @@ _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "PID",
+    "Baseline",
     "BaselineError",
     "BeltAxis",
     "Block",
@@ -128,6 +133,7 @@ __all__ = [
     "Log",
     "Loop",
     "Model",
+    "Monitor",
     "MotionCorrection",
     "OutputError",
     "Parameter",
@@ -139,6 +145,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "Responses",
+    "Run",
     "ServerError",
     "Settings",
     "SignalError",
@@ -150,6 +157,9 @@ __all__ = [
     "Tracker",
     "UsageError",
     "chirp",
+    "example_axis",
+    "example_responses",
+    "example_run",
     "fit",
     "fit_rational",
     "low_crest_phases",

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core.errors import ExtraError, GridError
+from livebode.core import _conversion, _description
+from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
+from livebode.core.errors import GridError
 from livebode.core.lines import Lines
 from livebode.core.rows import joined
 
-Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
 Floats = NDArray[np.float64]
 
 
@@ -34,7 +39,7 @@ def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(FrequencyResponse):
     """The frequency response of a machine at one moment, at Lines. Immutable.
 
     Shapes are (lines,). `value` is only meaningful together with its bounds and `valid`.
@@ -96,53 +101,44 @@ class Response:
         """Radius that covers the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
         return widened(self.sigma, self.dof, c)
 
-    @property
-    def magnitude_db(self) -> Floats:
-        """20·log10|value|, shape (lines,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(20 * np.log10(np.abs(self.value)))
-
-    @property
-    def phase_deg(self) -> Floats:
-        """Phase in degrees, −180 … 180, shape (lines,)."""
-        return np.asarray(np.degrees(np.angle(self.value)))
-
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """The measured values at lines of this Response, so that it is a Model; GridError elsewhere."""
-        wanted = np.asarray(frequency_hz, dtype=np.float64)
-        bins = wanted / self.lines.resolution_hz
-        at = np.searchsorted(self.lines.bins, np.rint(bins)).clip(0, len(self.lines) - 1)
-        known = np.abs(np.asarray(self.lines.bins)[at] - bins) < 1e-6
-        if not np.all(known):
-            missing = float(wanted[~known].flat[0])
-            raise GridError(
-                "line-off",
-                f"{missing:g} Hz is not a measured line, and a measured response is not interpolated",
-                "choose a measured line",
-                frequency_hz=missing,
-                resolution_hz=self.lines.resolution_hz,
-            )
-        return np.asarray(self.value[at])
+        """The measured values at lines of this Response, so that it is a Model; as calling it."""
+        return np.asarray(self(frequency_hz))
 
-    def to_control(self) -> Any:
-        """python-control FrequencyResponseData of the valid lines (extra `control`)."""
-        try:
-            import control
-        except ImportError:
-            raise ExtraError(
-                "not-installed",
-                "python-control is not installed",
-                "pip install 'livebode[control]'",
-                package="control",
-                extra="control",
-            ) from None
-        omega = 2 * np.pi * self.lines.frequency_hz[self.valid]
-        # `control.bode_plot` draws no system without a name.
-        return control.frd(self.value[self.valid], omega, name=self.quantity)
+    def _batch(self) -> Responses:
+        return Responses.of(self)
 
+    def to_xarray(self) -> Dataset:
+        return super().to_xarray().isel(time_s=0)
 
-PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
-"""Attributes with one value for each line."""
+    def to_pandas(self) -> DataFrame:
+        return super().to_pandas().droplevel("time_s")
+
+    def to_frd(self) -> Any:
+        """python-control's FrequencyResponseData of the valid lines, in rad/s, without bounds (extra `control`).
+
+        It is the response of the sampled plant; it is not interpolated (`smooth` is off).
+
+        Raises
+        ------
+        ExtraError
+            If python-control is not installed.
+
+        Examples
+        --------
+        >>> from livebode import example_responses
+        >>> frd = example_responses()[-1].to_frd()
+        >>> (frd.omega[:3] / (2 * np.pi)).round(9).tolist()
+        [20.0, 30.0, 40.0]
+        """
+        return _conversion.frd(self)
+
+    def __repr__(self) -> str:
+        return _description.of_response(self)
+
+    def _repr_html_(self) -> str:
+        return _description.table_of_response(self)
+
 
 PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule")
 """Attributes with one value for the response."""
@@ -159,7 +155,7 @@ def _fill_unknown(of: Response | Responses) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Responses(Sequence[Response]):
+class Responses(FrequencyResponse, Sequence[Response]):
     """Consecutive responses, one for each hop, as arrays: (rows, lines) for attributes of a line, (rows,) for the rest.
 
     Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
@@ -211,11 +207,42 @@ class Responses(Sequence[Response]):
         """Radius that covers the truth with probability 1 − exp(−c²), shape (rows, lines)."""
         return widened(self.sigma, self.dof[:, np.newaxis], c)
 
-    @property
-    def magnitude_db(self) -> Floats:
-        """20·log10|value|, shape (rows, lines)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(20 * np.log10(np.abs(self.value)))
+    def newest(self) -> Response | None:
+        """The last one with a valid line; None if there is none."""
+        rows = np.flatnonzero(self.valid.any(axis=1))
+        return self[int(rows[-1])] if rows.size else None
+
+    def sel(self, *, frequency_hz: slice | ArrayLike = slice(None), time_s: slice = slice(None)) -> Responses:
+        """The part at some lines and times: slices with both ends included, or a list of measured lines.
+
+        Names and rules are those of xarray and of the dimensions in `to_xarray`. Brackets count rows:
+        ``responses[20:80]`` are 60 responses, not the lines from 20 to 80 Hz.
+
+        Raises
+        ------
+        GridError
+            If no line is within the slice, or a frequency of the list is not a measured line.
+
+        Examples
+        --------
+        >>> from livebode import example_responses
+        >>> responses = example_responses()
+        >>> responses.sel(frequency_hz=slice(40, 100), time_s=slice(0.2, 0.3)).value.shape
+        (4, 7)
+        """
+        part = super().sel(frequency_hz=frequency_hz)
+        low = -np.inf if time_s.start is None else time_s.start
+        high = np.inf if time_s.stop is None else time_s.stop
+        return part if time_s == slice(None) else part.between(low, high)
+
+    def _batch(self) -> Responses:
+        return self
+
+    def __repr__(self) -> str:
+        return _description.of_responses(self)
+
+    def _repr_html_(self) -> str:
+        return _description.table_of_responses(self)
 
     @classmethod
     def of(cls, response: Response) -> Responses:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses
-from livebode.report import ticks, words
+from livebode.drawing import decibels, quantiles, ticks
+from livebode.report import words
 from livebode.report.style import Style, plain
-from livebode.report.summary import decibels, quantiles
 
 if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh

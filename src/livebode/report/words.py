@@ -6,8 +6,8 @@ import numpy as np
 
 from livebode.core import Responses, counted
 from livebode.core.clock import moment, moment_of_start
+from livebode.drawing.ticks import frequency_label
 from livebode.report.style import shortened
-from livebode.report.ticks import frequency_label
 
 _SYMBOL = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _CLOCK_FROM_S = 1e5
