@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.design import Waveform, belt_machine, peaks, worst
+from livebode.experiment_design import Waveform, belt_machine, peaks, worst
 from livebode.simulation import BeltAxis, SimulatedAxis
-from tests.design.test_predictions_truth import MOVING, STANDING
+from tests.experiment_design.test_predictions_truth import MOVING, STANDING
 from tests.support.experiments import extremes
 
 TARGET = 0.1

@@ -12,7 +12,7 @@ import pytest
 
 from bench.firmware import KERNEL, ROOT, run
 from livebode import Lines, multisine
-from livebode.design import Waveform, write
+from livebode.experiment_design import Waveform, write
 
 FOLDER = ROOT / "examples" / "drive"
 N, RAMP = 20, 3 * 20

@@ -1,6 +1,6 @@
 """The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
-from livebode.core._frequency_response import PER_LINE, Quantity
+from livebode.core._frequency_response import PER_LINE, PlotKind, Quantity
 from livebode.core.block import Block, Channel, nearest_name
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
@@ -26,6 +26,7 @@ from livebode.core.lines import Lines
 from livebode.core.loop import Loop
 from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
+from livebode.core.plotting import plot_responses
 from livebode.core.response import PER_RESPONSE, Response, Responses, widened
 from livebode.core.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 from livebode.core.wording import counted, rounded_down
@@ -54,6 +55,7 @@ __all__ = [
     "Model",
     "OutputError",
     "Parameters",
+    "PlotKind",
     "PositionPD",
     "Quantity",
     "RecordError",
@@ -70,6 +72,7 @@ __all__ = [
     "as_model",
     "counted",
     "nearest_name",
+    "plot_responses",
     "rms",
     "rounded_down",
     "widened",

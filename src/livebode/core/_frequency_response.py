@@ -167,9 +167,9 @@ measured line; the nearest are 50 and 60 Hz
         ['plant', 'bound: 63.2 % (1σ)']
         >>> plt.close("all")
         """
-        from livebode.core.plotting import plot
+        from livebode.core.plotting import plot_responses
 
-        return plot(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
+        return plot_responses(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
 
     def to_xarray(self) -> Dataset:
         """A labelled Dataset (extra `xarray`).

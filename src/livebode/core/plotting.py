@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from livebode.core.response import Response, Responses
 
 
-def plot(
+def plot_responses(
     responses: Responses, kind: PlotKind, *, axes: Any, c: float | None, label: str | None, color: Any,
     front: Response | None = None,
 ) -> Any:  # fmt: skip

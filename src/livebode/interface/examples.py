@@ -8,11 +8,12 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from livebode.configuration import Axis
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.interface.run import Run
-from livebode.session import Axis, Destination, run
+from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
 _RATE_HZ, _WINDOW, _HOP, _SECONDS = 4000.0, 400, 100, 1.0

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import pyarrow as pa
 
-from livebode.core import Event, Lines, Loop, Response, Responses, counted
+from livebode.analysis.averaged import Averaged, averaged
+from livebode.analysis.fits import fit_averaged
+from livebode.analysis.loop_report import loop_report
+from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import Event, Lines, Loop, PlotKind, Response, Responses, counted, plot_responses
 from livebode.core.clock import RunClock, moment, moments_by
-from livebode.core.plotting import PlotKind, plot
 from livebode.fitting import Fit
 from livebode.margins import Margins
 from livebode.records import PARAMETERS
 from livebode.records import Run as RunRecord
-from livebode.session.averaged import Averaged, averaged
-from livebode.session.axis import Axis, FitSection, LoopSection
-from livebode.session.fits import fit_averaged
-from livebode.session.loop_report import loop_report
-from livebode.session.said import said
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,7 +62,7 @@ class Run:
     ...     run = livebode.example_run(f"{folder}/monday")
     ...     print(livebode.Run(f"{folder}/monday"))
     ...     run.average.frequency_hz[:3], round(run.fit()["resonance"], 1)
-    <Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 32 responses in 0.8 s; 0 events>
+    <Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 32 responses in 0.8 s; 2 events>
     (array([20., 30., 40.]), 59.4)
     """
 
@@ -76,7 +75,7 @@ class Run:
 
     @cached_property
     def responses(self) -> Responses:
-        """All responses, as written, in memory: 100 bytes for each line of each; `batches` reads a long run in parts."""
+        """All responses, as written, in memory: 100 bytes for each value; `batches` reads a long run in parts."""
         return self._record.responses()
 
     def batches(self, from_s: float | None = None, to_s: float | None = None) -> Iterator[Responses]:
@@ -139,7 +138,7 @@ class Run:
         found = self._averaged
         words = label or "average"
         bound = c if bounds else None
-        return plot(found.overview, kind, axes=axes, c=bound, label=words, color=color, front=found.response)
+        return plot_responses(found.overview, kind, axes=axes, c=bound, label=words, color=color, front=found.response)
 
     def fit(
         self,
@@ -230,13 +229,13 @@ class Run:
         """
         responses = Responses.join(list(self._record.steady_batches()))
         if loop is None:
-            section = LoopSection.model_validate(said(self._record.summary).get("loop", {}))
+            section = LoopSection.model_validate(recorded_configuration(self._record.summary).get("loop", {}))
             loop = section.build(self.lines.rate_hz)
         return loop_report(fit or self.fit(), self._averaged.words, responses, loop).margins
 
     def _section(self, given: Mapping[str, Any]) -> FitSection:
         data = {"source": {"log": str(self.path)}, "signals": {"output": "y"}}
-        own = said(self._record.summary).get("fit", {})
+        own = recorded_configuration(self._record.summary).get("fit", {})
         named = {key: value for key, value in given.items() if value is not None}
         section = Axis.of(data | {"fit": own | named}, "the arguments").fit
         assert section is not None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from livebode.design import Design, Waveform
+    from livebode.experiment_design import Design, Waveform
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import DesignError, Lines, UsageError
-from livebode.design.grid import Grid
-from livebode.design.machine import Machine
-from livebode.design.waveform import Waveform
-from livebode.design.wish import Wish
 from livebode.excitation import Phases, chirp, equal_snr, multisine, prbs, stepped_sine
+from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.machine import Machine
+from livebode.experiment_design.waveform import Waveform
+from livebode.experiment_design.wish import Wish
 
 Floats = NDArray[np.float64]
 

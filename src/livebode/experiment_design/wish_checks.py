@@ -11,7 +11,7 @@ from livebode.core import UsageError
 from livebode.excitation import check_order
 
 if TYPE_CHECKING:
-    from livebode.design.wish import Wish
+    from livebode.experiment_design.wish import Wish
 
 _WHOSE = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
 _RESOLUTION_MIN_HZ = 1e-6

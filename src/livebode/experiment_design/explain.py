@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import counted
-from livebode.design.encoder import encoder_words
-from livebode.design.grid import Grid
-from livebode.design.limits import Bearable
-from livebode.design.machine import UNITS, Quantity
-from livebode.design.mains import mains_words
-from livebode.design.peaks import Peak, worst
+from livebode.experiment_design.encoder import encoder_words
+from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.limits import Bearable
+from livebode.experiment_design.machine import UNITS, Quantity
+from livebode.experiment_design.mains import mains_words
+from livebode.experiment_design.peaks import Peak, worst
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
 
 if TYPE_CHECKING:
-    from livebode.design.choose import Design
+    from livebode.experiment_design.choose import Design
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design.machine import STANDING, Extremes, Machine, Place, Quantity, check_noise
+from livebode.experiment_design.machine import STANDING, Extremes, Machine, Place, Quantity, check_noise
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 
 Floats = NDArray[np.float64]

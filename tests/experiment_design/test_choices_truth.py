@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError
-from livebode.design import Bearable, Wish, belt_machine, choose
-from livebode.design.grid import grid
 from livebode.estimation.settings import default_hop
+from livebode.experiment_design import Bearable, Wish, belt_machine, choose
+from livebode.experiment_design.grid import grid
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.support.errors import refused
 

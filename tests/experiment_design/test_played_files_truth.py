@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.core import ConfigError
-from livebode.design import Bearable, Wish, belt_machine, choose, worst, write
+from livebode.experiment_design import Bearable, Wish, belt_machine, choose, worst, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import Run
 from livebode.simulation import BeltAxis, SimulatedAxis

@@ -9,10 +9,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from livebode.core import UsageError
-from livebode.design.mains import MAINS_HZ
-from livebode.design.wish_checks import check
 from livebode.excitation import Phases
 from livebode.excitation.chirp import Sweep
+from livebode.experiment_design.mains import MAINS_HZ
+from livebode.experiment_design.wish_checks import check
 
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines
-from livebode.design import Bearable, Wish, accuracy_of, belt_machine, choose, measured_machine, peaks, worst
-from livebode.design.waveform import Waveform
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import chirp, chirp_lines, multisine, prbs
+from livebode.experiment_design import Bearable, Wish, accuracy_of, belt_machine, choose, measured_machine, peaks, worst
+from livebode.experiment_design.waveform import Waveform
 from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from tests.support.experiments import RUN_IN_S, extremes
 

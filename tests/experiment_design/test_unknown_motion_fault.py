@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from livebode.core import DesignError, UsageError
-from livebode.design import QUANTITIES, Bearable, Wish, choose, measured_machine
-from livebode.design.machine import MOTION_KEYS
+from livebode.experiment_design import QUANTITIES, Bearable, Wish, choose, measured_machine
+from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.simulation import BeltAxis
 from tests.support.errors import refused
 

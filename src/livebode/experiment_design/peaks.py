@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.design.machine import QUANTITIES, Machine, Place, Quantity, within
-from livebode.design.waveform import Waveform
+from livebode.experiment_design.machine import QUANTITIES, Machine, Place, Quantity, within
+from livebode.experiment_design.waveform import Waveform
 
 Floats = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError, Lines, LivebodeError, UsageError
-from livebode.design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
-from livebode.design.files.c_names import KEYWORDS, identifier
 from livebode.excitation import chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
+from livebode.experiment_design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
+from livebode.experiment_design.files.c_names import KEYWORDS, identifier
 from livebode.experiments.experiment import Experiment
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.support.command import livebode

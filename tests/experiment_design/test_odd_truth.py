@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import UsageError
-from livebode.design import Wish, belt_machine, choose
-from livebode.design.grid import grid
 from livebode.excitation import multisine, recognise
+from livebode.experiment_design import Wish, belt_machine, choose
+from livebode.experiment_design.grid import grid
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from tests.support.errors import refused
 

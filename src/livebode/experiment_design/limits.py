@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import inf, isnan
 
 from livebode.core import DesignError, UsageError
-from livebode.design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
-from livebode.design.peaks import Peak
+from livebode.experiment_design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
+from livebode.experiment_design.peaks import Peak
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from livebode.design.waveform import Waveform
+from livebode.experiment_design.waveform import Waveform
 
 
 def facts(waveform: Waveform) -> dict[str, Any]:

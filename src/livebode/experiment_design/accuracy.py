@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import UsageError
-from livebode.design.machine import Machine
-from livebode.design.waveform import Waveform
+from livebode.experiment_design.machine import Machine
+from livebode.experiment_design.waveform import Waveform
 
 Floats = NDArray[np.float64]
 

@@ -1,5 +1,5 @@
 """An excitation as a file for a drive, a PLC or another program."""
 
-from livebode.design.files.formats import FORMATS, write
+from livebode.experiment_design.files.formats import FORMATS, write
 
 __all__ = ["FORMATS", "write"]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from livebode.core import Lines
-from livebode.design.choose import Design
 from livebode.estimation.settings import DETECTION_LINES_MIN
+from livebode.experiment_design.choose import Design
 
 
 def axis_text(

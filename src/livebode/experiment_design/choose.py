@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from livebode.core import DesignError, rounded_down
-from livebode.design.accuracy import Accuracy, Floats, accuracy_of
-from livebode.design.encoder import encoder_counts
-from livebode.design.explain import Choice, explained
-from livebode.design.grid import grid
-from livebode.design.limits import Bearable, beyond, check_known, room
-from livebode.design.machine import UNITS, Machine
-from livebode.design.make import REACHED, unit_waveform
-from livebode.design.peaks import Peak, peaks, worst
-from livebode.design.waveform import Waveform
-from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
+from livebode.experiment_design.accuracy import Accuracy, Floats, accuracy_of
+from livebode.experiment_design.encoder import encoder_counts
+from livebode.experiment_design.explain import Choice, explained
+from livebode.experiment_design.grid import grid
+from livebode.experiment_design.limits import Bearable, beyond, check_known, room
+from livebode.experiment_design.machine import UNITS, Machine
+from livebode.experiment_design.make import REACHED, unit_waveform
+from livebode.experiment_design.peaks import Peak, peaks, worst
+from livebode.experiment_design.waveform import Waveform
+from livebode.experiment_design.wish import Wish
 
 # Of the room that the limits leave: reserve for errors of the prediction.
 _RESERVE = 0.1

@@ -10,11 +10,11 @@ import numpy as np
 
 from livebode.core import GridError, Lines, counted
 from livebode.core.lines import WINDOW_MAX, check_window
-from livebode.design.mains import meets_mains
-from livebode.design.wish import Wish
 from livebode.estimation.settings import default_hop
 from livebode.excitation import check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
+from livebode.experiment_design.mains import meets_mains
+from livebode.experiment_design.wish import Wish
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.core import DesignError, GridError, Loop, Responses, SignalError, UsageError
 from livebode.core.controllers import integral
 from livebode.core.model import Algebra, Gain, Model, as_model
-from livebode.design.machine import STANDING, Extremes, Machine, Place, within
+from livebode.experiment_design.machine import STANDING, Extremes, Machine, Place, within
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
