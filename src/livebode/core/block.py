@@ -14,7 +14,13 @@ from livebode.core.errors import SignalError, UsageError
 
 @dataclass(frozen=True)
 class Channel:
-    """Name and unit of one recorded signal; the unit is empty where the source does not report it."""
+    """Name and unit of one recorded signal; the unit is empty where the source does not report it.
+
+    Examples
+    --------
+    >>> Channel("iq", "A")
+    Channel(name='iq', unit='A')
+    """
 
     name: str
     unit: str = ""

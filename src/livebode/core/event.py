@@ -13,6 +13,12 @@ class Event:
     `kind` is a stable word that programs may rely on (``gap``, ``non-finite``, ``spike``, ``held``), `sample` the
     number of the first sample that it concerns, `time_s` its time in the source's clock, `message` one sentence for
     people, and `details` plain data.
+
+    Examples
+    --------
+    >>> event = Event("gap", sample=4000, time_s=1.0, message="25 samples are missing", details={"missing": 25})
+    >>> event.kind, event.details["missing"]
+    ('gap', 25)
     """
 
     kind: str

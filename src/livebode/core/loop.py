@@ -39,6 +39,16 @@ class Loop:
         If the feedback or the entry has no frequency response.
     UsageError
         If one of them has several inputs or outputs, or a `logged` word is not supported.
+
+    Examples
+    --------
+    The loop of a drive: P position control around PI velocity control, and an excitation that is added to the torque.
+
+    >>> from livebode import PID, Cascade
+    >>> velocity = PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000)
+    >>> loop = Loop(feedback=Cascade(velocity=velocity, position=PID(gain=1.0, rate_hz=2000, held_ticks=2)))
+    >>> loop.feedback_at([20.0, 140.0]).shape
+    (2,)
     """
 
     feedback: Model | None = None

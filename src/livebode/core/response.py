@@ -76,6 +76,17 @@ class Response(FrequencyResponse):
         Error of the value from effects that repeat with the excitation but are not linear (friction, backlash, encoder
         steps), unit of `value`. `sigma` includes it; NaN where it cannot be measured, infinite at a line that is
         invalid because of such an effect (distortion, mains hum, sensor steps).
+
+    Examples
+    --------
+    >>> import livebode
+    >>> response = livebode.example_responses()[-1]
+    >>> response
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
+    >>> response.magnitude_db[:3].round(1), response.phase_deg[:3].round()
+    (array([  2.6,  -2.9, -12.8]), array([-91., -90., -75.]))
+    >>> bool((response.bound(2) < 0.2 * abs(response.value)).all())
+    True
     """
 
     lines: Lines
@@ -160,6 +171,17 @@ class Responses(FrequencyResponse, Sequence[Response]):
 
     Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
     those of Response.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> responses = livebode.example_responses()
+    >>> responses.magnitude_db.shape, len(responses[10:20])
+    ((40, 13), 10)
+    >>> for response in responses[-2:]:
+    ...     print(response)
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.92 s>
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
     """
 
     lines: Lines

@@ -66,6 +66,10 @@ class Design:
     hop: int
     choices: tuple[Choice, ...]
 
+    def __repr__(self) -> str:
+        shown = (choice for choice in self.choices if choice.what in ("lines", "window", "amplitude", "recording"))
+        return f"<Design: {'; '.join(f'{choice.what} {choice.value}' for choice in shown)}>"
+
     @property
     def ramp_s(self) -> float:
         """Duration of the ramp of the excitation, whole periods: the peaks are those of the periodic state."""

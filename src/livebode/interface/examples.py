@@ -16,7 +16,7 @@ from livebode.interface.run import Run
 from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
-_RATE_HZ, _WINDOW, _HOP, _SECONDS = 4000.0, 400, 100, 1.0
+_RATE_HZ, _WINDOW, _HOP = 4000.0, 400, 100
 _AMPLITUDE_N_M = 0.3  # of each line
 _NOISE_RAD_PER_S = 0.005
 _CONFIGURATION = {
@@ -31,13 +31,18 @@ _CONFIGURATION = {
 }
 
 
-def example_axis() -> SimulatedAxis:
-    """A belt axis (Nevaranta 2016, Table I) at standstill, with 13 lines of excitation, for one second.
+def example_axis(seconds: float = 1.0) -> SimulatedAxis:
+    """A belt axis (Nevaranta 2016, Table I) at standstill, with 13 lines of excitation.
+
+    Parameters
+    ----------
+    seconds
+        Duration.
 
     Returns
     -------
     SimulatedAxis
-        4,000 samples at 4 kHz; among its channels the excitation ``w``, the torque ``u`` (N m) and the motor's
+        Sampled at 4 kHz; among its channels the excitation ``w``, the torque ``u`` (N m) and the motor's
         ``velocity`` (rad/s). The same samples at each call.
 
     Examples
@@ -49,12 +54,17 @@ def example_axis() -> SimulatedAxis:
     lines = Lines.parse("20:140:10", _RATE_HZ, _WINDOW)
     excitation = multisine(lines, _AMPLITUDE_N_M)
     return SimulatedAxis(
-        BeltAxis(excitation_n_m=excitation, sensor=Sensor(noise_rad_per_s=_NOISE_RAD_PER_S), seconds=_SECONDS)
+        BeltAxis(excitation_n_m=excitation, sensor=Sensor(noise_rad_per_s=_NOISE_RAD_PER_S), seconds=seconds)
     )
 
 
-def example_responses() -> Responses:
+def example_responses(seconds: float = 1.0) -> Responses:
     """Responses of the plant of `example_axis`, 40 per second, tracked by the joint estimator.
+
+    Parameters
+    ----------
+    seconds
+        Duration.
 
     Returns
     -------
@@ -67,19 +77,21 @@ def example_responses() -> Responses:
     >>> responses.magnitude_db.shape
     (40, 13)
     """
-    block, _ = example_axis().run()
+    block, _ = example_axis(seconds).run()
     lines = Lines.parse("20:140:10", _RATE_HZ, _WINDOW)
     tracker = Tracker(Settings(lines=lines, excitation="w", input="u", output="velocity", hop=_HOP))
     return tracker.process(block)
 
 
-def example_run(directory: str | PathLike[str]) -> Run:
+def example_run(directory: str | PathLike[str], seconds: float = 1.0) -> Run:
     """Track the recording of `example_axis`, as `livebode run` does, with a fit and the description of the loop.
 
     Parameters
     ----------
     directory
         The new run directory; the recording is written beside it, as ``DIRECTORY.parquet``.
+    seconds
+        Duration.
 
     Raises
     ------
@@ -97,7 +109,7 @@ def example_run(directory: str | PathLike[str]) -> Run:
     place = Path(directory)
     place.parent.mkdir(parents=True, exist_ok=True)
     log = place.with_name(f"{place.name}.parquet")
-    block, _ = example_axis().run()
+    block, _ = example_axis(seconds).run()
     names = {f"{channel.name} [{channel.unit}]": channel.name for channel in block.channels}
     pq.write_table(pa.table({column: block[name] for column, name in names.items()}), log)
     axis = Axis.of(_CONFIGURATION | {"source": {"log": str(log), "rate_hz": _RATE_HZ}}, "the example")

@@ -241,6 +241,9 @@ class Run:
         assert section is not None
         return section
 
+    def __fspath__(self) -> str:
+        return str(self.path)
+
     def __repr__(self) -> str:
         return f"<Run {self.path.name!r}: {'; '.join(self._facts())}>"
 
