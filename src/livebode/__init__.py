@@ -10,7 +10,7 @@ Quick start, without a machine::
     >>> response.magnitude_db.round(1)[:3]
     array([  2.6,  -2.9, -12.8])
     >>> response(60.0).round(2)                         # the value at a measured line
-    np.complex128(4.29-1.68j)
+    np.complex128(4.28-1.68j)
     >>> axes = response.plot()                          # Bode; also "nyquist", "nichols"
     >>> frame = response.to_pandas()                    # or to_xarray(), to_frd()
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import doctest
 import inspect
+import pydoc
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -15,6 +19,12 @@ import pytest
 import livebode
 
 ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "src" / "livebode"
+PAGE = ROOT / "docs" / "reference" / "python.md"
+GUARDED = ("core", "drawing", "interface", "kernel")
+"""Packages whose private modules begin with an underscore; docs/reference/python.md says what is public in the others."""
+SHARED = {"livebode.simulation._axis"}
+"""Private modules that another package may import: the C engine of the simulation also replays a recorded motion."""
 
 
 def test_every_public_name_exists_and_is_listed_once() -> None:
@@ -47,10 +57,84 @@ def test_every_documented_parameter_exists(name: str) -> None:
     assert documented <= known, documented - known
 
 
-@pytest.mark.parametrize("name", ["Settings", "Loop", "PID", "Block", "Lines", "SlidingDFT"])
-def test_every_misspelt_keyword_raises(name: str) -> None:
-    with pytest.raises(TypeError, match="spelt_wrong"):
-        getattr(livebode, name)(spelt_wrong=1)
+@pytest.mark.parametrize("name", livebode.__all__)
+def test_every_public_name_has_an_example_that_runs(name: str) -> None:
+    doc = inspect.getdoc(getattr(livebode, name)) or ""
+    example = doc.partition("Examples\n--------\n")[2]
+    assert doctest.DocTestParser().get_examples(example), name
+
+
+def test_the_page_of_the_public_interface_lists_every_name_and_package() -> None:
+    page = PAGE.read_text("utf-8")
+    rows = [line.split("|")[1:3] for line in page.splitlines() if line.startswith("| `")]
+    names = {name for cells in rows for name in re.findall(r"`(\w+)`", cells[0])}
+    packages = {name for cells in rows for name in re.findall(r"`livebode\.(\w+)`", cells[0])}
+    assert names == set(livebode.__all__)
+    have = {path.parent.name for path in SOURCE.glob("*/__init__.py") if "__all__" in path.read_text("utf-8")}
+    assert packages == have - {"cli"}
+    for package in packages:
+        module = import_module(f"livebode.{package}")
+        assert [name for name in module.__all__ if not hasattr(module, name)] == [], package
+
+
+def test_help_begins_with_a_page_that_names_every_name() -> None:
+    page = pydoc.plain(pydoc.render_doc(livebode)).partition("PACKAGE CONTENTS")[0]
+    assert [name for name in livebode.__all__ if not re.search(rf"\b{name}\b", page)] == []
+    assert max(map(len, page.splitlines())) <= 125
+
+
+def _callables() -> Iterator[tuple[str, Callable[..., object]]]:
+    """Public functions, classes, and their public methods; C functions have no signature and take no keywords."""
+    for name in livebode.__all__:
+        thing = getattr(livebode, name)
+        yield name, thing
+        for method in dir(thing) if inspect.isclass(thing) else ():
+            if not method.startswith("_") and inspect.isroutine(inspect.getattr_static(thing, method)):
+                yield f"{name}.{method}", getattr(thing, method)
+
+
+@pytest.mark.parametrize(
+    ("name", "callable_"),
+    [
+        pytest.param(name, callable_, id=name)
+        for name, callable_ in _callables()
+        # Facts of an error have any name; the options of a fit are those of its model, as the next test shows.
+        if not (name.split(".")[0].endswith("Error") or name in ("fit", "Fitter", "Model", "PhysicalModel"))
+    ],
+)
+def test_every_misspelt_keyword_raises(name: str, callable_: Callable[..., object]) -> None:
+    with pytest.raises(TypeError, match="spelt_wrong|takes no keyword arguments|incompatible function arguments"):
+        callable_(spelt_wrong=1)
+
+
+def test_a_misspelt_option_of_a_model_raises() -> None:
+    for call in (livebode.Fitter, lambda model, **given: livebode.fit(livebode.example_responses(), model, **given)):
+        with pytest.raises(livebode.UsageError, match="spelt_wrong"):
+            call("two-mass", spelt_wrong=1)
+
+
+def test_a_module_is_private_by_its_underscore() -> None:
+    """No other package imports a module with an underscore, and of the guarded ones each module without is imported."""
+    imports = {
+        found for folder in (SOURCE, ROOT / "tests") for path in folder.rglob("*.py") for found in _imported(path)
+    }
+    private = {f"livebode.{package}.{module}" for package, module in imports if module.startswith("_")}
+    assert private <= SHARED, private
+    modules = {(package, path.stem) for package in GUARDED for path in (SOURCE / package).glob("[!_]*.py")}
+    assert modules - imports == set()
+
+
+def _imported(path: Path) -> Iterator[tuple[str, str]]:
+    """Package and module of each import from another package of livebode."""
+    own = path.relative_to(SOURCE).parts[0] if path.is_relative_to(SOURCE) else ""
+    text = path.read_text("utf-8")
+    for package, module in re.findall(r"livebode\.(\w+)\.(\w+)", text):
+        if package != own:
+            yield package, module
+    for package, names in re.findall(r"from livebode\.(\w+) import ([^\n(]+|\([^)]*\))", text):
+        for name in re.findall(r"\w+", names) if package != own else ():
+            if (SOURCE / package / f"{name}.py").exists():
+                yield package, name
 
 
 def test_locks_name_no_host_and_agree_with_each_other() -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from livebode.core.response import Response, Responses
+    from livebode.core._response import Response, Responses
 
 _NAMES = {
     "response": "complex frequency response",

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from livebode.core._wording import counted
 from livebode.core.clock import moment
-from livebode.core.wording import counted
 
 if TYPE_CHECKING:
+    from livebode.core._response import Response, Responses
     from livebode.core.lines import Lines
-    from livebode.core.response import Response, Responses
 
 _ROWS_MAX = 24
 _HEADS = ("frequency", "magnitude", "phase", "bound (2σ, 98.2 %)", "coherence")

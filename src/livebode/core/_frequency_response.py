@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from livebode.core.response import Responses
+    from livebode.core._response import Responses
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 PlotKind = Literal["bode", "nyquist", "nichols"]
@@ -165,9 +165,8 @@ measured line; the nearest are 50 and 60 Hz
         >>> _ = example_responses()[-1].plot("nyquist", axes=axes, c=1)
         >>> axes.get_legend_handles_labels()[1]
         ['plant', 'bound: 63.2 % (1σ)']
-        >>> plt.close("all")
         """
-        from livebode.core.plotting import plot_responses
+        from livebode.core._plotting import plot_responses
 
         return plot_responses(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
 

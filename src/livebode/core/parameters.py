@@ -9,9 +9,9 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core._wording import counted
 from livebode.core.errors import UsageError
 from livebode.core.rows import joined
-from livebode.core.wording import counted
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from the same parts. Matplotlib is imported when something is drawn. Text and co
 the settings of the caller's Matplotlib.
 """
 
-from livebode.drawing.curve import Cloud, Curve
-from livebode.drawing.curves import SPAN, bound_db, bound_deg, circular, decibels, near, quantiles, unwrapped
+from livebode.drawing._curve import Cloud, Curve
+from livebode.drawing._curves import SPAN, bound_db, bound_deg, circular, decibels, near, quantiles, unwrapped
 
 __all__ = [
     "SPAN",

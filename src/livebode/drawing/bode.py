@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from livebode.drawing.bounds import without_stretching
-from livebode.drawing.curve import Cloud, Curve
-from livebode.drawing.curves import bound_db, bound_deg, circular, decibels, near, quantiles
+from livebode.drawing._bounds import without_stretching
+from livebode.drawing._curve import Cloud, Curve
+from livebode.drawing._curves import bound_db, bound_deg, circular, decibels, near, quantiles
 from livebode.drawing.panel import FEW_LINES, alone, band, bound
 from livebode.drawing.scales import free_frequency_axis, phase_axis
 

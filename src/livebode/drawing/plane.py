@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.drawing.bounds import circles, nichols_regions, without_stretching
-from livebode.drawing.curve import Cloud, Curve
-from livebode.drawing.curves import decibels, near
+from livebode.drawing._bounds import circles, nichols_regions, without_stretching
+from livebode.drawing._curve import Cloud, Curve
+from livebode.drawing._curves import decibels, near
 from livebode.drawing.scales import phase_axis
 from livebode.drawing.ticks import frequency_label
 

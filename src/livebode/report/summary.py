@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Response, Responses
-from livebode.drawing.curves import circular, decibels, near, quantiles, unwrapped
+from livebode.drawing import circular, decibels, near, quantiles, unwrapped
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.drawing.curves import unwrapped
+from livebode.drawing._curves import unwrapped
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -11,7 +11,7 @@ from livebode.core.errors import UsageError
 from livebode.drawing import Cloud, Curve
 
 if TYPE_CHECKING:
-    from livebode.core.response import Response, Responses
+    from livebode.core._response import Response, Responses
 
 
 def plot_responses(

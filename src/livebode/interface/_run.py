@@ -128,12 +128,11 @@ class Run:
 
         Examples
         --------
-        >>> import livebode, matplotlib.pyplot as plt, tempfile
+        >>> import livebode, tempfile
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     axes = livebode.example_run(f"{folder}/monday").plot("nyquist")
         >>> axes.get_legend_handles_labels()[1]
         ['average', 'bound: 98.2 % (2σ)']
-        >>> plt.close("all")
         """
         found = self._averaged
         words = label or "average"

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core.block import Block, Channel
+from livebode.core._block import Block, Channel
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import WINDOW_MAX, Lines
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.drawing.curves import FLOOR_DB, decibels
+from livebode.drawing._curves import FLOOR_DB, decibels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from livebode.configuration import Axis
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.interface.run import Run
+from livebode.interface._run import Run
 from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
