@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "livebode"
 PAGE = ROOT / "docs" / "reference" / "python.md"
 GUARDED = ("core", "drawing", "interface", "kernel")
-"""Packages whose private modules begin with an underscore; docs/reference/python.md says what is public in the others."""
+"""Packages whose private modules begin with an underscore."""
 SHARED = {"livebode.simulation._axis"}
 """Private modules that another package may import: the C engine of the simulation also replays a recorded motion."""
 
@@ -89,21 +89,21 @@ def _callables() -> Iterator[tuple[str, Callable[..., object]]]:
         thing = getattr(livebode, name)
         yield name, thing
         for method in dir(thing) if inspect.isclass(thing) else ():
-            if not method.startswith("_") and inspect.isroutine(inspect.getattr_static(thing, method)):
+            if not method.startswith("_") and callable(getattr(thing, method)):
                 yield f"{name}.{method}", getattr(thing, method)
 
 
 @pytest.mark.parametrize(
-    ("name", "callable_"),
+    "callable_",
     [
-        pytest.param(name, callable_, id=name)
+        pytest.param(callable_, id=name)
         for name, callable_ in _callables()
         # Facts of an error have any name; the options of a fit are those of its model, as the next test shows.
         if not (name.split(".")[0].endswith("Error") or name in ("fit", "Fitter", "Model", "PhysicalModel"))
     ],
 )
-def test_every_misspelt_keyword_raises(name: str, callable_: Callable[..., object]) -> None:
-    with pytest.raises(TypeError, match="spelt_wrong|takes no keyword arguments|incompatible function arguments"):
+def test_every_misspelt_keyword_raises(callable_: Callable[..., object]) -> None:
+    with pytest.raises(TypeError, match=r"spelt_wrong|takes no keyword arguments|incompatible function arguments"):
         callable_(spelt_wrong=1)
 
 
@@ -115,9 +115,8 @@ def test_a_misspelt_option_of_a_model_raises() -> None:
 
 def test_a_module_is_private_by_its_underscore() -> None:
     """No other package imports a module with an underscore, and of the guarded ones each module without is imported."""
-    imports = {
-        found for folder in (SOURCE, ROOT / "tests") for path in folder.rglob("*.py") for found in _imported(path)
-    }
+    files = (path for folder in (SOURCE, ROOT / "tests") for path in folder.rglob("*.py"))
+    imports = {found for path in files for found in _imported(path)}
     private = {f"livebode.{package}.{module}" for package, module in imports if module.startswith("_")}
     assert private <= SHARED, private
     modules = {(package, path.stem) for package in GUARDED for path in (SOURCE / package).glob("[!_]*.py")}
