@@ -97,7 +97,9 @@ if TYPE_CHECKING:
         stepped_sine,
     )
     from livebode.fitting import Fit, Fitter, Parameter, PhysicalModel, Rational, fit, fit_rational
-    from livebode.interface import Run, design, example_axis, example_responses, example_run
+    from livebode.interface._examples import example_axis, example_responses, example_run
+    from livebode.interface._experiment import design
+    from livebode.interface._run import Run
     from livebode.kernel import SlidingDFT
     from livebode.monitoring import Baseline, Monitor
     from livebode.motion import MotionCorrection
@@ -121,7 +123,9 @@ _HOME = {
         "stepped_sine",
     ),
     "fitting": ("Fit", "Fitter", "Parameter", "PhysicalModel", "Rational", "fit", "fit_rational"),
-    "interface": ("Run", "design", "example_axis", "example_responses", "example_run"),
+    "interface._examples": ("example_axis", "example_responses", "example_run"),
+    "interface._experiment": ("design",),
+    "interface._run": ("Run",),
     "kernel": ("SlidingDFT",),
     "monitoring": ("Baseline", "Monitor"),
     "motion": ("MotionCorrection",),

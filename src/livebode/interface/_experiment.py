@@ -54,7 +54,7 @@ def design(
     >>> machine = {"belt": {"standstill": {"position_m": 0.8}}, "excitation": {}}
     >>> found = design(machine, band_hz=(20, 140), resolution_hz=20)
     >>> found.waveform.lines.frequency_hz
-    array([ 20.,  40.,  80., 120.])
+    array([ 30.,  70.,  90., 130.])
     >>> found.waveform.lines.window, found.hop
     (400, 20)
     """
