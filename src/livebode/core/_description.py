@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.core._wording import counted
 from livebode.core.clock import moment
 
 if TYPE_CHECKING:
@@ -44,30 +42,33 @@ def of_responses(many: Responses) -> str:
 
 def table_of_response(one: Response) -> str:
     """HTML: a row for each line, thinned to `_ROWS_MAX`; lines that are not valid are grey."""
-    every = np.unique(np.linspace(0, len(one.lines) - 1, _ROWS_MAX).round().astype(int))
+    count = len(one.lines)
+    shown = np.unique(np.linspace(0, count - 1, min(count, _ROWS_MAX)).round().astype(int))
     with np.errstate(divide="ignore", invalid="ignore"):
         share = one.bound(2) / np.abs(one.value)
-    values = zip(one.frequency_hz, one.magnitude_db, one.phase_deg, share, one.coherence, one.valid)
-    rows = [_row(*row) for i, row in enumerate(values) if i in set(every.tolist())]
-    thinned = (
-        f"<caption>{len(rows)} of {counted(len(one.lines), 'line')}</caption>" if len(rows) < len(one.lines) else ""
-    )
+    values = (one.frequency_hz, one.magnitude_db, one.phase_deg, share, one.coherence, one.valid)
+    rows = [_row(*row) for row in zip(*(part[shown] for part in values))]
+    thinned = f"<caption>{len(rows)} of {count} lines</caption>" if len(rows) < count else ""
     heads = "".join(f"<th>{head}</th>" for head in _HEADS)
-    return (
-        f"<div>{escape(of_response(one))}</div><table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
-    )
+    return f"{_paragraph(of_response(one))}<table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
 
 
 def table_of_responses(many: Responses) -> str:
     """HTML: all in a line, and the newest valid one as a table."""
     newest = many.newest()
-    return f"<div>{escape(of_responses(many))}</div>" + ("" if newest is None else table_of_response(newest))
+    return _paragraph(of_responses(many)) + ("" if newest is None else table_of_response(newest))
 
 
 def _row(f: float, db: float, deg: float, share: float, coherence: float, valid: bool) -> str:
     cells = (f"{f:.6g} Hz", f"{db:.2f} dB", f"{deg:.1f}°", f"{100 * share:.2g} %", f"{coherence:.3f}")
     look = "" if valid else ' style="opacity: 0.4"'
     return f"<tr{look}>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _paragraph(text: str) -> str:
+    from html import escape  # its table of entities is loaded for a notebook only
+
+    return f"<div>{escape(text)}</div>"
 
 
 def _named(of: Response | Responses) -> str:
