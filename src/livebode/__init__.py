@@ -8,9 +8,9 @@ Quick start, without a machine::
     >>> responses = livebode.example_responses()        # a simulated belt axis, tracked for a second
     >>> response = responses[-1]                        # the newest
     >>> response.magnitude_db.round(1)[:3]
-    array([  2.6,  -2.9, -12.8])
+    array([  2.6,  -2.9, -13.3])
     >>> response(60.0).round(2)                         # the value at a measured line
-    np.complex128(4.28-1.68j)
+    np.complex128(4.27-1.64j)
     >>> axes = response.plot()                          # Bode; also "nyquist", "nichols"
     >>> frame = response.to_pandas()                    # or to_xarray(), to_frd()
 

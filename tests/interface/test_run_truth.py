@@ -31,7 +31,7 @@ def printed(*arguments: object) -> dict:
 
 def test_a_run_describes_itself_in_a_line(run: Run) -> None:
     assert repr(run) == (
-        "<Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 32 responses in 0.8 s; 2 events>"
+        "<Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 40 responses in 1 s; 1 event>"
     )
     assert "<li>13 lines, 20 … 140 Hz</li>" in run._repr_html_()
 
@@ -44,6 +44,7 @@ def test_nothing_but_the_summary_is_read_at_first(run: Run, tmp_path: Path) -> N
         assert len(opened.responses) == 0
     with refused(RecordError, "not-a-run"):
         Run(tmp_path / "none")
+    assert repr(opened).endswith("events unreadable (record.unreadable)>")
 
 
 def test_the_average_is_the_mean_of_the_responses(run: Run) -> None:

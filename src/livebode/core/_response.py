@@ -84,9 +84,9 @@ class Response(FrequencyResponse):
     >>> response
     <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
     >>> response.magnitude_db[:3].round(1), response.phase_deg[:3].round()
-    (array([  2.6,  -2.9, -12.8]), array([-91., -90., -75.]))
+    (array([  2.6,  -2.9, -13.3]), array([-90., -88., -71.]))
     >>> response.bound(2).shape, round(float(response.coherence.min()), 2)
-    ((13,), 0.99)
+    ((13,), 1.0)
     """
 
     lines: Lines

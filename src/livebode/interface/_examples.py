@@ -17,8 +17,9 @@ from livebode.runtime import Destination, run
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 
 _RATE_HZ, _WINDOW, _HOP = 4000.0, 400, 100
+_RUN_IN_S = 0.5  # until the response to the excitation repeats
 _AMPLITUDE_N_M = 0.3  # of each line
-_NOISE_RAD_PER_S = 0.005
+_NOISE_RAD_PER_S = 0.05
 _CONFIGURATION = {
     "signals": {"output": "velocity", "input": "u", "excitation": "w"},
     "lines": {"frequencies": "20:140:10", "window": _WINDOW},
@@ -52,9 +53,13 @@ def example_axis(seconds: float = 1.0) -> SimulatedAxis:
     (4000, 4000.0)
     """
     lines = Lines.parse("20:140:10", _RATE_HZ, _WINDOW)
-    excitation = multisine(lines, _AMPLITUDE_N_M)
     return SimulatedAxis(
-        BeltAxis(excitation_n_m=excitation, sensor=Sensor(noise_rad_per_s=_NOISE_RAD_PER_S), seconds=seconds)
+        BeltAxis(
+            excitation_n_m=multisine(lines, _AMPLITUDE_N_M),
+            sensor=Sensor(noise_rad_per_s=_NOISE_RAD_PER_S),
+            run_in_s=_RUN_IN_S,
+            seconds=seconds,
+        )
     )
 
 

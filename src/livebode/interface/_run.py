@@ -16,7 +16,7 @@ from livebode.analysis.fits import fit_averaged
 from livebode.analysis.loop_report import loop_report
 from livebode.configuration.axis import Axis, FitSection, LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Event, Lines, Loop, PlotKind, Response, Responses, counted, plot_responses
+from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
 from livebode.margins import Margins
@@ -62,7 +62,7 @@ class Run:
     ...     run = livebode.example_run(f"{folder}/monday")
     ...     print(livebode.Run(f"{folder}/monday"))
     ...     run.average.frequency_hz[:3], round(run.fit()["resonance"], 1)
-    <Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 32 responses in 0.8 s; 2 events>
+    <Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 40 responses in 1 s; 1 event>
     (array([20., 30., 40.]), 59.4)
     """
 
@@ -257,7 +257,10 @@ class Run:
         names += f", excited by {signals['excitation']}" if signals.get("excitation") else ""
         f: np.ndarray = self.lines.frequency_hz
         facts = [names, f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz", self._extent()]
-        return [*facts, counted(len(self.events), "event")]
+        try:
+            return [*facts, counted(len(self.events), "event")]
+        except LivebodeError as error:  # a description never raises, whatever happened to the directory
+            return [*facts, f"events unreadable ({error.code})"]
 
     def _extent(self) -> str:
         """Number of responses, duration and, if the run has a clock, its start."""
