@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 from livebode.core import BaselineError, Lines, counted
@@ -46,8 +47,8 @@ class Baseline:
     >>> import livebode, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     baseline = livebode.learn([livebode.example_run(f"{folder}/healthy", seconds=5)])
-    ...     baseline.save(Path(folder) / "healthy.json")
-    ...     Baseline.load(Path(folder) / "healthy.json")
+    ...     baseline.save(f"{folder}/healthy.json")
+    ...     Baseline.load(f"{folder}/healthy.json")
     <Baseline: lines and parameters, 13 lines, 20 … 140 Hz; learned from 1 run>
     """
 
@@ -136,17 +137,17 @@ class Baseline:
             )
 
     @classmethod
-    def load(cls, path: Path) -> Baseline:
+    def load(cls, path: str | PathLike[str]) -> Baseline:
         """The baseline in a file; BaselineError where it cannot be read or is not a baseline."""
         from livebode.monitoring.baseline_file import load
 
-        return load(path)
+        return load(Path(path))
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | PathLike[str]) -> None:
         """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content."""
         from livebode.monitoring.baseline_file import save
 
-        save(self, path)
+        save(self, Path(path))
 
 
 def signals_of(settings: Settings) -> dict[str, str | None]:

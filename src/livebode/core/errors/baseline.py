@@ -14,9 +14,8 @@ class BaselineError(LivebodeError):
     Examples
     --------
     >>> import livebode
-    >>> from pathlib import Path
     >>> try:
-    ...     livebode.Baseline.load(Path("missing.json"))
+    ...     livebode.Baseline.load("missing.json")
     ... except livebode.BaselineError as error:
     ...     print(error.code)
     baseline.absent
