@@ -113,20 +113,20 @@ def test_a_design_writes_what_the_command_writes(tmp_path: Path) -> None:
     file = tmp_path / "experiment.toml"
     file.write_text("[belt.standstill]\nposition_m = 0.8\n[excitation]\nband_hz = [20, 140]\nwindow = 400\n")
     wanted = printed("design", file, "--out", tmp_path / "command", "--amplitude", 0.5, "--to", "csv")
-    found = json.loads(to_json(livebode.experiment_design(str(file), amplitude_n_m=0.5).plain()))
+    found = json.loads(to_json(livebode.design(str(file), amplitude_n_m=0.5).plain()))
     assert found == {name: wanted[name] for name in found}
-    livebode.experiment_design(MACHINE, tmp_path / "python", amplitude_n_m=0.5)
+    livebode.design(MACHINE, tmp_path / "python", amplitude_n_m=0.5)
     text = [(tmp_path / place / "axis.toml").read_text() for place in ("command", "python")]
     assert text[0] == text[1]
     with refused(OutputError, "exists"):
-        livebode.experiment_design(MACHINE, tmp_path / "python")
+        livebode.design(MACHINE, tmp_path / "python")
 
 
 def test_a_mapping_without_an_excitation_and_a_misspelt_key_are_refused() -> None:
     with refused(ConfigError, "key-missing"):
-        livebode.experiment_design({"belt": {}})
+        livebode.design({"belt": {}})
     with refused(ConfigError, "key-unknown"):
-        livebode.experiment_design(MACHINE | {"excitation": {"bnd_hz": [20, 140]}})
+        livebode.design(MACHINE | {"excitation": {"bnd_hz": [20, 140]}})
 
 
 def test_a_baseline_is_learned_from_paths_and_from_runs_alike(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import doctest
 import inspect
+import io
 import pydoc
 import re
 import subprocess
@@ -62,6 +63,23 @@ def test_every_public_name_has_an_example_that_runs(name: str) -> None:
     doc = inspect.getdoc(getattr(livebode, name)) or ""
     example = doc.partition("Examples\n--------\n")[2]
     assert doctest.DocTestParser().get_examples(example), name
+
+
+@pytest.mark.parametrize("name", [name for name in livebode.__all__ if name.endswith("Error")])
+def test_the_example_of_an_error_runs(name: str) -> None:
+    """doctest finds the others in their modules; errors name `livebode` as theirs, and are not found there."""
+    doc = inspect.getdoc(getattr(livebode, name)) or ""
+    example = doctest.DocTestParser().get_doctest(doc, {}, name, None, None)
+    report = io.StringIO()
+    assert doctest.DocTestRunner().run(example, out=report.write).failed == 0, report.getvalue()
+
+
+@pytest.mark.parametrize("name", [name for name in livebode.__all__ if not name.endswith("Error")])
+def test_the_example_of_another_name_is_found_by_doctest(name: str) -> None:
+    thing = getattr(livebode, name)
+    found = doctest.DocTestFinder(recurse=False).find(thing, name, module=sys.modules[thing.__module__])
+    assert [test for test in found if test.examples]
+    assert vars(sys.modules[thing.__module__])[thing.__name__] is thing
 
 
 def test_the_page_of_the_public_interface_lists_every_name_and_package() -> None:

@@ -15,7 +15,7 @@ class ConfigError(LivebodeError):
     --------
     >>> import livebode
     >>> try:
-    ...     livebode.experiment_design("missing.toml")
+    ...     livebode.design("missing.toml")
     ... except livebode.ConfigError as error:
     ...     print(error.code)
     config.file-missing

@@ -16,7 +16,7 @@ class DesignError(LivebodeError):
     >>> import livebode
     >>> axis = {"belt": {"drive": {"torque_n_m_max": 0.1}}, "excitation": {"band_hz": [20, 140], "window": 400}}
     >>> try:
-    ...     livebode.experiment_design(axis, amplitude_n_m=1.0)
+    ...     livebode.design(axis, amplitude_n_m=1.0)
     ... except livebode.DesignError as error:
     ...     print(error.code)
     design.limit-exceeded
