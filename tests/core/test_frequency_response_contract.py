@@ -83,6 +83,15 @@ def test_sel_without_a_line_is_an_error(frequency_hz: object, kind: type[Excepti
         made(3, LINES).sel(frequency_hz=frequency_hz)
 
 
+def test_sel_of_times_takes_a_slice_by_value() -> None:
+    responses = made(9, LINES)
+    assert len(responses.sel(time_s=slice(None, responses.time_s[3]))) == 4
+    with pytest.raises(TypeError, match="is not a slice"):
+        responses.sel(time_s=0.05)
+    with refused(UsageError, "out-of-range", argument="time_s"):
+        responses.sel(time_s=slice(0, 1, 0.1))
+
+
 @SOME
 @given(any_responses())
 def test_a_frame_has_the_numbers_of_the_dataset(responses: Responses) -> None:

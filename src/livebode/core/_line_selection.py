@@ -25,18 +25,9 @@ def position(lines: Lines, frequency_hz: ArrayLike) -> NDArray[np.intp]:
 
 def within(lines: Lines, span_hz: slice) -> NDArray[np.intp]:
     """Positions of the lines from `start` to `stop` in Hz, both included; None is an open end."""
-    if span_hz.step is not None:
-        raise UsageError(
-            "out-of-range",
-            f"a slice of frequencies has no step, and this one has {span_hz.step!r}",
-            "give slice(from_hz, to_hz)",
-            argument="frequency_hz",
-            value=str(span_hz.step),
-        )
     f = lines.frequency_hz
     room_hz = ON_GRID_BINS * lines.resolution_hz
-    low = -np.inf if span_hz.start is None else float(span_hz.start)
-    high = np.inf if span_hz.stop is None else float(span_hz.stop)
+    low, high = ends(span_hz, "frequency_hz")
     at = np.flatnonzero((f >= low - room_hz) & (f <= high + room_hz))
     if not at.size:
         raise GridError(
@@ -47,6 +38,21 @@ def within(lines: Lines, span_hz: slice) -> NDArray[np.intp]:
             lines_hz=[float(f[0]), float(f[-1])],
         )
     return at
+
+
+def ends(span: slice, argument: str) -> tuple[float, float]:
+    """Both ends of a slice by value; TypeError for anything else, UsageError for a slice with a step."""
+    if not isinstance(span, slice):
+        raise TypeError(f"{argument}={span!r} is not a slice(from, to)")
+    if span.step is not None:
+        raise UsageError(
+            "out-of-range",
+            f"{argument} is a slice with a step, {span.step!r}, and selects by value",
+            "give slice(from, to)",
+            argument=argument,
+            value=str(span.step),
+        )
+    return -np.inf if span.start is None else float(span.start), np.inf if span.stop is None else float(span.stop)
 
 
 def _not_measured(lines: Lines, frequency_hz: float) -> GridError:

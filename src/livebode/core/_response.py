@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import _conversion, _description
 from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
+from livebode.core._line_selection import ends
 from livebode.core.errors import GridError
 from livebode.core.lines import Lines
 from livebode.core.rows import joined
@@ -253,9 +254,7 @@ class Responses(FrequencyResponse, Sequence[Response]):
         (4, 7)
         """
         part = super().sel(frequency_hz=frequency_hz)
-        low = -np.inf if time_s.start is None else time_s.start
-        high = np.inf if time_s.stop is None else time_s.stop
-        return part if time_s == slice(None) else part.between(low, high)
+        return part if time_s == slice(None) else part.between(*ends(time_s, "time_s"))
 
     def _batch(self) -> Responses:
         return self
