@@ -98,6 +98,15 @@ def test_a_bound_that_contains_zero_does_not_flatten_the_curve() -> None:
     assert high - low < 360 * 2
 
 
+def test_the_phase_is_the_same_with_and_without_bounds() -> None:
+    value = np.exp(-1j * np.linspace(0.1, 5.0, 7))
+    value[3] *= -0.01  # half a turn off, and smaller than its bound
+    response = one(value, 0.02)
+    phases = [response.plot(bounds=shown)[1].lines[1].get_ydata() for shown in (True, False)]
+    np.testing.assert_array_equal(*phases)
+    assert np.all(np.diff(np.delete(phases[0], 3)) < 0)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_draws_on_the_axes_that_are_given_and_opens_no_figure(kind: str) -> None:
     response = example_responses()[-1]

@@ -64,7 +64,8 @@ def _panels(kind: PlotKind, axes: Any) -> Any:
 
 def _curve(one: Response, c: float | None, label: str | None, color: Any) -> Curve:
     use = one.valid & np.isfinite(one.value) & (one.value != 0)
-    radius = np.full(len(one.lines), np.nan) if c is None else one.bound(c)
+    # Also without a drawn bound: the phase of a line that may be zero follows the other lines.
+    radius = one.bound(2.0 if c is None else c)
     words = "" if c is None else f"bound: {100 * -np.expm1(-(c**2)):.1f} % ({c:g}σ)"
     value = np.where(use, one.value, np.nan)
     return Curve(one.frequency_hz, value, np.where(use, radius, np.nan), label or one.quantity, words, color)

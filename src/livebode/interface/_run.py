@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 class Run:
     """A run that `livebode run` recorded: its responses, fits and events, and what can be computed from them.
 
-    Only run.json is read at first, the rest when it is asked for, once. Of a run that is still being written, this is
-    what was written by then; open it again for more.
+    Only run.json is read at first; everything else is read when it is first used, once. Of a run that is still being
+    written, this is what was written by then; open it again for more.
 
     Parameters
     ----------
