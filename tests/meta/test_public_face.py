@@ -38,10 +38,16 @@ def test_every_public_name_exists_and_is_listed_once() -> None:
         _ = livebode.Trakcer
 
 
-def test_importing_livebode_loads_nothing_heavy() -> None:
-    code = "import livebode, sys; print(sorted({'numpy', 'scipy', 'matplotlib', 'pyarrow'} & set(sys.modules)))"
+def test_importing_livebode_loads_nothing_heavy_and_a_response_nothing_that_draws_or_converts() -> None:
+    code = """
+import sys, livebode
+heavy = {'numpy', 'scipy', 'matplotlib', 'pyarrow', 'pandas', 'xarray', 'control', 'html'}
+print(sorted(heavy & set(sys.modules)))
+livebode.Response, livebode.Responses
+print(sorted(heavy & set(sys.modules)))
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.splitlines() == ["[]", "['numpy']"]
 
 
 @pytest.mark.parametrize("name", [n for n in livebode.__all__ if inspect.isclass(getattr(livebode, n))])
