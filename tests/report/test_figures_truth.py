@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, Responses
+from livebode.drawing import quantiles, unwrapped
 from livebode.report import bode_figure, terminal_bode, tracking_figure
-from livebode.report.summary import BOUND_C, PROBABILITY, quantiles, unwrapped
+from livebode.report.summary import BOUND_C, PROBABILITY
 from livebode.report.tracking import is_falling, spread, with_holes
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)

@@ -39,6 +39,18 @@ class Monitor:
         If the baseline was learned with other lines or signals.
     UsageError
         If `false_alarms` cannot be read.
+
+    Examples
+    --------
+    >>> import livebode, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     baseline = livebode.learn([livebode.example_run(f"{folder}/healthy", seconds=5)])
+    >>> settings = Settings(lines=baseline.lines, excitation="w", input="u", output="velocity", hop=baseline.hop)
+    >>> tracker, monitor = livebode.Tracker(settings), Monitor(baseline, settings)
+    >>> for block in livebode.example_axis(seconds=2).blocks():
+    ...     events = monitor.process(block, tracker.process(block))
+    >>> monitor.summary()["message"]
+    'No change against the baseline (1.8 s of the run judged).'
     """
 
     def __init__(

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses, counted
-from livebode.report import ticks, words
+from livebode.drawing import ticks
+from livebode.report import words
 from livebode.report.style import shortened
 from livebode.report.summary import Summary, summarised
 

@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class ConfigError(LivebodeError):
-    """A configuration (axis.toml, experiment.toml) cannot be read, or has a key or value that cannot be used."""
+    """A configuration (axis.toml, experiment.toml) cannot be read, or has a key or value that cannot be used.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.design("missing.toml")
+    ... except livebode.ConfigError as error:
+    ...     print(error.code)
+    config.file-missing
+    """
 
     area: ClassVar[str] = "config"
     codes: ClassVar[Mapping[str, str]] = {
