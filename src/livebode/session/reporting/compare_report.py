@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import dataclass
 from datetime import datetime
@@ -19,7 +20,7 @@ from livebode.session.reporting.changes import Change, Changes, changes, percent
 from livebode.session.reporting.comparison_verdict import verdict
 from livebode.session.reporting.difference import ALPHA, Compared, Difference, compare
 from livebode.session.reporting.material import written
-from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, signed, to_toml, with_bound
+from livebode.session.reporting.wording import BOUND_95, decibels, many, polar, signed, with_bound
 from livebode.session.said import said
 
 _TEST = (
@@ -193,8 +194,8 @@ def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
     for name, value in values.items():
         if isinstance(value, dict):
             found += _flat(value, f"{path}{name}.")
-        else:
-            found.append((path + name, to_toml({"x": value}).removeprefix("x = ")))
+        elif value is not None:
+            found.append((path + name, json.dumps(value, ensure_ascii=False)))
     return found
 
 
