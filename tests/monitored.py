@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
 from livebode.monitoring.accuracy import Accuracy
 from livebode.motion import Curve, MovingModel
 from livebode.motion.model import basis
@@ -26,8 +26,8 @@ def machine() -> Machine:
     return learn_machine(healthy_runs(2, 6), LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
 
 
-def watcher(asked: str = "one in 30 days of motion") -> MachineMonitor:
-    return MachineMonitor(machine(), LINES, NAMES, seconds_between(asked))
+def watcher(interval_s: float = DEFAULT_INTERVAL_S) -> MachineMonitor:
+    return MachineMonitor(machine(), LINES, NAMES, interval_s)
 
 
 def strokes(speeds: Sequence[float], ends: tuple[float, float] = THERE) -> RandomStrokes:

@@ -144,8 +144,8 @@ def events(of: Material) -> Section:
     monitoring = of.run.summary.get("monitoring", {})
     words = alarms(of.run, of.happenings)[0].text
     if monitoring.get("baseline"):
-        words += f" Baseline {monitoring['baseline']}, judged by {monitoring.get('judged_by', '—')}; false alarms: "
-        words += f"{monitoring.get('false_alarms', '—')}."
+        words += f" Baseline {monitoring['baseline']}, judged by {monitoring.get('judged_by', '—')}; mean time "
+        words += f"between false alarms: {monitoring.get('false_alarm_interval_days', '—')} days of motion or more."
         if covariates := monitoring.get("covariates"):
             words += f" Covariates: {', '.join(covariates)}."
     return Section("Alarms and events", (Paragraph(words), *of.happenings.parts()))
