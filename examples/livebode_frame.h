@@ -1,4 +1,4 @@
-/* The binary frame of livebode for senders in C99 (docs/live.md has it byte by byte): samples with lb_frame, or spectra
+/* The binary frame of livebode for senders in C99 (docs/how-to/live.md has it byte by byte): samples with lb_frame, or spectra
  * of a drive that runs the kernel with lb_frame_put_spectrum and lb_frame_spectra.
  *
  * Little-endian machines only. No memory is taken: the caller gives a buffer of LB_FRAME_BYTES(payload). */
@@ -74,7 +74,7 @@ static inline void lb_frame_put_spectrum(uint8_t *frame, uint16_t index, uint32_
 
 /* Completes a frame into which `count` spectra were put, each a hop after the one before; returns its length.
  *
- * layout: lb_frame_crc(0, text, length) of the text that docs/live.md describes, itself sent with lb_frame as
+ * layout: lb_frame_crc(0, text, length) of the text that docs/how-to/live.md describes, itself sent with lb_frame as
  * LB_FRAME_SPECTRA_LAYOUT of signals + values_count channels and 0 samples. sample, stamp_ns: of the newest sample in
  * the first spectrum's window; sample + 1 is a multiple of the hop. */
 static inline size_t lb_frame_spectra(uint8_t *frame, uint32_t sequence, uint64_t epoch, uint64_t sample,

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.session import Axis, Destination, run
-from tests.command import write_parquet
+from livebode.configuration import Axis
+from livebode.runtime import Destination, run
+from tests.support.command import write_parquet
 
 
 def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[str, object]) -> Path:
