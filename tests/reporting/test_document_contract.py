@@ -145,8 +145,9 @@ def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> N
     save_pdf(document, tmp_path / "b.pdf")
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
     reader = PdfReader(tmp_path / "a.pdf")
-    for i, page in enumerate(reader.pages, 1):
-        assert f"{i} / {len(reader.pages)}" in page.extract_text()
+    texts = [page.extract_text() for page in reader.pages]
+    for i, (page, text) in enumerate(zip(reader.pages, texts), 1):
+        assert f"{i} / {len(reader.pages)}" in text
         assert [float(side) for side in page.mediabox[2:]] == pytest.approx([595.28, 841.89], abs=0.1)
     assert [entry["/Title"] for entry in reader.outline] == [document.asked, *(s.title for s in document.sections)]
 
@@ -179,10 +180,22 @@ def test_what_is_no_run_or_has_nothing_valid_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("**/report.*"))
 
 
-def test_without_reportlab_the_page_is_written_and_the_rest_is_said(tmp_path: Path) -> None:
+def test_figures_are_vectors_with_text_that_can_be_searched(tmp_path: Path) -> None:
+    data = {"responses": measured(6, 1), "names": ("u", "ω")}
+    section = Section("Average", (Picture("bode", data, "caption"),))
+    facts, verdict = (("rate", "4 kHz"),), (Finding("ok", "no change"),)
+    save_pdf(Document("run", "Report", facts, verdict, (section,), "foot"), tmp_path / "a.pdf")
+    (page,) = PdfReader(tmp_path / "a.pdf").pages
+    text = page.extract_text()
+    assert ("frequency in Hz" in text, "phase in degrees" in text, "u to ω" in text) == (True, True, True)
+    assert not page.images
+
+
+@pytest.mark.parametrize("package", ["reportlab", "pypdf"])
+def test_without_its_libraries_the_page_is_written_and_the_rest_is_said(tmp_path: Path, package: str) -> None:
     run = write_run(tmp_path / "run", measured(20, 1))
     code = (
-        "import sys; sys.modules['reportlab'] = None; sys.argv[1:] = ['report', sys.argv[1]]\n"
+        f"import sys; sys.modules['{package}'] = None; sys.argv[1:] = ['report', sys.argv[1]]\n"
         "from livebode.cli import main; main()"
     )
     done = subprocess.run([sys.executable, "-c", code, str(run)], capture_output=True, text=True, check=False)

@@ -1,7 +1,8 @@
-"""A document as PDF on A4 (extra `pdf`: ReportLab)."""
+"""A document as PDF on A4 (extra `pdf`: ReportLab and pypdf)."""
 
 from __future__ import annotations
 
+import io
 import textwrap
 from html import escape
 from pathlib import Path
@@ -29,7 +30,7 @@ from reportlab.platypus import Table as Grid
 from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
 from livebode.report.figures import WIDTH_IN, drawn
 from livebode.report.html import readable
-from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, draw_on, register_fonts
+from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, Place, register_fonts, with_figures
 from livebode.report.style import LIGHT
 
 _MARGIN = 16 * mm
@@ -49,7 +50,8 @@ def save_pdf(document: Document, path: Path) -> None:
         If the file cannot be written.
     """
     register_fonts()
-    template = _Pages(document, path)
+    pages = io.BytesIO()
+    template = _Pages(document, pages)
     flow: list[Flowable] = [
         _words(document.kind, _KIND), _words(document.title, _TITLE), _facts(document), Spacer(0, 4 * mm),
         _words(document.asked, _HEADING), _verdict(document),
@@ -57,12 +59,14 @@ def save_pdf(document: Document, path: Path) -> None:
     for section in document.sections:
         flow += _section(section)
     template.build(flow, canvasmaker=_Numbered)
+    with path.open("wb") as file:
+        with_figures(pages.getvalue(), template.canv.places).write(file)
 
 
 class _Pages(BaseDocTemplate):  # type: ignore[misc]
-    def __init__(self, document: Document, path: Path) -> None:
+    def __init__(self, document: Document, file: io.BytesIO) -> None:
         super().__init__(
-            str(path), pagesize=A4, title=readable(f"{document.title}: {document.kind.lower()}"), author="livebode",
+            file, pagesize=A4, title=readable(f"{document.title}: {document.kind.lower()}"), author="livebode",
             invariant=1, pageCompression=1,
         )  # fmt: skip
         frame = Frame(_MARGIN, 18 * mm, _WIDTH, A4[1] - 34 * mm, 0, 0, 0, 0)
@@ -80,11 +84,12 @@ class _Pages(BaseDocTemplate):  # type: ignore[misc]
 
 
 class _Numbered(Canvas):  # type: ignore[misc]
-    """Pages with their total number, which is known only at the end."""
+    """Pages with their total number, which is known only at the end, and the places of figures."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._kept: list[dict[str, Any]] = []
+        self.places: list[Place] = []
 
     def showPage(self) -> None:  # noqa: N802
         self._kept.append(dict(self.__dict__))
@@ -107,7 +112,7 @@ def _foot(canvas: Canvas, text: str) -> None:
 
 
 class _Drawing(Flowable):  # type: ignore[misc]
-    """A figure as wide as the page, or as its height permits."""
+    """The place of a figure as wide as the page, or as its height permits."""
 
     def __init__(self, picture: Picture) -> None:
         super().__init__()
@@ -117,10 +122,8 @@ class _Drawing(Flowable):  # type: ignore[misc]
         self.width, self.height = 72 * width_in * self._scale, 72 * height_in * self._scale
 
     def draw(self) -> None:
-        self.canv.saveState()
-        self.canv.scale(self._scale, self._scale)
-        draw_on(self.canv, self._figure)
-        self.canv.restoreState()
+        x, y = self.canv.absolutePosition(0, 0)
+        self.canv.places.append(Place(self.canv.getPageNumber(), x, y, self._scale, self._figure))
 
 
 class _Kept(KeepTogether):  # type: ignore[misc]
