@@ -25,7 +25,8 @@ static uint32_t crc32(const unsigned char *data, size_t bytes)
 {
     static const uint32_t of_nibble[16] = {
         0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
-        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu};
+        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
+    };
     uint32_t crc = 0xFFFFFFFFu;
     for (size_t i = 0; i < bytes; ++i) {
         crc ^= data[i];
@@ -37,13 +38,24 @@ static uint32_t crc32(const unsigned char *data, size_t bytes)
 
 static header header_of(const LB_DFT *t)
 {
-    header h = {LB_SNAPSHOT_MAGIC, LB_SNAPSHOT_VERSION, LB_BITS, (uint32_t)t->variant, t->window, t->channels,
-                t->bin_count, 0u, t->count, t->damping};
+    header h = {
+        .magic = LB_SNAPSHOT_MAGIC,
+        .version = LB_SNAPSHOT_VERSION,
+        .bits = LB_BITS,
+        .variant = (uint32_t)t->variant,
+        .window = t->window,
+        .channels = t->channels,
+        .bin_count = t->bin_count,
+        .reserved = 0u,
+        .count = t->count,
+        .damping = t->damping,
+    };
     return h;
 }
 
 static size_t length_of(const LB_DFT *t)
 {
+    LB_ASSERT(lb_laid_out(t));
     const size_t per_channel = t->window + 4u * (size_t)t->inner_count;
     return sizeof(header) + t->bin_count * sizeof(uint32_t) + t->channels * per_channel * sizeof(real) +
            sizeof(uint32_t);
@@ -66,6 +78,8 @@ lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
     if (bytes != length_of(t)) {
         return LB_ERROR_SNAPSHOT_LENGTH;
     }
+    LB_ASSERT(lb_sound(t));
+    LB_ASSERT(lb_apart(out, bytes, t->table, (size_t)((unsigned char *)t->bins - (unsigned char *)t->table)));
     LB(catch_up)(t);
     const header h = header_of(t);
     unsigned char *at = (unsigned char *)out;
@@ -81,6 +95,7 @@ lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
             copy(at, (const unsigned char *)sum, sizeof(real));
         }
     }
+    LB_ASSERT((size_t)(at - (unsigned char *)out) == bytes - sizeof(uint32_t));
     const uint32_t crc = crc32((unsigned char *)out, bytes - sizeof(uint32_t));
     copy(at, (const unsigned char *)&crc, sizeof crc);
     return LB_OK;
@@ -101,8 +116,8 @@ static lb_status examine(const LB_DFT *t, const unsigned char *from, size_t byte
         return LB_ERROR_SNAPSHOT_CRC;
     }
     const header own = header_of(t);
-    if (h->bits != own.bits || h->variant != own.variant || h->window != own.window ||
-        h->channels != own.channels || h->bin_count != own.bin_count || h->damping != own.damping) {
+    if (h->bits != own.bits || h->variant != own.variant || h->window != own.window || h->channels != own.channels ||
+        h->bin_count != own.bin_count || h->damping != own.damping) {
         return LB_ERROR_SNAPSHOT_CONFIG;
     }
     if (bytes != length_of(t)) {
@@ -127,6 +142,7 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
     if (status != LB_OK) {
         return status;
     }
+    LB_ASSERT(h.window == t->window && h.bin_count == t->bin_count && h.channels == t->channels);
     at += sizeof h + t->bin_count * sizeof(uint32_t);
     t->count = h.count;
     t->index = (uint32_t)(h.count % t->window);
@@ -139,5 +155,7 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
             copy((unsigned char *)sum, at, sizeof(real));
         }
     }
+    LB_ASSERT((size_t)(at - (const unsigned char *)snapshot) == bytes - sizeof(uint32_t));
+    LB_ASSERT(lb_sound(t));
     return LB_OK;
 }
