@@ -1,4 +1,4 @@
-"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if the extra is installed."""
+"""The documents of `livebode report` and `livebode compare`: one HTML file, and a PDF if ReportLab is installed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from livebode.core import OutputError
 from livebode.core.document import Document
 
-_NO_PDF = "no PDF: ReportLab or pypdf is not installed; pip install 'livebode[pdf]', or print the page from a browser"
+_NO_PDF = "no PDF: ReportLab is not installed; pip install 'livebode[pdf]', or print the page from a browser"
 
 
 def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list[Path], str]:

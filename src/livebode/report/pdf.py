@@ -1,8 +1,7 @@
-"""A document as PDF on A4 (extra `pdf`: ReportLab and pypdf)."""
+"""A document as PDF on A4 (extra `pdf`: ReportLab)."""
 
 from __future__ import annotations
 
-import io
 import textwrap
 from html import escape
 from pathlib import Path
@@ -28,10 +27,12 @@ from reportlab.platypus import Paragraph as Words
 from reportlab.platypus import Table as Grid
 
 from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.language import recognised
 from livebode.report.figures import WIDTH_IN, drawn
 from livebode.report.html import readable
-from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, Place, register_fonts, with_figures
-from livebode.report.style import LIGHT
+from livebode.report.pdf_figure import draw_on, draw_string
+from livebode.report.pdf_fonts import BOLD, FIXED, PLAIN, register_fonts, runs, wide_font
+from livebode.report.style import LIGHT, columns
 
 _MARGIN = 16 * mm
 _WIDTH = A4[0] - 2 * _MARGIN
@@ -50,8 +51,7 @@ def save_pdf(document: Document, path: Path) -> None:
         If the file cannot be written.
     """
     register_fonts()
-    pages = io.BytesIO()
-    template = _Pages(document, pages)
+    template = _Pages(document, path)
     flow: list[Flowable] = [
         _words(document.kind, _KIND), _words(document.title, _TITLE), _facts(document), Spacer(0, 4 * mm),
         _words(document.asked, _HEADING), _verdict(document),
@@ -59,14 +59,12 @@ def save_pdf(document: Document, path: Path) -> None:
     for section in document.sections:
         flow += _section(section)
     template.build(flow, canvasmaker=_Numbered)
-    with path.open("wb") as file:
-        with_figures(pages.getvalue(), template.canv.places).write(file)
 
 
 class _Pages(BaseDocTemplate):  # type: ignore[misc]
-    def __init__(self, document: Document, file: io.BytesIO) -> None:
+    def __init__(self, document: Document, path: Path) -> None:
         super().__init__(
-            file, pagesize=A4, title=readable(f"{document.title}: {document.kind.lower()}"), author="livebode",
+            str(path), pagesize=A4, title=readable(f"{document.title}: {document.kind}"), author="livebode",
             invariant=1, pageCompression=1,
         )  # fmt: skip
         frame = Frame(_MARGIN, 18 * mm, _WIDTH, A4[1] - 34 * mm, 0, 0, 0, 0)
@@ -84,12 +82,11 @@ class _Pages(BaseDocTemplate):  # type: ignore[misc]
 
 
 class _Numbered(Canvas):  # type: ignore[misc]
-    """Pages with their total number, which is known only at the end, and the places of figures."""
+    """Pages with their total number, which is known only at the end."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._kept: list[dict[str, Any]] = []
-        self.places: list[Place] = []
 
     def showPage(self) -> None:  # noqa: N802
         self._kept.append(dict(self.__dict__))
@@ -106,13 +103,12 @@ class _Numbered(Canvas):  # type: ignore[misc]
 
 
 def _foot(canvas: Canvas, text: str) -> None:
-    canvas.setFont(PLAIN, 7.5)
     canvas.setFillColor(HexColor(LIGHT.muted))
-    canvas.drawString(_MARGIN, 10 * mm, text)
+    draw_string(canvas, 10 * mm, text, PLAIN, 7.5, x=_MARGIN)
 
 
 class _Drawing(Flowable):  # type: ignore[misc]
-    """The place of a figure as wide as the page, or as its height permits."""
+    """A figure as wide as the page, or as its height permits."""
 
     def __init__(self, picture: Picture) -> None:
         super().__init__()
@@ -122,8 +118,10 @@ class _Drawing(Flowable):  # type: ignore[misc]
         self.width, self.height = 72 * width_in * self._scale, 72 * height_in * self._scale
 
     def draw(self) -> None:
-        x, y = self.canv.absolutePosition(0, 0)
-        self.canv.places.append(Place(self.canv.getPageNumber(), x, y, self._scale, self._figure))
+        self.canv.saveState()
+        self.canv.scale(self._scale, self._scale)
+        draw_on(self.canv, self._figure)
+        self.canv.restoreState()
 
 
 class _Kept(KeepTogether):  # type: ignore[misc]
@@ -156,7 +154,10 @@ _CODE = _style("code", 7, fontName=FIXED, leading=9)
 
 def _words(text: str, style: ParagraphStyle) -> Words:
     # Paragraphs have a markup language; text from data must remain plain text.
-    return Words(escape(readable(text), quote=False), style)
+    parts = [(escape(run, quote=False), wide) for run, wide in runs(readable(text))]
+    if any(wide for _, wide in parts):
+        style = style.clone(style.name, wordWrap="CJK")
+    return Words("".join(f'<font name="{wide_font()}">{run}</font>' if wide else run for run, wide in parts), style)
 
 
 def _cell(text: str, style: ParagraphStyle, width: float) -> Words:
@@ -178,7 +179,7 @@ def _verdict(document: Document) -> Grid:
     rows, widths = [], [0.16 * _WIDTH, 0.84 * _WIDTH]
     for finding in document.verdict:
         tone = _style("tone", 8, fontName=BOLD, textColor=HexColor(_TONE[finding.tone]))
-        rows.append([_words(document.tones[finding.tone], tone), _cell(finding.text, _BODY, widths[1])])
+        rows.append([_words(recognised(document.tones[finding.tone]), tone), _cell(finding.text, _BODY, widths[1])])
     return Grid(rows, colWidths=widths, style=_LINES, hAlign="LEFT")
 
 
@@ -234,5 +235,5 @@ def _widths(table: Table) -> list[float]:
     if not any(table.headings):
         return [0.24 * _WIDTH, 0.76 * _WIDTH]
     every = [table.headings, *table.rows]
-    letters = [min(max(len(texts[i]) for texts in every), 60) + 2 for i in range(len(table.headings))]
+    letters = [min(max(columns(texts[i]) for texts in every), 60) + 2 for i in range(len(table.headings))]
     return [_WIDTH * max(n, 6) / sum(max(m, 6) for m in letters) for n in letters]
