@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
+
+import tomli_w
 
 from livebode.core import Lines
 from livebode.estimation.settings import DETECTION_LINES_MIN
@@ -44,20 +45,15 @@ def axis_text(
         tracked |= {"average": True, "forgetting": 1.0}
     if moves and len(lines.quiet) >= DETECTION_LINES_MIN and not motion:
         tracked |= {"noise": "quiet"}
-    tables: dict[str, Mapping[str, Any]] = {
+    tables: dict[str, Any] = {
         "source": {"log": log},
         "signals": signals,
         "lines": {"frequencies": lines_text(lines), "window": lines.window},
         "tracking": tracked,
     }
-    if motion:
-        tables["motion"] = motion
-    for name, value in (loop or {}).items():
-        tables[f"loop.{name}" if isinstance(value, Mapping) else "loop"] = (
-            value if isinstance(value, Mapping) else {**tables.get("loop", {}), name: value}
-        )
-    head = f"# Written by `livebode design`; record {design.recording_s:.4g} s or more.\n"
-    return head + "".join(f"\n[{name}]\n{_pairs(table)}" for name, table in tables.items())
+    tables |= {name: table for name, table in (("motion", motion), ("loop", loop)) if table}
+    head = f"# Written by `livebode design`; record {design.recording_s:.4g} s or more.\n\n"
+    return head + tomli_w.dumps(tables)
 
 
 def lines_text(lines: Lines) -> str:
@@ -92,14 +88,3 @@ def _runs(bins: list[int]) -> list[list[int]]:
             runs.append([bins[at]])
             at += 1
     return runs
-
-
-def _pairs(table: Mapping[str, Any]) -> str:
-    return "".join(f"{name} = {_value(value)}\n" for name, value in table.items())
-
-
-def _value(value: Any) -> str:
-    """As TOML: JSON's strings, booleans and numbers are valid TOML, except infinity."""
-    if isinstance(value, float):
-        return repr(value)
-    return json.dumps(value, ensure_ascii=False)

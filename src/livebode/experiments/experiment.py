@@ -58,7 +58,7 @@ class Experiment(BaseModel):
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
+            raise ConfigError("file-unreadable", f"there is no file {path}", "check the name", path=str(path)) from None
         except OSError as error:
             raise ConfigError(
                 "file-unreadable",
