@@ -23,9 +23,10 @@ import numpy as np
 
 from bench.browser import chromium
 from bench.job import LINES, RATE_HZ, WINDOW, signals
+from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
-from livebode.session import Audience, Axis, Destination, Relay, Session
+from livebode.runtime import Audience, Destination, Relay, Session
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))

@@ -19,11 +19,12 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW
+from livebode.configuration import Axis
 from livebode.core import Block, Channel
 from livebode.excitation import multisine
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
-from livebode.session import Audience, Axis, Destination, Orders, run_live
+from livebode.runtime import Audience, Destination, Orders, run_live
 from livebode.sources.live import Batch, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW, best_s, signals
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
-from livebode.session.axis import RecordSection
-from livebode.session.checks import ChannelCheck
-from livebode.session.segmented import SegmentedRun
-from livebode.session.tally import Tally
+from livebode.preparation.checks import ChannelCheck
+from livebode.runtime.segmented import SegmentedRun
+from livebode.runtime.tally import Tally
 
 AXES, SECONDS, HOP = 16, 600, 200
 NAMES = ("w", "u", "y")

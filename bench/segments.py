@@ -17,14 +17,14 @@ import pyarrow.parquet as pq
 
 from bench.job import LINES
 from bench.record import NAMES, tracker_at
+from livebode.analysis.overview import Overview
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel
+from livebode.preparation.checks import ChannelCheck
 from livebode.records import Run
 from livebode.records.query import query
-from livebode.session.axis import RecordSection
-from livebode.session.checks import ChannelCheck
-from livebode.session.overview import Overview
-from livebode.session.segmented import SegmentedRun
-from livebode.session.tally import Tally
+from livebode.runtime.segmented import SegmentedRun
+from livebode.runtime.tally import Tally
 
 SEGMENTS, RATE_HZ, HOP = 5000, 4000.0, 400
 FOUND = {

@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from livebode.dashboard import Dashboard, Serving
-from livebode.session.demo import demo, demo_baseline
+from livebode.runtime.demo import demo, demo_baseline
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 SECONDS, MOMENT_S = 40.0, 25.7

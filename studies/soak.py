@@ -27,10 +27,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from examples.closed_loop import RATE_HZ, Drive
+from livebode.configuration import Axis
 from livebode.core import Block, Channel, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
-from livebode.session import Audience, Axis, Destination, Relay, Session
+from livebode.runtime import Audience, Destination, Relay, Session
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
 

@@ -15,16 +15,16 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from livebode.configuration.axis import FitSection, RecordSection
 from livebode.core import DamageWarning, Event, LivebodeError, UsageError
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.estimation import Tracker
 from livebode.records import Run
 from livebode.records.query import query
-from livebode.session.axis import FitSection, RecordSection
-from livebode.session.fits import Fits
-from livebode.session.reporting.run_report import run_report
-from livebode.session.tracking import record
+from livebode.reporting.run_report import run_report
+from livebode.runtime.fits import Fits
+from livebode.runtime.tracking import record
 from tests.command import livebode
 from tests.recorded import SETTINGS, machine
 

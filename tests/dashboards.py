@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from examples.closed_loop import RATE_HZ, Drive
+from livebode.configuration.axis import FitSection, LoopSection, RecordSection
 from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import Run
-from livebode.session.axis import FitSection, LoopSection, RecordSection
-from livebode.session.fits import Fits
-from livebode.session.tracking import record
+from livebode.runtime.fits import Fits
+from livebode.runtime.tracking import record
 from tests.browser import until
 from tests.responses import made
 

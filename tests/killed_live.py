@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from livebode.configuration.axis import Axis
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
-from livebode.session.axis import Axis
-from livebode.session.destination import Destination
-from livebode.session.live import run_live
-from livebode.session.orders import Orders
+from livebode.runtime.destination import Destination
+from livebode.runtime.live import run_live
+from livebode.runtime.orders import Orders
 from tests.command import RATE_HZ
 from tests.live_feeds import Feed
 from tests.peers.peer import PATIENCE_S, until

@@ -8,9 +8,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from livebode.configuration import Axis
 from livebode.core import Block, Event
 from livebode.records import Run
-from livebode.session import Audience, Axis, Destination, Orders, run_live
+from livebode.runtime import Audience, Destination, Orders, run_live
 from livebode.sources.live import Batch, SourceSettings
 from tests.peers.peer import CHANNELS, RATE_HZ, Peer
 

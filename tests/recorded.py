@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
-from livebode.session.axis import RecordSection
-from livebode.session.tracking import Outcome, record
+from livebode.runtime.tracking import Outcome, record
 from tests.command import LINES, RATE_HZ, signals
 
 NAMES = ("w", "u", "y", "t")

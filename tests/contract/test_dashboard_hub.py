@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from examples.closed_loop import RATE_HZ
+from livebode.configuration.axis import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
 from livebode.dashboard.frames import KINDS, frame
@@ -23,7 +24,6 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, Rows, Trend
-from livebode.session.axis import LoopSection
 from livebode.sources.live import LiveBlock
 from tests.dashboards import LINES, LOOP, Watched
 from tests.responses import any_responses, made

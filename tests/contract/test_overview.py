@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis.overview import Overview
 from livebode.core import Lines, Responses
-from livebode.session.overview import Overview
 
 LINES = Lines((4,), 100, 1000.0)
 

@@ -9,13 +9,13 @@ import pyarrow as pa
 import pytest
 
 from livebode import MotionCorrection, Tracker
+from livebode.configuration.axis import FitSection, RecordSection
 from livebode.monitoring import Baseline, Monitor
+from livebode.preparation.follower import Follower
 from livebode.records import Run
-from livebode.session.axis import FitSection, RecordSection
-from livebode.session.fits import Fits
-from livebode.session.follower import Follower
-from livebode.session.tracking import Outcome, record
-from livebode.session.watching import Watching
+from livebode.runtime.fits import Fits
+from livebode.runtime.tracking import Outcome, record
+from livebode.runtime.watching import Watching
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 from studies.motion import SETTINGS
 from tests.axes import MULTISINE

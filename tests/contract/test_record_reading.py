@@ -16,12 +16,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
 from livebode.records import Run, RunDirectory
 from livebode.records.grouped_events import each_event
-from livebode.session.axis import RecordSection
-from livebode.session.tracking import record
+from livebode.runtime.tracking import record
 from tests.command import RATE_HZ, livebode, signals, write_parquet
 from tests.recorded import (
     KEPT,
@@ -204,7 +204,7 @@ def test_the_command_goes_on_where_it_was_ended(
 ) -> None:
     # Ended from within, after two thirds of the recording.
     code = (
-        "import os, signal, sys; import livebode.session.segmented as s; from livebode.cli import main\n"
+        "import os, signal, sys; import livebode.runtime.segmented as s; from livebode.cli import main\n"
         # What starts the tests in the background may have told them to ignore it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "feed = s.in_pieces\n"

@@ -21,8 +21,8 @@ from livebode.core import Event
 from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
 from livebode.report.html import to_html
 from livebode.report.pdf import save_pdf
-from livebode.session.reporting.run_report import run_report
-from livebode.session.reporting.wording import to_toml
+from livebode.reporting.run_report import run_report
+from livebode.reporting.wording import to_toml
 from tests.command import livebode
 from tests.recorded import machine, record_machine
 from tests.reports import Page, measured, strokes, write_run

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.session.axis import RecordSection
-from livebode.session.event_groups import REPEATS_MAX
-from livebode.session.tracking import record
+from livebode.runtime.event_groups import REPEATS_MAX
+from livebode.runtime.tracking import record
 
 RATE_HZ, WINDOW, HOP, BLOCK = 1000.0, 50, 25, 5
 NAMES = ("w", "u", "y")

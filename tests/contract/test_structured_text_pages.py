@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.session.axis import Axis
+from livebode.configuration.axis import Axis
 from livebode.sources.live.ring import FILETIME_1970, HEADER, read_ring
 from livebode.structured_text import ring_block, ring_type
 from tests.command import livebode

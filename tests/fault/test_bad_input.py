@@ -255,7 +255,7 @@ def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: 
 
 
 def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:
-    monkeypatch.setattr("livebode.session.recording.make_follower", lambda *_: 1 / 0)
+    monkeypatch.setattr("livebode.runtime.recording.make_follower", lambda *_: 1 / 0)
     result = livebode("run", log, *JOINT, *GRID, "--out", tmp_path / "run")
     assert result.code == 1
     assert "ZeroDivisionError" in result.err

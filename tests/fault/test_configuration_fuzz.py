@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from livebode.configuration import ConfigurationFile
+from livebode.configuration.axes import axes_of
+from livebode.configuration.axis import Axis
+from livebode.configuration.fit_settings import chosen_model, fitter_of
+from livebode.configuration.toml_file import FILE_BYTES_MAX
 from livebode.core import ConfigError, LivebodeError
-from livebode.session import ConfigurationFile
-from livebode.session.axis import Axis
-from livebode.session.configuration import axes_of
-from livebode.session.fits import chosen_model, fitter_of
-from livebode.session.plan import live_follower
-from livebode.session.toml_file import FILE_BYTES_MAX
+from livebode.preparation.plan import live_follower
 from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_CONFIGURATION_FUZZ", "2000"))

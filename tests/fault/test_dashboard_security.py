@@ -16,11 +16,11 @@ import pytest
 import websockets
 from websockets.sync.client import connect
 
+from livebode.configuration.axis import Axis, ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, ServerError
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.access import Access
 from livebode.dashboard.guard import Guard
-from livebode.session.axis import Axis, ServeSection
 from tests.browser import Tab, chromium
 from tests.dashboards import Watched
 from tests.guarded import TOKEN, VIEWER, ask, cookie, guarded, login, origin, port_of

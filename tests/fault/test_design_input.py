@@ -13,7 +13,7 @@ from livebode.core import DesignError, GridError, Lines, LivebodeError, UsageErr
 from livebode.design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
 from livebode.design.files.c_names import KEYWORDS, identifier
 from livebode.excitation import chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
-from livebode.session.experiment import Experiment
+from livebode.experiments.experiment import Experiment
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.command import livebode
 from tests.support.errors import refused

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
+from livebode.configuration.axis import MAY_BE_SECRET, Axis
 from livebode.core import OutputError
 from livebode.doctor import Subject, bundle, write_bundle
 from livebode.doctor.check import Check
 from livebode.doctor.secrets import REMOVED, Secrets
-from livebode.session.axis import MAY_BE_SECRET, Axis
-from livebode.session.experiment import Experiment
+from livebode.experiments.experiment import Experiment
 from tests.command import livebode, signals
 from tests.small_axis import ONE_LINE
 from tests.support.runs import small_run

@@ -3,7 +3,7 @@
 import pytest
 
 from livebode.core import ConfigError
-from livebode.session.experiment import Experiment
+from livebode.experiments.experiment import Experiment
 from tests.support.errors import refused
 
 

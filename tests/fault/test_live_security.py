@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from pyads.testserver import PLCVariable
 
+from livebode.configuration import Axis
 from livebode.core import ConfigError, SourceError
-from livebode.session import Axis
 from livebode.sources.live import SourceSettings, encode_layout, encode_samples, make_source, open_source
 from tests.peers.broker import TOPIC, Mosquitto, publisher, stop
 from tests.peers.certificates import Authority, self_signed

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.cli.log_output import LineFormatter, log_output
+from livebode.configuration import Axis
 from livebode.core import SourceError
 from livebode.dashboard import Dashboard, Serving
-from livebode.session import Axis
 from livebode.sources.live import SourceSettings, make_source
 from livebode.sources.live.address import PORTS
 from tests.command import livebode, signals, write_parquet
@@ -33,7 +33,7 @@ ROLES = ("--output", "y", "--input", "u", "--excitation", "w", "--json")
 
 
 def test_a_program_that_asks_for_no_log_sees_none() -> None:
-    code = "import livebode, logging; logging.getLogger('livebode.session.live').error('not shown')"
+    code = "import livebode, logging; logging.getLogger('livebode.runtime.live').error('not shown')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr == ""
 
@@ -209,7 +209,7 @@ def test_a_record_is_logged_from_its_beginning_over_its_segments_to_its_end(
     closed = [i for i, line in enumerate(text) if line.startswith("livebode.records.segments.shelf: ")]
     assert begun < closed[0] < closed[-1] < ended
     assert len(closed) >= 4
-    (event,) = [line for line in text[begun:ended] if line.startswith("livebode.session.audience: ")]
+    (event,) = [line for line in text[begun:ended] if line.startswith("livebode.runtime.audience: ")]
     assert "not finite" in event
 
 

@@ -71,7 +71,7 @@ def disk_that(wrong: Callable[[Disk], None], at: int) -> Iterator[Disk]:
 
 @pytest.fixture(autouse=True)
 def _commit_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.session.segmented._INTERVAL_S", 0.0)
+    monkeypatch.setattr("livebode.runtime.segmented._INTERVAL_S", 0.0)
 
 
 @pytest.fixture

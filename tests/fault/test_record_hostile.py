@@ -28,7 +28,7 @@ from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
 from livebode.report.pictures import save
 from livebode.report.style import style
-from livebode.session.segmented import make_way
+from livebode.runtime.segmented import make_way
 from tests.command import livebode
 from tests.damaged import StopError, commands, make_runs, record_run
 from tests.support.errors import refused

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from livebode.session import ConfigurationFile
+from livebode.configuration import ConfigurationFile
 from livebode.sources.live import encode_layout, encode_samples
 from tests.command import livebode
 from tests.peers.broker import Mosquitto, publisher, stop

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.configuration.axis import Axis
 from livebode.core import Lines, UsageError
-from livebode.session.axis import Axis
-from livebode.session.plc import plc_project
+from livebode.experiments.plc import plc_project
 from livebode.structured_text import Project, sliding_dft
 from tests.support.errors import refused
 

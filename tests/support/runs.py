@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.session import Axis, Destination, run
+from livebode.configuration import Axis
+from livebode.runtime import Destination, run
 from tests.command import write_parquet
 
 

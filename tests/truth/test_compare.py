@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.analysis.difference import ALPHA, Difference, compare
 from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
 from livebode.records import Run
-from livebode.session.reporting.difference import ALPHA, Difference, compare
 from tests import command
 from tests.command import livebode
 from tests.reports import LINES, measured, plant, strokes, write_run

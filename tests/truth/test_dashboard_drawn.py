@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
+from livebode.configuration.axis import LoopSection
 from livebode.core import Response
 from livebode.dashboard import Dashboard, Serving
 from livebode.dashboard.overlays import grid_hz
@@ -22,7 +23,6 @@ from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.table import BACK, FORTH
 from livebode.records import Run
 from livebode.records.summary_file import to_document
-from livebode.session.axis import LoopSection
 from tests.browser import Tab, chromium
 from tests.dashboards import FIT, LINES, LOOP, RATE_HZ, Watched, whole_run
 

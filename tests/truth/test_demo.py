@@ -14,8 +14,8 @@ from livebode.core import Event, UsageError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import Run
-from livebode.session.audience import Audience
-from livebode.session.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings
+from livebode.runtime.audience import Audience
+from livebode.runtime.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings
 from livebode.simulation import SimulatedAxis
 from tests.command import livebode
 from tests.reports import Page
@@ -42,7 +42,7 @@ class Heard(Audience):
 def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("livebode.session.demo.demo_baseline", lambda seed: {2: baseline}[seed]())  # learned once
+    monkeypatch.setattr("livebode.runtime.demo.demo_baseline", lambda seed: {2: baseline}[seed]())  # learned once
     done = livebode("demo", "--fast", "--out", tmp_path / "run")
     assert done.code == 0, done.err
     (change,) = [

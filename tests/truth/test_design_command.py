@@ -14,9 +14,9 @@ from livebode import Lines, open_log
 from livebode.core import LivebodeError
 from livebode.design import Waveform, choose, write
 from livebode.excitation import multisine
+from livebode.experiments.experiment import Experiment
 from livebode.records import Run
 from livebode.report import save_excitation_picture
-from livebode.session.experiment import Experiment
 from livebode.simulation import SimulatedAxis
 from tests.command import livebode, write_parquet
 from tests.structured_text import Machine

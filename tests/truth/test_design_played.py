@@ -9,8 +9,8 @@ import pytest
 
 from livebode.core import ConfigError
 from livebode.design import Bearable, Wish, belt_machine, choose, worst, write
+from livebode.experiments.experiment import Experiment
 from livebode.records import Run
-from livebode.session.experiment import Experiment
 from livebode.simulation import BeltAxis, SimulatedAxis
 from tests.command import livebode, write_parquet
 from tests.experiments import extremes

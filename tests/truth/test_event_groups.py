@@ -12,17 +12,17 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, Lines
 from livebode.dashboard.notices import Notices, event_id
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query
-from livebode.session.audience import Audience
-from livebode.session.axis import RecordSection
-from livebode.session.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
-from livebode.session.reporting.happenings import EventSummary
-from livebode.session.tracking import record
+from livebode.reporting.happenings import EventSummary
+from livebode.runtime.audience import Audience
+from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
+from livebode.runtime.tracking import record
 
 RATE_HZ, WINDOW = 1000.0, 50
 NAMES = ("w", "u", "y")

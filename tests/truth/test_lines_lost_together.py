@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.analysis.averaged import averaged
 from livebode.core import Block, Channel, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
 from livebode.records import Run
-from livebode.session.averaged import averaged
 from tests.command import livebode
 from tests.reports import write_run
 from tests.responses import cut

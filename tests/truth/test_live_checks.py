@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.analysis.averaged import averaged
 from livebode.core import Block, Channel, Event, Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
@@ -19,8 +20,7 @@ from livebode.records import Run
 from livebode.records.segments.journal import Commit
 from livebode.records.segments.last_commit import last_commit
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.session.averaged import averaged
-from livebode.session.live_checks import LiveChecks
+from livebode.runtime.live_checks import LiveChecks
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 from livebode.sources.live import Batch, encode_layout
 from tests.live_session import LiveSession

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Event, SourceError
-from livebode.session.continuing import StreamPosition
+from livebode.runtime.continuing import StreamPosition
 from livebode.sources import open_log
 from livebode.sources.live import LiveBlock, SourceSettings, make_source, open_source
 from tests.command import RATE_HZ, signals, write_csv, write_parquet

@@ -18,7 +18,7 @@ import pytest
 
 from livebode.core import Channel, Event
 from livebode.records import Run
-from livebode.session import Audience
+from livebode.runtime import Audience
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.command import RATE_HZ, livebode, signals, write_parquet

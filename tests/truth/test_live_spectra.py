@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 
 from examples.kernel_drive import KernelDrive
+from livebode.configuration.axis import Axis
 from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
 from livebode.excitation import multisine
+from livebode.preparation.spectra_plan import check_spectra
 from livebode.records import Run
-from livebode.session.axis import Axis
-from livebode.session.spectra_plan import check_spectra
-from livebode.session.watching import make_watching
+from livebode.runtime.watching import make_watching
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
 from tests.command import livebode, write_parquet

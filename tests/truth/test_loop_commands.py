@@ -12,13 +12,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from examples.closed_loop import RATE_HZ, Drive
+from livebode.analysis.loop_report import loop_of_run
 from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
 from livebode.margins import margins
 from livebode.records import Run
 from livebode.records.summary_file import to_document
-from livebode.session.loop_report import loop_of_run
 from tests.command import livebode, write_parquet
 from tests.loops import BELT, Case, parameters, values
 from tests.truth.test_margins import read

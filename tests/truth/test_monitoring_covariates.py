@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.analysis.learning import learn
+from livebode.configuration import Axis
 from livebode.core import BaselineError, Block, Event
 from livebode.monitoring import Baseline, Machine, MachineMonitor
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
-from livebode.session import Axis, Destination, run
-from livebode.session.learning import learn
+from livebode.runtime import Destination, run
 from livebode.simulation import TensionLoss
 from studies.healthy import NAMES
 from studies.monitoring_axis import LINES

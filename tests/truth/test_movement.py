@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis.averaged import averaged
 from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.movement import Movement
 from livebode.excitation import multisine, odd_lines
 from livebode.records import Run
-from livebode.session.averaged import averaged
 from tests.reports import write_run
 
 RATE_HZ, N, PERIODS = 4000.0, 800, 60

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from livebode.core import Lines
 from livebode.excitation import Slip, find_slips, multisine, recognise
 from livebode.excitation.slips import realigned
+from livebode.preparation.aligned import AlignedLog
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
-from livebode.session.aligned import AlignedLog
 from livebode.sources import open_log
 from tests.command import livebode, write_parquet
 

@@ -16,8 +16,8 @@ from livebode.fitting import mean_response
 from livebode.records import Run
 from livebode.report.figures import drawn
 from livebode.report.svg import inline_svg
-from livebode.session.reporting.compare_report import Comparison
-from livebode.session.reporting.run_report import run_report
+from livebode.reporting.compare_report import Comparison
+from livebode.reporting.run_report import run_report
 from tests.command import livebode
 from tests.reports import LINES, Page, measured, plant, strokes, write_run
 from tests.truth.test_loop_commands import AXIS, record

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.configuration import Axis
 from livebode.core import Block, Lines, LivebodeError, Responses, UsageError
 from livebode.estimation import RippleOrder, Settings, Tracker, ripple_power
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Rows, learn_table
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
-from livebode.session import Axis
-from livebode.session.plan import live_follower
+from livebode.preparation.plan import live_follower
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes
 from studies.monitoring_axis import LINES, RADIUS_M, RandomStrokes
 from studies.motion import SETTINGS, cruising, truth_at

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from livebode.core import Block, Gain, Lines, Loop
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.session.plan import beginnings
-from livebode.session.role_spectra import role_spectra
-from livebode.session.roles import ROLES, suspicions
+from livebode.preparation.plan import beginnings
+from livebode.preparation.role_spectra import role_spectra
+from livebode.preparation.roles import ROLES, suspicions
 from livebode.simulation import BeltAxis, Drive, Friction, Sensor, SimulatedAxis, Strokes
 from livebode.sources import open_log
 from tests.command import Result, livebode, signals, write_parquet

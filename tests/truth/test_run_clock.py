@@ -16,7 +16,7 @@ from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 from livebode.records import Run
 from livebode.records.query import query
-from livebode.session.clock_relation import STEP_S, ClockRelation
+from livebode.runtime.clock_relation import STEP_S, ClockRelation
 from livebode.sources.live import LiveBlock
 from tests.command import livebode
 from tests.live_session import LiveSession

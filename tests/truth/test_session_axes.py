@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.configuration.axes import axes_of
 from livebode.core import ConfigError, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
-from livebode.session.configuration import axes_of
 from tests.command import livebode, signals, write_parquet
 from tests.peers.machine import Machine
 from tests.peers.peer import free_port

@@ -13,7 +13,7 @@ import pytest
 from livebode.core import Lines, RecordingError
 from livebode.design import Waveform, write
 from livebode.excitation import multisine
-from livebode.session.designed import read_designed
+from livebode.experiments.designed import read_designed
 from livebode.structured_text import multisine as block_text
 from tests.command import livebode
 from tests.structured_text import Machine

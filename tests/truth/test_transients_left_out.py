@@ -12,10 +12,10 @@ import pytest
 from livebode.core import Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
+from livebode.preparation.aligned import AlignedLog
+from livebode.preparation.early_spikes import early_spikes
+from livebode.preparation.transients import leading_transient
 from livebode.records import Run
-from livebode.session.aligned import AlignedLog
-from livebode.session.early_spikes import early_spikes
-from livebode.session.transients import leading_transient
 from livebode.sources import open_log
 from tests.command import livebode, write_parquet
 from tests.real_recordings import recording

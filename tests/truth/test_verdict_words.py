@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from livebode.analysis.difference import Difference
 from livebode.core import Event
 from livebode.core.clock import moment
 from livebode.fitting import mean_response
 from livebode.report.html import to_html
-from livebode.session.reporting.compare_report import Comparison
-from livebode.session.reporting.difference import Difference
-from livebode.session.reporting.run_report import run_report
+from livebode.reporting.compare_report import Comparison
+from livebode.reporting.run_report import run_report
 from tests.reports import measured, write_run
 
 MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)

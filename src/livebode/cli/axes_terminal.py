@@ -14,8 +14,8 @@ from rich.text import Text
 from livebode.cli.failures import failure_of
 from livebode.cli.terminal import console
 from livebode.core import Event, LivebodeError
-from livebode.session import Session, StoppedError
-from livebode.session.axis_thread import AxisThread
+from livebode.runtime import Session, StoppedError
+from livebode.runtime.axis_thread import AxisThread
 
 _COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
 _EVENT_LETTERS = 60

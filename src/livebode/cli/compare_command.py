@@ -24,7 +24,7 @@ def compare_command(
 
     Runs with a schedule, such as a position, are compared by place and direction, and over all places.
     """
-    from livebode.session.reporting.compare_report import Comparison
+    from livebode.reporting.compare_report import Comparison
 
     found = Comparison.of(before, after)
     files: list[Path] = []

@@ -14,10 +14,10 @@ from livebode.cli import terminal
 from livebode.cli.options import Json, Port, Serve
 from livebode.cli.pictures import drawing, show
 from livebode.cli.serving import served
+from livebode.configuration.axis import ServeSection
 from livebode.core import Responses
 from livebode.records import to_json
-from livebode.session import Relay
-from livebode.session.axis import ServeSection
+from livebode.runtime import Relay
 
 _SHOWN = 4
 
@@ -36,7 +36,7 @@ def demo_command(
     """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from livebode.session.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
+    from livebode.runtime.demo import LEARNED_S, check_seconds, demo, demo_baseline  # with the simulation
 
     check_seconds(seconds)
     console = terminal.console(stderr=True)

@@ -46,8 +46,8 @@ def design_command(
     as_json: Json = False,
 ) -> None:
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
-    from livebode.session.designing import design_experiment  # with the simulation
-    from livebode.session.experiment import Experiment
+    from livebode.experiments.designing import design_experiment  # with the simulation
+    from livebode.experiments.experiment import Experiment
 
     over: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,

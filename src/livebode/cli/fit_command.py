@@ -9,9 +9,9 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import show_fit
+from livebode.configuration import Axis
 from livebode.core import UsageError
 from livebode.records import Run, to_json
-from livebode.session import Axis
 
 
 def fit_command(
@@ -47,8 +47,8 @@ def fit_command(
 
     Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
-    from livebode.session.fits import fit_run, plain_fit
-    from livebode.session.said import said
+    from livebode.analysis.fits import fit_run, plain_fit
+    from livebode.configuration.recorded import recorded_configuration
 
     given: dict[str, Any] = {
         "model": model,
@@ -62,7 +62,7 @@ def fit_command(
         "hold": hold,
     }
     data = {"source": {"log": str(directory)}, "signals": {"output": "y"}}
-    own = said(Run.open(directory).summary).get("fit", {})
+    own = recorded_configuration(Run.open(directory).summary).get("fit", {})
     section = Axis.of(data | {"fit": own | {k: v for k, v in given.items() if v is not None}}, "the options").fit
     assert section is not None
     found, words = fit_run(directory, section)

@@ -16,8 +16,8 @@ from livebode.estimation.settings import default_hop
 from livebode.records import to_json
 
 if TYPE_CHECKING:
-    from livebode.session.inspection import Inspection
-    from livebode.session.quiet import Quiet
+    from livebode.preparation.inspection import Inspection
+    from livebode.preparation.quiet import Quiet
 
 _LINES_SHOWN = 24
 
@@ -44,7 +44,7 @@ def inspect_command(
 
     With --lines, search for mains hum in a recording without excitation, or in its longest pause.
     """
-    from livebode.session.inspection import inspect  # with its statistics half a second to import
+    from livebode.preparation.inspection import inspect  # with its statistics half a second to import
 
     _check(excitation, output, input_, lines, window)
     of_lines = None if lines is None or window is None else (lines, window)

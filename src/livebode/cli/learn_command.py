@@ -27,7 +27,7 @@ def learn_command(
 ) -> None:
     """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
 
-    from livebode.session.learning import learn  # with the simulation
+    from livebode.analysis.learning import learn  # with the simulation
 
     if out.exists() and not force:
         raise OutputError(

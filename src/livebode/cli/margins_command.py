@@ -10,13 +10,13 @@ import typer
 
 from livebode.cli.options import Json
 from livebode.cli.pictures import margins_in_short
+from livebode.configuration import Axis
 from livebode.margins.words import WORDS
 from livebode.records import to_json
-from livebode.session import Axis
 
 if TYPE_CHECKING:
+    from livebode.analysis.loop_report import LoopReport
     from livebode.margins import Margins, Proposal, Tuning
-    from livebode.session.loop_report import LoopReport
 
 
 def margins_command(
@@ -36,9 +36,9 @@ def margins_command(
 
     Writes margins.png to the run directory.
     """
+    from livebode.analysis.loop_report import loop_of_run
+    from livebode.configuration.axis import FitSection
     from livebode.report import save_loop_picture
-    from livebode.session.axis import FitSection
-    from livebode.session.loop_report import loop_of_run
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None

@@ -14,7 +14,7 @@ from livebode.cli.terminal import is_terminal, print_drawn
 from livebode.core import Model, Responses
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.fitting import Fit
-from livebode.session import Draw, Outcome
+from livebode.runtime import Draw, Outcome
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()  # Matplotlib's settings belong to the whole process

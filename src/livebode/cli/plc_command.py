@@ -39,10 +39,10 @@ def plc_command(
 ) -> None:
     """Write function blocks for the PLC of an axis: excitation, sliding DFT and the ring buffer that livebode reads."""
     from livebode import structured_text
+    from livebode.configuration.axis import Axis
+    from livebode.experiments.designed import read_designed
+    from livebode.experiments.plc import plc_project
     from livebode.records import to_json
-    from livebode.session.axis import Axis
-    from livebode.session.designed import read_designed
-    from livebode.session.plc import plc_project
 
     project = plc_project(
         Axis.read(axis),

@@ -32,16 +32,16 @@ def report_command(
     """
     from livebode.core.clock import RunClock, moments_by
     from livebode.records import Run, to_json
-    from livebode.session.reporting.material import Judged
-    from livebode.session.reporting.run_report import run_report
+    from livebode.reporting.material import Judged
+    from livebode.reporting.run_report import run_report
 
     judged = None
     if on is not None:
-        from livebode.session.axis import FitSection
-        from livebode.session.said import said
-        from livebode.session.validation import validate_run
+        from livebode.analysis.validation import validate_run
+        from livebode.configuration.axis import FitSection
+        from livebode.configuration.recorded import recorded_configuration
 
-        section = FitSection.model_validate(said(Run.open(directory).summary).get("fit", {}))
+        section = FitSection.model_validate(recorded_configuration(Run.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
     with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)):

@@ -12,21 +12,11 @@ from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import AudienceOf, served
+from livebode.configuration import Axes, Axis, ConfigurationFile
+from livebode.configuration.axis import ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, UsageError
 from livebode.records import to_json
-from livebode.session import (
-    Audience,
-    Axes,
-    Axis,
-    ConfigurationFile,
-    Destination,
-    Draw,
-    Outcome,
-    Session,
-    StoppedError,
-    run,
-)
-from livebode.session.axis import ServeSection
+from livebode.runtime import Audience, Destination, Draw, Outcome, Session, StoppedError, run
 
 
 def run_command(

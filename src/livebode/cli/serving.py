@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from livebode.session import Audience
-from livebode.session.axis import ServeSection
+from livebode.configuration.axis import ServeSection
+from livebode.runtime import Audience
 
 if TYPE_CHECKING:
     from livebode.dashboard import Dashboard

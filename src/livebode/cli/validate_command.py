@@ -35,12 +35,14 @@ def validate_command(
     Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
     machine whose plant changes with position. The channels default to those of the run.
     """
+    from livebode.analysis.validation import validate_run
+    from livebode.configuration.axis import FitSection
+    from livebode.configuration.recorded import recorded_configuration
     from livebode.report import save_validation_picture
-    from livebode.session.axis import FitSection
-    from livebode.session.said import said
-    from livebode.session.validation import validate_run
 
-    base = said(Run.open(directory).summary).get("fit", {}) | ({} if radius is None else {"radius_m": radius})
+    base = recorded_configuration(Run.open(directory).summary).get("fit", {}) | (
+        {} if radius is None else {"radius_m": radius}
+    )
     named = [{"model": name} for name in model or []] or [{}]
     sections = [FitSection.model_validate(base | one) for one in named]
     channels = {"output": output, "input": input, "excitation": excitation}

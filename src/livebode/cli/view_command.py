@@ -9,8 +9,8 @@ import typer
 
 from livebode.cli.options import Port
 from livebode.cli.serving import dashboard_of, tell, wait_for_the_end
-from livebode.session import Axis
-from livebode.session.axis import ServeSection
+from livebode.configuration import Axis
+from livebode.configuration.axis import ServeSection
 
 
 def view_command(

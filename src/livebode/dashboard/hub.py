@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from livebode.analysis.overview import Overview
 from livebode.core import Block, Event, Parameters, Responses
-from livebode.session import Audience
-from livebode.session.overview import Overview
+from livebode.runtime import Audience
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.configuration.axis import FitSection
+from livebode.configuration.fit_settings import chosen_model
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
 from livebode.dashboard.trends import Trends
 from livebode.fitting import Grid, PhysicalModel
-from livebode.session.axis import FitSection
-from livebode.session.fits import chosen_model
-from livebode.session.said import said
 
 if TYPE_CHECKING:
     from livebode.monitoring import Table
@@ -44,7 +44,7 @@ class Fitted:
     @classmethod
     def of(cls, summary: Mapping[str, Any], quantities: Quantities) -> Fitted | None:
         """Build it from the configuration; None without [fit], or if no plant is available."""
-        words = said(dict(summary)).get("fit")
+        words = recorded_configuration(dict(summary)).get("fit")
         if words is None or quantities.own != "plant":
             return None
         return cls(quantities, FitSection.model_validate(words))
@@ -91,7 +91,7 @@ class Healthy:
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Healthy | None:
         """Read the baseline of the configuration; None if there is none. LivebodeError if the file cannot be read."""
-        path = said(dict(summary)).get("monitoring", {}).get("baseline")
+        path = recorded_configuration(dict(summary)).get("monitoring", {}).get("baseline")
         if path is None:
             return None
         from livebode.monitoring import Baseline  # with the simulation

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from livebode.analysis.overview import Overview
 from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
 from livebode.records import Run
-from livebode.session.overview import Overview
 
 ROWS_MAX = 2000
 _WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent

@@ -10,11 +10,11 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.configuration.axis import LoopSection
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Lines, Loop, Quantity, Responses, ServerError
 from livebode.estimation.quantities import convert
 from livebode.records.run import lines_in
-from livebode.session.axis import LoopSection
-from livebode.session.said import said
 
 Complex = NDArray[np.complex128]
 
@@ -49,7 +49,9 @@ class Quantities:
         found = summary["found"]
         lines = lines_in(found)
         try:
-            loop = LoopSection.model_validate(said(dict(summary)).get("loop", {})).build(lines.rate_hz)
+            loop = LoopSection.model_validate(recorded_configuration(dict(summary)).get("loop", {})).build(
+                lines.rate_hz
+            )
         except ValueError:  # of livebode or of pydantic
             loop = None
         return cls(found["quantity"], found["unit"], lines, loop)

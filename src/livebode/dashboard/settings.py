@@ -10,8 +10,8 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
+from livebode.configuration.axis import ServeSection
 from livebode.core import ConfigError
-from livebode.session.axis import ServeSection
 from livebode.sources.live.secret import secret
 
 TOKEN_LETTERS_MIN = 32

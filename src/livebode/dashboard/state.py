@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis.overview import Overview
+from livebode.configuration.recorded import recorded_configuration
 from livebode.core import Event, LivebodeError, Quantity, Responses
 from livebode.core.clock import RunClock
 from livebode.dashboard.frames import curve, frame
@@ -25,8 +27,6 @@ from livebode.dashboard.recent import Recent
 from livebode.dashboard.trends import Trends
 from livebode.margins import peak_sensitivity_at_lines
 from livebode.records import Run, to_json
-from livebode.session.overview import Overview
-from livebode.session.said import said
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
@@ -198,7 +198,7 @@ class State:
         q = self.quantities
         if q is None:
             return facts
-        words = said(dict(self._summary))
+        words = recorded_configuration(dict(self._summary))
         found = self._summary["found"]
         return facts | {
             "begun": True,

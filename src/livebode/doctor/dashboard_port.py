@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from livebode.configuration.axis import Axis, ServeSection
 from livebode.core import LivebodeError
 from livebode.dashboard.dashboard import listening
 from livebode.dashboard.settings import Serving
 from livebode.doctor.check import Check
-from livebode.session.axis import Axis, ServeSection
 
 NAME = "dashboard port"
 

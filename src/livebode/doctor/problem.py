@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError
-from livebode.session.axis import Axis
-from livebode.session.plan import live_follower
+from livebode.preparation.plan import live_follower
 
 
 def problem_of(axis: Axis) -> LivebodeError | None:

@@ -13,9 +13,9 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from livebode.configuration.axis import MAY_BE_SECRET, Axis
 from livebode.core import LivebodeError
-from livebode.session.axis import MAY_BE_SECRET, Axis
-from livebode.session.experiment import Experiment
+from livebode.experiments.experiment import Experiment
 from livebode.sources.live.address import parse_address
 from livebode.sources.live.secret import secret
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError
 from livebode.doctor.check import Check
-from livebode.session.axis import Axis
 from livebode.sources.live import make_source
 from livebode.sources.live.address import Address
 from livebode.sources.live.settings import SourceSettings

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from livebode.configuration.axes import axes_of
+from livebode.configuration.axis import Axis
+from livebode.configuration.recorded import recorded_configuration
+from livebode.configuration.toml_file import parse_table, read_bytes
 from livebode.core import LivebodeError, UsageError
 from livebode.doctor.problem import problem_of
+from livebode.experiments.experiment import Experiment
 from livebode.records import Run
-from livebode.session.axis import Axis
-from livebode.session.configuration import axes_of
-from livebode.session.experiment import Experiment
-from livebode.session.said import said
-from livebode.session.toml_file import parse_table, read_bytes
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
         try:
             run = Run.open(run_path, told=lambda _: None)
             if configuration is None:
-                axes = {"": Axis.of(said(run.summary), str(run_path))}
+                axes = {"": Axis.of(recorded_configuration(run.summary), str(run_path))}
         except LivebodeError as error:
             problems["run"] = error
     if configuration is not None:

@@ -7,8 +7,8 @@ import socket
 import sys
 from collections.abc import Mapping
 
+from livebode.configuration.axis import Axis
 from livebode.doctor.check import Check
-from livebode.session.axis import Axis
 from livebode.sources.live.udp import BUFFER_BYTES
 
 NAME = "UDP receive buffer"

@@ -1,0 +1,116 @@
+"""Average of a run, read once and in parts, so that memory does not depend on the length of the run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.analysis.overview import Overview
+from livebode.core import Response, Responses
+from livebode.estimation import Movement
+from livebode.fitting import RunningMean
+from livebode.records import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Averaged:
+    """The average response of a run, and a description of what was averaged.
+
+    Attributes
+    ----------
+    response
+        The mean of all responses; for a run with tracking.average the newest valid one.
+    words
+        Description of the average.
+    overview
+        Responses of the whole run, thinned to at most 2048.
+    count, valid
+        Number of responses, and number of valid ones at each line, (lines,).
+    incomplete
+        Number of responses with an invalid line.
+    spans_s, spans
+        The first and last time; lowest and highest schedule at a valid response, NaN without one.
+    moved
+        Whether the machine moved at a valid response, as `Movement` finds it.
+    """
+
+    response: Response
+    words: str
+    overview: Responses
+    count: int
+    valid: np.ndarray
+    incomplete: int
+    spans_s: tuple[float, float]
+    spans: tuple[float, float]
+    moved: bool
+
+
+def averaged(run: Run) -> Averaged:
+    """Read the run.
+
+    Raises
+    ------
+    SignalError, RecordError
+        If no line is ever valid, or the run cannot be read.
+    """
+    mean, overview, counted = RunningMean(), Overview(), _Counted(run)
+    for part in run.steady_batches():
+        mean.add(part)
+        overview.add(part)
+        counted.add(part)
+    one, words = mean.response()[0], f"the mean of {mean.rows} responses"
+    if mean.averages:
+        words = f"the average up to {one.time_s:.6g} s"
+    found = Averaged(
+        one,
+        words,
+        overview.responses(),
+        counted.rows,
+        counted.valid,
+        counted.incomplete,
+        counted.spans_s,
+        counted.spans,
+        counted.moved,
+    )
+    if not found.moved:
+        return found
+    words += f" from {found.spans[0]:.4g} to {found.spans[1]:.4g} of the schedule, whose change is in the bounds"
+    return Averaged(**{**found.__dict__, "words": words})
+
+
+class _Counted:
+    """Further properties of a run's responses."""
+
+    def __init__(self, run: Run) -> None:
+        self._window, self._hop = run.lines.window, int(run.found.get("hop", run.lines.window))
+        self._movement, self.moved = Movement(max(1, self._window // self._hop)), False
+        self.rows, self.incomplete = 0, 0
+        self.valid = np.zeros(len(run.lines), dtype=np.int64)
+        self.spans_s, self.spans = (np.nan, np.nan), (np.nan, np.nan)
+
+    def add(self, part: Responses) -> None:
+        self.rows += len(part)
+        self.valid += np.count_nonzero(part.valid, axis=0)
+        self.incomplete += int(np.count_nonzero(~part.valid.all(axis=1)))
+        self.spans_s = _wider(self.spans_s, part.time_s)
+        rows = np.flatnonzero(part.valid.any(axis=1))
+        if rows.size:
+            self.spans = _wider(self.spans, part.schedule[rows])
+            self._follow(part.sample[rows], part.schedule[rows])
+
+    def _follow(self, sample: NDArray[np.int64], schedule: NDArray[np.float64]) -> None:
+        places = max(1, self._window // self._hop)
+        place = ((sample + 1) % self._window // self._hop - 1) % places
+        follows = (np.diff(place) % places == 1 % places) & (np.diff(sample) <= 2 * self._hop)
+        cuts = np.flatnonzero(~follows) + 1
+        for at, values in zip(np.split(place, cuts), np.split(schedule, cuts)):
+            self.moved |= bool(self._movement.process(int(at[0]), values).any())
+
+
+def _wider(span: tuple[float, float], values: np.ndarray) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return span
+    return float(np.fmin(span[0], known.min())), float(np.fmax(span[1], known.max()))

@@ -1,0 +1,192 @@
+"""From finished runs of a healthy machine to its Baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from livebode.configuration.axis import Axis, FitSection
+from livebode.configuration.fit_settings import fitter_of
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import BaselineError, Block, LivebodeError
+from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table, places
+from livebode.records import Run
+from livebode.sources import open_log
+
+_ROLES = ("output", "input", "excitation", "schedule")
+# The belt's parameters referred to the motor shaft; changes are reported in percent.
+_RADIUS_M = 1.0
+
+
+def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) -> Baseline:
+    """The Baseline of runs of the healthy machine, all with the same lines and signals.
+
+    Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
+    is also learned, from the recordings of the runs; `say` receives the progress.
+
+    Raises
+    ------
+    RecordError
+        If a run cannot be read.
+    BaselineError
+        If the runs do not match, or contain too little data.
+    """
+    if not paths:
+        raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
+    runs = [Run.open(path) for path in paths]
+    axes = [_axis(run) for run in runs]
+    _check_once(runs, axes)
+    for run, axis in zip(runs, axes):
+        _check_same(runs[0], axes[0], run, axis)
+    say("learning the lines over the schedule")
+    lines, signals = runs[0].lines, axes[0].signals
+    names = [f"{f:g} Hz" for f in lines.frequency_hz]
+    overlap = len(_apart(runs[0]))
+    tables = [learn_table("lines", names, [rows for run in runs for rows in _rows(run)], overlap)]
+    if axes[0].fit is not None:
+        say("learning the fitted parameters over the schedule")
+        tables.append(_parameters(runs, axes[0].fit))
+    machine, remark = _machine(runs, axes, say)
+    if machine is None and (covariates := axes[0].monitoring.covariates):
+        raise BaselineError(
+            "covariates-without-machine",
+            f"covariates ({', '.join(covariates)}) need a model of the moving machine, which these runs do not give: "
+            f"{remark}",
+            "remove them from [monitoring] to learn only tables",
+            channels=list(covariates),
+        )
+    return Baseline(
+        lines,
+        runs[0].found["hop"],
+        {role: getattr(signals, role) for role in _ROLES},
+        axes[0].tracking.estimator,
+        axes[0].tracking.quantity,
+        tuple(tables),
+        machine,
+        axes[0].motion is not None,
+        tuple(str(path) for path in paths),
+        remark,
+    )
+
+
+def _axis(run: Run) -> Axis:
+    configuration = recorded_configuration(run.summary)
+    if "source" not in configuration:
+        raise BaselineError(
+            "run-not-of-machine",
+            f"{str(run.path)!r} is not the run of a machine",
+            "learn from a directory that `livebode run` wrote",
+            path=str(run.path),
+        )
+    axis = Axis.of(configuration, str(run.path / "run.json"))
+    if axis.tracking.average:
+        raise BaselineError(
+            "run-averaged",
+            f"{str(run.path)!r} was created with tracking.average, so that each response contains those before it",
+            "learn from a run of the same recording without it",
+            path=str(run.path),
+        )
+    return axis
+
+
+def _check_once(runs: list[Run], axes: list[Axis]) -> None:
+    """Duplicated data would count as twice as much evidence."""
+    seen: dict[Path, Run] = {}
+    for run, axis in zip(runs, axes):
+        for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()):
+            if thing is not None and thing in seen:
+                raise BaselineError(
+                    "run-repeated",
+                    f"{str(run.path)!r} contains the same data as {str(seen[thing].path)!r}",
+                    "give each recording once",
+                    path=str(run.path),
+                    other=str(seen[thing].path),
+                )
+        seen |= {thing: run for thing in (run.path.resolve(), axis.source.log and axis.source.log.resolve()) if thing}
+
+
+def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
+    for name, one, other in (
+        ("lines", first.lines, run.lines),
+        ("hop", first.found["hop"], run.found["hop"]),
+        ("signals", mine.signals, axis.signals),
+        ("tracking options", mine.tracking, axis.tracking),
+        ("motion options", mine.motion, axis.motion),
+        ("fit options", mine.fit, axis.fit),
+        ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
+    ):
+        if one != other:
+            raise BaselineError(
+                "runs-differ",
+                f"{str(run.path)!r} and {str(first.path)!r} differ in {name}",
+                "learn from runs with the same configuration",
+                path=str(run.path),
+                other=str(first.path),
+                what=name,
+            )
+
+
+def _apart(run: Run) -> list[Apart]:
+    window, hop = run.lines.window, run.found["hop"]
+    return [Apart(max(window, hop), place) for place in places(window, hop)]
+
+
+def _rows(run: Run) -> list[Rows]:
+    """Rows at each place of the period."""
+    each = _apart(run)
+    return _joined([[apart.of_responses(batch) for apart in each] for batch in run.steady_batches()])
+
+
+def _joined(batches: list[list[Rows]]) -> list[Rows]:
+    return [Rows.join(parts) for parts in zip(*batches)]
+
+
+def _parameters(runs: list[Run], section: FitSection) -> Table:
+    """The table of the fits; they are repeated, because a run's parameters.parquet has no covariance."""
+    model = fitter_of(section, runs[0].found["unit"])
+    names = [name for name in model.model.names if name not in model.held]
+    rows = []
+    for run in runs:
+        fitter, each = fitter_of(section, run.found["unit"]), _apart(run)
+        fitted = (fitter.process(batch).only(names) for batch in run.steady_batches())
+        rows += _joined([[apart.of_parameters(part) for apart in each] for part in fitted])
+    return learn_table("parameters", names, rows, len(_apart(runs[0])))
+
+
+def _machine(runs: list[Run], axes: list[Axis], say: Callable[[str], None]) -> tuple[Machine | None, str]:
+    """A model of the moving machine, or the reason why there is none."""
+    signals = axes[0].signals
+    covariates = axes[0].monitoring.covariates
+    if signals.input is None or signals.schedule is None:
+        return None, "a model of the machine needs the torque and a scheduling position"
+    if axes[0].tracking.quantity != "plant":
+        return None, f"a model describes the plant, but the runs contain the {axes[0].tracking.quantity}"
+    if any(axis.source.log is None for axis in axes):
+        return None, "a model is learned from recordings, but not all of these runs are from one"
+    say("learning a model of the moving machine from the recordings")
+    try:
+        return (
+            learn_machine(
+                [_samples(axis) for axis in axes],
+                runs[0].lines,
+                input=signals.input,
+                output=signals.output,
+                schedule=signals.schedule,
+                radius_m=_RADIUS_M,
+                covariates=covariates,
+            ),
+            "",
+        )
+    except LivebodeError as error:
+        return None, str(error)
+
+
+def _samples(axis: Axis) -> Callable[[], Iterator[Block]]:
+    names: list[Any] = [axis.signals.input, axis.signals.output, axis.signals.schedule, *axis.monitoring.covariates]
+
+    def blocks() -> Iterator[Block]:
+        assert axis.source.log is not None
+        return open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time).blocks(names)
+
+    return blocks

@@ -1,0 +1,125 @@
+"""A run's fitted model judged on another recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from livebode.analysis.fits import fit_run
+from livebode.configuration.axis import Axis, FitSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import Block, FitError, RecordError, SignalError, UsageError
+from livebode.records import Run
+from livebode.sources import Log, open_log
+from livebode.validation import Validation, validate
+
+
+def validate_run(
+    directory: Path,
+    log: Path,
+    sections: list[FitSection],
+    *,
+    lags: int = 40,
+    samples: int | None = None,
+    channels: dict[str, str | None] | None = None,
+) -> tuple[list[Validation], list[str]]:
+    """One verdict for each section's model, all on the same samples of `log`; and a list of remarks.
+
+    Rate, loop and channels are those of the run's configuration; `channels` can replace output, input or excitation.
+    The excitation may be missing in `log`. Of a recording with gaps or samples that are not finite, the longest clean
+    stretch is used; of that the last `samples`, where the transient has decayed. The remarks report this, models that
+    were not fitted, and whether the recording is that of the run.
+
+    Raises
+    ------
+    RecordError
+        If the run does not name the channels that are needed.
+    RecordingError, SignalError, UsageError
+        If the recording lacks a channel or has no stretch that is long enough.
+    FitError
+        If no model could be fitted.
+    """
+    own_words = recorded_configuration(Run.open(directory).summary)
+    if "signals" not in own_words:
+        raise RecordError(
+            "not-tracked",
+            f"{str(directory)!r} does not name the channels that it was computed from",
+            "create it with `livebode run`",
+            path=str(directory),
+        )
+    axis = Axis.of({key: own_words[key] for key in ("source", "signals", "loop") if key in own_words}, str(directory))
+    named = {role: name for role, name in (channels or {}).items() if name}
+    signals = axis.signals.model_copy(update=named)
+    if signals.input is None:
+        raise RecordError(
+            "not-tracked",
+            "the run has no plant input u, which a simulation of the model needs",
+            "run again with signals.input",
+            path=str(directory),
+            role="input",
+        )
+    notes = _freshness(own_words["source"].get("log"), log)
+    opened = open_log(log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    there = {c.name for c in opened.channels} | set(opened.aliases)
+    if signals.excitation and "excitation" not in named and signals.excitation not in there:
+        notes.append(f"{log.name} has no channel {signals.excitation!r}: judged without the excitation w")
+        signals = signals.model_copy(update={"excitation": None})
+    names = [name for name in (signals.input, signals.output, signals.excitation) if name]
+    block, recorded = clean_stretch(opened, names)
+    if len(block) < recorded:
+        notes.append(f"gaps or samples that are not finite: the longest clean stretch, {len(block)} of {recorded}")
+    if samples is not None:
+        if samples > len(block):
+            raise UsageError(
+                "out-of-range",
+                f"{samples=} is more than the {len(block)} clean ones in a row",
+                "choose fewer",
+                argument="samples",
+                value=samples,
+                limit=len(block),
+            )
+        block = block.cut(len(block) - samples, len(block))
+    loop = axis.loop.build(block.rate_hz)
+    roles = {"input": signals.input, "output": signals.output, "excitation": signals.excitation}
+    fits = [fit_run(directory, section)[0] for section in sections]
+    judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
+    refused = [f"{fit.model.name} was not fitted: {fit.sentence}" for fit in fits if fit.status != "ok"]
+    if not judged:
+        raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[fit.model.name for fit in fits])
+    return judged, notes + refused
+
+
+def _freshness(own: str | None, log: Path) -> list[str]:
+    if own is None or Path(own).resolve() != log.resolve():
+        return []
+    return [f"{log.name} is the recording of the run: this is not independent data, because the model was fitted to it"]
+
+
+def clean_stretch(opened: Log, names: list[str]) -> tuple[Block, int]:
+    """The longest stretch of a recording without gaps and with finite samples only, and the number of all samples."""
+    best: list[Block] = []
+    now: list[Block] = []
+    recorded = 0
+    for block in opened.blocks(names):
+        recorded += len(block)
+        broken = ~np.isfinite(block.data).all(axis=0)
+        edges = np.flatnonzero(np.diff(np.concatenate([[1], broken, [1]])))
+        for first, last in zip(edges[::2], edges[1::2]):
+            if first > 0 or block.gap or not now or now[-1].stop != block.start:
+                now = []
+            now.append(block.cut(int(first), int(last)))
+            if sum(map(len, now)) > sum(map(len, best)):
+                best = list(now)
+            if last < len(block):
+                now = []
+    if not best:
+        raise SignalError(
+            "no-clean-samples",
+            f"{str(opened.path)!r} has no sample at which {', '.join(names)} are all finite",
+            "choose another recording",
+            path=str(opened.path),
+            channels=names,
+        )
+    data = np.concatenate([b.data for b in best], axis=1)
+    return Block(data, best[0].channels, best[0].rate_hz, best[0].start), recorded

@@ -1,0 +1,44 @@
+"""The configuration of a run, read from its run.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from livebode.configuration.axis import FitSection, LoopSection
+from livebode.core import RecordError
+
+_SECTIONS: dict[str, type[BaseModel]] = {"fit": FitSection, "loop": LoopSection}
+
+
+def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
+    """The configuration without null values: in JSON, null is used for None and for infinity.
+
+    >>> recorded_configuration({"configuration": {"tracking": {"hop": 5, "spikes": None}, "fit": None}})
+    {'tracking': {'hop': 5}}
+
+    Raises
+    ------
+    RecordError
+        If a section that is used again is not in the form that a run writes.
+    """
+    found = dict(_kept(summary.get("configuration", {})))
+    for name, section in _SECTIONS.items():
+        try:
+            section.model_validate(found.get(name, {}))
+        except ValidationError as error:
+            wrong = error.errors()[0]
+            place = ".".join(map(str, (name, *wrong["loc"])))
+            raise RecordError(
+                "unexpected-content",
+                f"the configuration in run.json is invalid ({place}: {wrong['msg']})",
+                "restore the file as the run wrote it",
+                key=place,
+            ) from None
+    return found
+
+
+def _kept(values: dict[str, Any]) -> dict[str, Any]:
+    kept = {name: value for name, value in values.items() if value is not None}
+    return {name: _kept(value) if isinstance(value, dict) else value for name, value in kept.items()}

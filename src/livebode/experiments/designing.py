@@ -1,0 +1,191 @@
+"""From the description of an experiment to a directory with the excitation, its picture and its axis.toml."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from livebode.core import ConfigError, OutputError, UsageError
+from livebode.design import FORMATS, Design, axis_text, choose, write
+from livebode.experiments.experiment import Experiment
+from livebode.records import to_json
+from livebode.structured_text import PERIOD_MAX
+
+_MARK, _AXIS = "design.json", "axis.toml"
+Picture = Callable[[Design, Path], None]
+
+
+@dataclass(frozen=True)
+class Designed:
+    """Result of a design.
+
+    Attributes
+    ----------
+    design
+        The experiment.
+    directory, files
+        Its location.
+    left_out
+        Sentence on the formats that were not written by default; empty if there are none.
+    """
+
+    design: Design
+    directory: Path
+    files: tuple[str, ...]
+    left_out: str = ""
+
+
+def design_experiment(
+    experiment: Experiment,
+    directory: Path,
+    *,
+    name: str = "excitation",
+    suffixes: Sequence[str] | None = None,
+    force: bool = False,
+    draw: Picture | None = None,
+) -> Designed:
+    """Design the experiment, and write its files to a new directory, which appears when it is complete.
+
+    Raises
+    ------
+    DesignError
+        If there is no solution (see `choose`).
+    UsageError
+        If a format is not supported or does not allow the name.
+    ConfigError
+        If the name of the recording is invalid.
+    OutputError
+        If the directory exists and must not be replaced, or the disk reports an error. Nothing is written then.
+    """
+    kinds = None if suffixes is None else tuple(f".{s.lstrip('.').lower()}" for s in suffixes)
+    for kind in kinds or ():
+        if kind not in FORMATS:
+            raise UsageError(
+                "not-one-of",
+                f"the format {kind!r} is not supported",
+                f"choose {', '.join(FORMATS)}",
+                argument="suffixes",
+                value=kind,
+                allowed=list(FORMATS),
+            )
+    _check_names(name, experiment.log)
+    _check_free(directory, force)
+    design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
+    lines = design.waveform.lines
+    left_out = ""
+    if kinds is None and lines.window > PERIOD_MAX:
+        left_out = f"no .st: its {lines.window} samples are more than the {PERIOD_MAX} of a PLC's table"
+    try:
+        there = directory.absolute()  # "." has no parent in which a sibling can be created
+        there.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{there.name[:100]}.partial-", dir=there.parent) as folder:
+            partial = Path(folder) / "whole"
+            partial.mkdir()
+            for kind in kinds or _all_that_hold(lines.window):
+                write(partial / f"{name}{kind}", design.waveform, name)
+            configuration = axis_text(
+                design,
+                signals=experiment.signal_names(),
+                log=experiment.log,
+                loop=experiment.loop_tables(),
+                motion=experiment.motion_table(lines.window / lines.rate_hz),
+                tracking=experiment.tracking(),
+            )
+            (partial / _AXIS).write_text(configuration, encoding="utf-8")
+            if draw is not None:
+                draw(design, partial / f"{name}.png")
+            files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
+            told = {"files": files} | design.plain()
+            (partial / _MARK).write_text(to_json(told, indent=1) + "\n", encoding="utf-8")
+            _check_free(directory, force)
+            _put(partial, there, aside=Path(folder) / "before")
+    except OSError as error:
+        raise OutputError(
+            "not-written",
+            f"{str(directory)!r} could not be written: {error.strerror}; nothing was changed there",
+            "check the disk and its permissions",
+            path=str(directory),
+        ) from None
+    return Designed(design, directory, files, left_out)
+
+
+def _put(made: Path, there: Path, aside: Path) -> None:
+    """Put it in its place; the previous directory is removed, or remains if this fails."""
+    before = there.exists()
+    if before:
+        there.rename(aside)
+    try:
+        made.rename(there)
+    except OSError:
+        if before:
+            aside.rename(there)
+        raise
+
+
+def _check_names(name: str, log: str) -> None:
+    if not name.strip() or not name.isprintable() or name.startswith(".") or Path(name).name != name:
+        raise UsageError(
+            "invalid-name",
+            f"{name!r} cannot be the name of a file",
+            "choose letters, digits and underscores",
+            argument="name",
+            value=name,
+        )
+    if not log.isprintable() or not Path(log).name:
+        raise ConfigError(
+            "value-invalid",
+            f"log = {log!r} cannot be the file of a recording",
+            "specify one such as 'log.parquet'",
+            key="log",
+            value=log,
+        )
+    if log in (_MARK, _AXIS, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
+        raise ConfigError(
+            "key-conflict",
+            f"log = {log!r} is a file of the design",
+            "give the recording another name",
+            key="log",
+            value=log,
+        )
+
+
+def _all_that_hold(window: int) -> list[str]:
+    """The default formats: a PLC's compiler limits the length of the period."""
+    return [kind for kind in FORMATS if kind != ".st" or window <= PERIOD_MAX]
+
+
+def _check_free(directory: Path, force: bool) -> None:
+    if not (directory.exists() or directory.is_symlink()):
+        return
+    if not force:
+        raise OutputError(
+            "exists",
+            f"{str(directory)!r} exists already",
+            "choose another directory, or replace it with force",
+            path=str(directory),
+        )
+    if directory.is_symlink() or not (directory / _MARK).is_file():
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} is not the directory of an earlier design",
+            "choose another directory",
+            path=str(directory),
+        )
+    if others := sorted({path.name for path in directory.iterdir()} - _left_by(directory / _MARK)):
+        raise OutputError(
+            "not-replaceable",
+            f"{str(directory)!r} also contains {others[0]!r}, which is not from a design",
+            "move it, or choose another directory",
+            path=str(directory),
+            name=others[0],
+        )
+
+
+def _left_by(mark: Path) -> set[str]:
+    try:
+        return set(json.loads(mark.read_text(encoding="utf-8"))["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()

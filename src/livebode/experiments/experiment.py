@@ -1,0 +1,273 @@
+"""Experiment: description of a machine and of the measurement, from a TOML file."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from functools import cached_property
+from math import inf
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from livebode.configuration.axis import LoopSection, nearest
+from livebode.configuration.toml_file import shortened
+from livebode.core import ConfigError
+from livebode.design import Bearable, Machine, Wish, belt_machine
+from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
+from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
+
+T = TypeVar("T")
+
+_BELT: dict[str, Any] = {
+    "mechanics": Mechanics,
+    "friction": Friction,
+    "drive": Drive,
+    "sensor": Sensor,
+    "limits": Limits,
+    "strokes": Strokes,
+    "standstill": Standstill,
+}
+_SIGNALS = {"excitation": "w", "input": "u", "output": "velocity"}
+
+
+class Experiment(BaseModel):
+    """A machine, either a belt axis by its constants or a measured one, and the specification of the experiment."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    excitation: dict[str, Any]
+    belt: dict[str, dict[str, Any]] | None = None
+    measured: MeasuredSection | None = None
+    limits: dict[str, Any] = {}
+    loop: LoopSection | None = None
+    signals: dict[str, str] = {}
+    log: str = "log.parquet"
+
+    @classmethod
+    def read(cls, path: Path, over: Mapping[str, Any] | None = None) -> Experiment:
+        """The Experiment in a TOML file; `over` replaces keys of its [excitation].
+
+        Raises
+        ------
+        ConfigError
+            If the file cannot be read, is not TOML, or a key or a value is invalid; the message contains it.
+        """
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
+        except OSError as error:
+            raise ConfigError(
+                "file-unreadable",
+                f"{str(path)!r} cannot be read: {error.strerror}",
+                "check the path and its permissions",
+                path=str(path),
+            ) from None
+        except UnicodeDecodeError:
+            raise ConfigError(
+                "not-text",
+                f"{str(path)!r} is not text",
+                "give the description of an experiment in TOML",
+                path=str(path),
+            ) from None
+        except tomllib.TOMLDecodeError as error:
+            raise ConfigError(
+                "not-toml", f"{str(path)!r} is not TOML: {error}", "correct it there", path=str(path)
+            ) from None
+        wanted, above = data.get("excitation", {}), dict(over or {})
+        if isinstance(wanted, dict):
+            # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
+            gone = {"lines": "band_hz" in above, "window": "resolution_hz" in above, "order": "resolution_hz" in above}
+            data["excitation"] = {key: value for key, value in wanted.items() if not gone.get(key)} | above
+        found = cls.of(data, str(path))
+        if found.measured is None:
+            return found
+        return found.model_copy(
+            update={"measured": found.measured.model_copy(update={"run": path.parent / found.measured.run})}
+        )
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any], origin: str) -> Experiment:
+        """The Experiment in plain data; `origin` names it in messages."""
+        try:
+            found = cls.model_validate(data)
+        except ValidationError as error:
+            raise _first_of(error).at(origin) from None
+        if found.belt is not None and found.loop is not None:
+            raise ConfigError(
+                "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
+            ).at(origin)
+        if (found.belt is None) == (found.measured is None):
+            raise ConfigError(
+                "key-conflict",
+                "the machine is described by both or neither of [belt] and [measured]",
+                "describe either a [belt] axis by its constants, or one that was [measured]",
+                key="belt",
+            ).at(origin)
+        return found
+
+    def wish(self) -> Wish:
+        """Specification from [excitation]."""
+        given = dict(self.excitation)
+        if isinstance(given.get("band_hz"), list):
+            given["band_hz"] = tuple(given["band_hz"])
+        return _made(Wish, given, "excitation")
+
+    def bearable(self) -> Bearable:
+        """[limits]; for a belt axis its own limits by default."""
+        axis = self.axis()
+        own = {} if axis is None else {
+            "torque_n_m_max": axis.drive.torque_n_m_max,
+            "speed_m_per_s_max": axis.limits.speed_m_per_s_max,
+            "position_m_min": axis.limits.position_m_min,
+            "position_m_max": axis.limits.position_m_max,
+        }  # fmt: skip
+        return _made(Bearable, own | self.limits, "limits")
+
+    def axis(self) -> BeltAxis | None:
+        """The belt axis; None for a measured one."""
+        if self.belt is None:
+            return None
+        if unknown := [name for name in self.belt if name not in _BELT]:
+            raise ConfigError(
+                "key-unknown",
+                f"there is no [belt.{unknown[0]}]",
+                _near(unknown[0], _BELT),
+                key=f"belt.{unknown[0]}",
+            )
+        parts = {name: _made(_BELT[name], given, f"belt.{name}") for name, given in self.belt.items()}
+        if "strokes" in parts and "standstill" in parts:
+            raise ConfigError(
+                "key-conflict",
+                "[belt.strokes] and [belt.standstill] exclude each other",
+                "remove one of them",
+                key="belt.standstill",
+            )
+        motion = parts.pop("strokes", None) or parts.pop("standstill", None) or Standstill()
+        return BeltAxis(motion=motion, **parts)
+
+    def machine(self) -> Machine:
+        """The described machine: simulates a cycle for a belt axis, reads a run directory for a measured one."""
+        axis = self.axis()
+        if axis is not None:
+            return belt_machine(axis)
+        return self._measured_axis.machine()
+
+    @cached_property
+    def _measured_axis(self) -> MeasuredAxis:
+        """The run is opened once."""
+        assert self.measured is not None
+        return MeasuredAxis(self.measured, self.loop)
+
+    def loop_tables(self) -> dict[str, Any]:
+        """[loop] of the axis.toml, as in docs/reference/configuration.md."""
+        axis = self.axis()
+        if axis is None:
+            return _finite(self._measured_axis.loop_tables())
+        drive = axis.drive
+        velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
+                    "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
+                    "delay_ticks": drive.delay_ticks}  # fmt: skip
+        position = {"gain": drive.position_gain_per_s, "rate_hz": drive.position_rate_hz,
+                    "held_ticks": drive.position_ticks}  # fmt: skip
+        return {"velocity": velocity, "position": position}
+
+    def motion_table(self, window_s: float) -> dict[str, Any]:
+        """[motion] of the axis.toml for a moving belt axis: a chunk is a stroke, at least two windows."""
+        axis = self.axis()
+        if axis is None or (cycle := axis.motion.cycle(axis.drive.rate_hz)[0].size) == 1:
+            return {}
+        stroke_s = cycle / 2 / axis.drive.rate_hz
+        return {"radius_m": axis.mechanics.radius_m, "chunk_s": max(stroke_s, 2 * window_s)}
+
+    def signal_names(self) -> dict[str, str]:
+        """[signals] of the axis.toml; default: those of the simulated axis or of the run."""
+        if unknown := [name for name in self.signals if name not in (*_SIGNALS, "schedule")]:
+            raise ConfigError(
+                "key-unknown",
+                f"there is no signals.{unknown[0]}",
+                _near(unknown[0], (*_SIGNALS, "schedule")),
+                key=f"signals.{unknown[0]}",
+            )
+        if self.belt is None:
+            own = self._measured_axis.signal_names()
+        else:
+            own = _SIGNALS | ({"schedule": "x"} if "strokes" in self.belt else {})
+        names = own | self.signals
+        for role, name in names.items():
+            if not name or not name.isprintable():
+                raise ConfigError(
+                    "value-invalid",
+                    f"signals.{role} = {name!r} cannot be the name of a channel",
+                    "specify its name in the recording",
+                    key=f"signals.{role}",
+                    value=name,
+                )
+            if twins := [other for other in names if other != role and names[other] == name]:
+                raise ConfigError(
+                    "key-conflict",
+                    f"signals.{role} and signals.{twins[0]} are both {name!r}",
+                    "name two channels",
+                    key=f"signals.{role}",
+                    value=name,
+                )
+        return names
+
+    def tracking(self) -> dict[str, Any]:
+        """[tracking] of the axis.toml: keys that depend on the recording."""
+        return {} if self.belt is not None else self._measured_axis.tracking()
+
+
+def _first_of(error: ValidationError) -> ConfigError:
+    """The first error, with its key and value."""
+    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")  # a typo also causes a missing key
+    place = ".".join(map(str, first["loc"]))
+    if first["type"] == "extra_forbidden":
+        if first["loc"][0] == "loop":
+            meant = nearest(first["loc"])
+        else:
+            known = MeasuredSection if first["loc"][0] == "measured" else Experiment
+            meant = _near(place.split(".")[-1], known.model_fields)
+        return ConfigError("key-unknown", f"there is no {place!r}", meant, key=place)
+    if first["type"] == "missing" and all(isinstance(part, str) for part in first["loc"]):
+        return ConfigError("key-missing", f"{place!r} is missing", "add it", key=place)
+    return _unusable(place, first["input"], first["msg"])
+
+
+def _unusable(key: str, value: Any, why: str) -> ConfigError:
+    shown = shortened(value)
+    message = f"{key} = {shown} is not usable: {_plain(why)}"
+    return ConfigError("value-invalid", message, "correct it", key=key, value=shown)
+
+
+def _plain(why: str) -> str:
+    # TOML has only lists; some become tuples here.
+    return why.lower().replace("tuple", "list")
+
+
+def _made(kind: type[T], given: Mapping[str, Any], section: str) -> T:
+    """The dataclass from plain data; ConfigError for an unknown key, or a value of another type."""
+    known = get_type_hints(kind)
+    for name, value in given.items():
+        if name not in known:
+            raise ConfigError(
+                "key-unknown", f"there is no {section}.{name}", _near(name, known), key=f"{section}.{name}"
+            )
+        try:
+            TypeAdapter(known[name], config=ConfigDict(strict=True)).validate_python(value)
+        except ValidationError as error:
+            raise _unusable(f"{section}.{name}", value, error.errors()[0]["msg"]) from None
+    return kind(**given)
+
+
+def _near(name: str, known: Any) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(known)}"
+
+
+def _finite(table: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {name: _finite(v) if isinstance(v, Mapping) else v for name, v in table.items() if v is not None}
+    return {name: v for name, v in kept.items() if v != inf}

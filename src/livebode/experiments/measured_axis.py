@@ -1,0 +1,127 @@
+"""The axis of an experiment from a measured run: its machine, and what it uses of the run's configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from livebode.configuration.axis import LoopSection
+from livebode.configuration.fit_settings import output_of
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import ConfigError
+from livebode.design import Machine, MeasuredResponse, measured_machine
+from livebode.design.machine import MOTION_KEYS
+from livebode.design.measured import Output
+from livebode.fitting import mean_response
+from livebode.records import Run
+
+Number = Annotated[float, Field(strict=True)]  # true is not a number
+
+_KEPT = ("differenced", "spikes")  # of the run's [tracking]: properties of the recording, not of the evaluation
+_UNITS = ("rad/s/(N m)", "rad/(N m)")
+_UNCHECKED = "the loop is not that of the run: its stability is not checked"
+
+
+class MeasuredSection(BaseModel):
+    """[measured]: a plant that a run measured, and the effect of its motion alone."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    run: Path
+    output: Output | None = None
+    radius_m: Number = 1.0
+    noise: Number = 0.0
+    encoder_counts_per_turn: Annotated[int, Field(strict=True, ge=0)] = 0
+    stroke_s: Number | None = None
+    torque_n_m: tuple[Number, Number] | None = None
+    speed_m_per_s: tuple[Number, Number] | None = None
+    position_m: tuple[Number, Number] | None = None
+    following_error_m: tuple[Number, Number] | None = None
+
+
+class MeasuredAxis:
+    """A run's mean plant, by default in the loop of the run.
+
+    Raises
+    ------
+    RecordError
+        If there is no such run.
+    ConfigError
+        If the loop acts on an output that the run does not have, or the excitation is not a torque.
+    """
+
+    def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
+        self._section, self._run = section, Run.open(section.run)
+        self._said = recorded_configuration(self._run.summary)
+        self._given = loop
+        self._loop = loop or LoopSection.model_validate(self._said.get("loop", {}))
+
+    def machine(self) -> Machine:
+        """The Machine of the run's mean response."""
+        if self._loop.excitation_at != "plant input":
+            raise ConfigError(
+                "value-invalid",
+                f"loop.excitation_at = {self._loop.excitation_at!r}, where an excitation is not a torque",
+                "design for 'plant input'",
+                key="loop.excitation_at",
+                value=self._loop.excitation_at,
+            )
+        told, rate_hz = self._section, self._run.lines.rate_hz
+        motion = {name: getattr(told, key) for name, key in MOTION_KEYS.items() if getattr(told, key) is not None}
+        return measured_machine(
+            MeasuredResponse.of(mean_response(self._run.steady_batches())), self._loop.build(rate_hz), rate_hz,
+            output=self._output(), radius_m=told.radius_m, noise=told.noise, motion=motion, stroke_s=told.stroke_s,
+            notes=self._notes(), encoder_counts_per_turn=told.encoder_counts_per_turn,
+        )  # fmt: skip
+
+    def loop_tables(self) -> dict[str, Any]:
+        """[loop] of the file or of the run."""
+        if self._given is not None:
+            return self._given.model_dump(exclude_unset=True, exclude_none=True)
+        return dict(self._said.get("loop", {}))
+
+    def signal_names(self) -> dict[str, str]:
+        """[signals] of the run; a design always has an excitation."""
+        return {"excitation": "w"} | dict(self._said.get("signals", {}))
+
+    def tracking(self) -> dict[str, Any]:
+        """The part of the run's [tracking] that its recordings need."""
+        tracking = self._said.get("tracking", {})
+        kept = {name: tracking[name] for name in _KEPT if tracking.get(name)}
+        return kept if "input" in self.signal_names() else {"estimator": "indirect"} | kept
+
+    def _output(self) -> Output:
+        unit = self._run.found.get("unit", "")
+        own = output_of(unit)
+        if own and self._section.output and self._section.output != own:
+            raise ConfigError(
+                "value-mismatch",
+                f"measured.output = {self._section.output!r}, but the run's plant is in {unit}",
+                "leave it out",
+                key="measured.output",
+                value=self._section.output,
+                unit=unit,
+            )
+        acts_on: Output = "position" if self._loop.position_pd is not None else "velocity"
+        output = self._section.output or own or acts_on
+        if output != acts_on and self._loop.build(self._run.lines.rate_hz).feedback is not None:
+            other = "loop.velocity" if acts_on == "position" else "loop.position_pd"
+            raise ConfigError(
+                "value-mismatch",
+                f"the run's output is a {output}, but its loop as described acts on a {acts_on}",
+                f"describe {other}, or track the {acts_on}",
+                key=other,
+                value=output,
+            )
+        return output
+
+    def _notes(self) -> tuple[str, ...]:
+        notes = [] if self._given is None else [_UNCHECKED]
+        if (unit := self._run.found.get("unit", "")) and unit not in _UNITS:
+            notes.append(f"the run's plant is in {unit}: N m and rad here stand for these units")
+        if not unit and self._section.output is None:
+            taken = {"velocity": "a velocity in rad/s", "position": "a position in rad"}[self._output()]
+            notes.append(f"the run has no units: its output is assumed to be {taken}, its input N m")
+        return tuple(notes)

@@ -1,0 +1,138 @@
+"""Content of a recording, and the excitation in one of its channels."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.core import Block, Lines, LivebodeError
+from livebode.estimation.settings import nearest_hop
+from livebode.excitation import Excitation, recognise
+from livebode.preparation.plan import LIVE_RESPONSES_PER_S, beginning
+from livebode.preparation.quiet import Quiet, look_for_hum
+from livebode.sources import Log, open_log
+
+
+@dataclass
+class ChannelSummary:
+    """One channel over the whole recording: range of its finite samples, and number of others."""
+
+    name: str
+    unit: str
+    minimum: float = float("inf")
+    maximum: float = float("-inf")
+    not_finite: int = 0
+
+    def take(self, block: Block) -> None:
+        samples = block[self.name]
+        finite = samples[np.isfinite(samples)]
+        self.not_finite += samples.size - finite.size
+        if finite.size:
+            self.minimum = min(self.minimum, float(finite.min()))
+            self.maximum = max(self.maximum, float(finite.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """Result of `livebode inspect`; `unrecognised`: why an excitation next to a silent stretch is not recognised."""
+
+    log: Log
+    samples: int
+    channels: list[ChannelSummary]
+    gaps: int
+    missing: int
+    excitation: Excitation | None
+    quiet: Quiet | None = None
+    unrecognised: str = ""
+
+    @property
+    def live_hop(self) -> int:
+        """Default hop of a live run whose window is the excitation's period, in samples."""
+        assert self.excitation is not None
+        return nearest_hop(self.excitation.period, self.log.rate_hz / LIVE_RESPONSES_PER_S)
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, for JSON."""
+        log, found = self.log, self.excitation
+        plain: dict[str, Any] = {
+            "log": str(log.path),
+            "format": log.format,
+            "rate_hz": log.rate_hz,
+            "rate_from": log.rate_origin,
+            "samples": self.samples,
+            "duration_s": self.samples / log.rate_hz,
+            "gaps": self.gaps,
+            "missing_samples": self.missing,
+            "timing": asdict(log.timing) if log.timing else None,
+            "channels": [asdict(channel) for channel in self.channels],
+            "skipped": [asdict(skipped) for skipped in log.skipped],
+        }
+        if self.quiet is not None:
+            plain["without_excitation"] = self.quiet.plain()
+        if found is not None:
+            plain["excitation"] = {
+                "period": found.period,
+                "periods": found.periods,
+                "start": found.start,
+                "crest_factor": found.crest_factor,
+                "rms": found.rms,
+                "peak": found.peak,
+                "live_hop": self.live_hop,
+                "frequency_hz": found.lines.frequency_hz.tolist(),
+                "amplitude": found.amplitude.tolist(),
+                "snr_db": None if found.snr_db is None else found.snr_db.tolist(),
+                "transient_periods": list(found.transient),
+                "outlying_periods": list(found.outlying),
+                "phase_slips": [[slip.sample, slip.missing] for slip in found.slips],
+            }
+        if self.unrecognised:
+            plain["unrecognised"] = self.unrecognised
+        return plain
+
+
+def inspect(
+    path: Path,
+    *,
+    rate_hz: float | None = None,
+    time: str | None = None,
+    excitation: str | None = None,
+    output: str | None = None,
+    input: str | None = None,
+    lines: tuple[str, int] | None = None,
+) -> Inspection:
+    """Read and describe a recording; LivebodeError if it cannot be read or has no periodic signal.
+
+    With lines (a text and the window), hum is searched in `output` and `input` where there is no excitation.
+    """
+    log = open_log(path, rate_hz=rate_hz, time=time)
+    wanted = [name for name in (excitation, output, input) if name is not None]
+    known = {channel.name for channel in log.channels}
+    # A channel given by a path or an alias is listed by that name.
+    extra = [name for name in dict.fromkeys(wanted) if name not in known]
+    names = [channel.name for channel in log.channels] + extra
+    summaries: dict[str, ChannelSummary] = {}
+    samples, gaps, missing, stop = 0, 0, 0, None
+    for block in log.blocks(names):
+        for channel in block.channels:
+            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit)).take(block)
+        samples += len(block)
+        if stop is not None and (block.gap or block.start != stop):
+            gaps, missing = gaps + 1, missing + block.start - stop
+        stop = block.stop
+    found, quiet = None, None
+    if lines is not None:
+        signals = [name for name in (output, input) if name is not None]
+        quiet = look_for_hum(log, signals, excitation, Lines.parse(lines[0], log.rate_hz, lines[1]))
+    unrecognised = ""
+    if excitation is not None and not (quiet is not None and quiet.constant):
+        try:
+            w = beginning(log, excitation)
+            found = recognise(w, log.rate_hz, None if output is None else beginning(log, output))
+        except LivebodeError as error:
+            if quiet is None:
+                raise
+            unrecognised = str(error)
+    return Inspection(log, samples, list(summaries.values()), gaps, missing, found, quiet, unrecognised)

@@ -1,0 +1,187 @@
+"""Settings of a tracker from an Axis and its recording; "auto" values are determined here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from livebode.configuration.axis import Axis
+from livebode.core import Block, ConfigError, Lines, SignalError, SpectraLayout
+from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.estimation.settings import nearest_hop
+from livebode.preparation.checks import PERIODS_COMPARED, check_length, check_period
+from livebode.preparation.follower import Follower
+from livebode.preparation.roles import ROLES, check_distinct, check_roles
+from livebode.preparation.spectra_plan import check_spectra
+from livebode.sources import Log
+
+LIVE_RESPONSES_PER_S = 20.0
+"""Default for a live source: sufficient for display, with a tenth of the work of a hop of a twentieth of the window."""
+_LOOKED_AT = 1 << 22  # samples that "auto" uses: half an hour at 2 kHz, and 100 MB of work
+_ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
+
+
+class Recorded(Protocol):
+    """A source of Blocks that begins at the first sample."""
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
+
+
+def make_follower(axis: Axis, log: Log) -> Follower:
+    """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
+    return _follower(axis, make_settings(axis, log))
+
+
+def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
+    """The same for a live source: samples, whose lines and window must be given, or spectra of a layout."""
+    if layout is not None:
+        lines = check_spectra(axis, layout, rate_hz)
+        return SpectraTracker(_settings(axis, rate_hz, lines, layout.hop), layout)
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if frequencies == "auto" or window == "auto":
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', which needs a recording",
+            "set lines.frequencies and lines.window for a live source",
+            key="lines",
+        )
+    lines = Lines.parse(frequencies, rate_hz, window)
+    hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
+    return _follower(axis, _settings(axis, rate_hz, lines, hop))
+
+
+def _follower(axis: Axis, settings: Settings) -> Follower:
+    if axis.motion is None:
+        return Tracker(settings)
+    # The simulation, which its model needs, is slow to import.
+    from livebode.motion import MotionCorrection
+
+    chunk_samples = round(axis.motion.chunk_s * settings.lines.rate_hz)
+    if chunk_samples < 2 * settings.lines.window:
+        raise ConfigError(
+            "value-invalid",
+            f"motion.chunk_s = {axis.motion.chunk_s:g} is {chunk_samples} samples, less than two windows of "
+            f"{settings.lines.window}",
+            "set it to the duration of a stroke",
+            key="motion.chunk_s",
+            value=axis.motion.chunk_s,
+            window=settings.lines.window,
+        )
+    return MotionCorrection(
+        settings, radius_m=axis.motion.radius_m, chunk_samples=chunk_samples, driven_by=axis.motion.driven_by
+    )
+
+
+def make_settings(axis: Axis, log: Log) -> Settings:
+    """The tracker's settings for this recording; LivebodeError if they do not fit it or each other."""
+    settings = _settings(axis, log.rate_hz, _lines(axis, log))
+    if settings.method.reference == "excitation" and settings.excitation and axis.lines.window != "auto":
+        check_period(beginning(log, settings.excitation, PERIODS_COMPARED * settings.lines.window), settings)
+    return settings
+
+
+def _settings(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None) -> Settings:
+    signals, tracking = axis.signals, axis.tracking
+    settings = Settings(
+        lines=lines,
+        output=signals.output,
+        input=signals.input,
+        excitation=signals.excitation,
+        schedule=signals.schedule,
+        estimator=tracking.estimator,
+        loop=axis.loop.build(rate_hz),
+        quantity=tracking.quantity,
+        hop=hop or tracking.hop,
+        average=tracking.average,
+        forgetting=tracking.forgetting,
+        noise=tracking.noise,
+        differenced=tuple(tracking.differenced),
+        hann=tracking.hann,
+        spikes=tuple(tracking.spikes),
+        dtype=tracking.dtype,
+        ripple=_ripple(axis),
+    )
+    if not tracking.accept_roles:
+        check_distinct(settings)
+    return settings
+
+
+def _ripple(axis: Axis) -> tuple[RippleOrder, ...]:
+    """Ripple orders from the configuration, else those that its baseline has learned."""
+    if axis.tracking.ripple or axis.monitoring.baseline is None or axis.signals.schedule is None:
+        return tuple(RippleOrder(*order) for order in axis.tracking.ripple)
+    from livebode.monitoring import Baseline  # with the simulation
+
+    machine = Baseline.load(axis.monitoring.baseline).machine
+    if machine is None:
+        return ()
+    amplitudes = machine.ripple.amplitude_n_m * 2**0.5  # of sine and cosine each
+    return tuple(RippleOrder(float(k), float(a)) for k, a in zip(machine.ripple.cycles_per_m, amplitudes) if a > 0)
+
+
+def _lines(axis: Axis, log: Log) -> Lines:
+    frequencies, window = axis.lines.frequencies, axis.lines.window
+    if window != "auto":
+        check_length(log.samples, window)
+    if frequencies != "auto" and window != "auto":
+        return Lines.parse(frequencies, log.rate_hz, window)
+    reference = axis.signals.input if axis.tracking.estimator == "direct" else axis.signals.excitation
+    if reference is None:
+        raise ConfigError(
+            "auto-needs-recording",
+            "lines or window are 'auto', but signals.excitation is missing",
+            "name its channel",
+            key="signals.input" if axis.tracking.estimator == "direct" else "signals.excitation",
+        )
+    # Its statistics take half a second to import; a run with known lines does not need them.
+    from livebode.excitation import recognise
+
+    found = recognise(beginning(log, reference), log.rate_hz)
+    if window == "auto":
+        window = found.period
+    if frequencies != "auto":
+        return Lines.parse(frequencies, log.rate_hz, window)
+    if window % found.period:
+        raise SignalError(
+            "wrong-period",
+            f"the excitation repeats every {found.period} samples, which does not divide the {window=}",
+            f"set lines.window to a multiple of {found.period}, or to 'auto'",
+            channel=reference,
+            key="lines.window",
+            period=found.period,
+            window=window,
+        )
+    times = window // found.period
+    return Lines(
+        tuple(k * times for k in found.lines.bins), window, log.rate_hz, tuple(k * times for k in found.lines.quiet)
+    )
+
+
+def beginning(log: Log, channel: str, samples: int = _LOOKED_AT) -> np.ndarray:
+    """The first samples of a channel, with NaN where some are missing."""
+    return np.asarray(beginnings(log, [channel], samples)[0])
+
+
+def beginnings(log: Recorded, channels: Sequence[str], samples: int) -> np.ndarray:
+    """The same of several channels, shape (channels, samples)."""
+    parts: list[np.ndarray] = []
+    size = 0
+    for block in log.blocks(list(channels)):
+        missing = block.start - size
+        parts += [np.full((len(channels), missing), np.nan), np.array([block[name] for name in channels])]
+        size = block.stop
+        if size >= samples:
+            break
+    return np.concatenate(parts, axis=1)[:, :samples] if parts else np.zeros((len(channels), 0))
+
+
+def roles_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[str]:
+    """Doubts about the roles of the channels, as sentences; SignalError if one is certain and not accepted."""
+    names = {role: name for role in ROLES if (name := settings.channel(role))}
+    samples = min(_LOOKED_AT, max(_ROLES_SAMPLES, _ROLES_WINDOWS * settings.lines.window)) + 1
+    channels = list(dict.fromkeys(names.values()))
+    rows = dict(zip(channels, beginnings(log, channels, samples)))
+    signals = {role: rows[name] for role, name in names.items()}
+    return check_roles(signals, settings, accepted=axis.tracking.accept_roles)

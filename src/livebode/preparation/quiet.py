@@ -1,0 +1,96 @@
+"""Mains hum in a recording without excitation, or in a pause of the excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from livebode.core import Lines, SignalError
+from livebode.estimation.hum import SECONDS_MIN, Hum, find_hum
+from livebode.preparation.plan import beginnings
+from livebode.sources import Log
+
+_SAMPLES_MAX = 1 << 22  # that are searched
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """The longest stretch without excitation, and the hum in it.
+
+    Attributes
+    ----------
+    lines
+        Lines to be measured later.
+    first, samples
+        First sample and length of the stretch.
+    found
+        Tones, and the lines that each disturbs.
+    units
+        Units of the signals.
+    constant
+        Whether the excitation never changes in the searched samples.
+    """
+
+    lines: Lines
+    first: int
+    samples: int
+    found: list[tuple[Hum, list[float]]]
+    units: dict[str, str]
+    constant: bool
+
+    def plain(self) -> dict[str, Any]:
+        """As plain data, for JSON."""
+        tones = [
+            {"frequency_hz": hum.frequency_hz, "amplitude": dict(hum.amplitude), "disturbed_lines_hz": disturbed}
+            for hum, disturbed in self.found
+        ]
+        return {"first": self.first, "samples": self.samples, "units": self.units, "hum": tones}
+
+
+def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines: Lines) -> Quiet:
+    """Hum in the longest stretch in which the excitation does not change; without excitation, in the whole recording.
+
+    A tone disturbs a line if their distance is less than half a bin of its window; a design excludes such lines.
+
+    Raises
+    ------
+    SignalError
+        If that stretch is shorter than two seconds.
+    """
+    names = list(dict.fromkeys([*signals, *([excitation] if excitation else [])]))
+    rows = dict(zip(names, beginnings(log, names, _SAMPLES_MAX)))
+    silent = np.all([np.isfinite(x) for x in rows.values()], axis=0)
+    constant = True
+    if excitation:
+        w = rows[excitation]
+        constant = np.unique(w[np.isfinite(w)]).size < 2
+        silent[1:] &= (w[1:] == w[:-1]) & np.isfinite(w[1:])
+    first, stop = _longest(silent)
+    if excitation and stop - first < SECONDS_MIN * lines.rate_hz:
+        raise SignalError(
+            "pause-too-short",
+            f"{excitation!r} pauses for {(stop - first) / lines.rate_hz:.3g} s at most, but the search for hum needs "
+            f"{SECONDS_MIN:g} s or more without excitation",
+            "record such a pause, or omit the lines",
+            channel=excitation,
+            pause_s=float((stop - first) / lines.rate_hz),
+            limit_s=float(SECONDS_MIN),
+        )
+    found = find_hum({name: rows[name][first:stop] for name in dict.fromkeys(signals)}, lines.rate_hz)
+    f = lines.frequency_hz
+    near = [f[np.abs(f - hum.frequency_hz) <= lines.resolution_hz / 2].tolist() for hum in found]
+    known = {channel.name: channel.unit for channel in log.channels}
+    units = {name: known.get(name, "") for name in signals}
+    return Quiet(lines, first, stop - first, list(zip(found, near)), units, constant)
+
+
+def _longest(flags: np.ndarray) -> tuple[int, int]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    if not edges.size:
+        return 0, 0
+    first, stop = edges[::2], edges[1::2]
+    at = int(np.argmax(stop - first))
+    return int(first[at]), int(stop[at])

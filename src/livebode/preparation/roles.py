@@ -1,0 +1,245 @@
+"""Whether the channels can have their specified roles: excitation, input and output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import SignalError
+from livebode.estimation import Settings
+from livebode.estimation.estimators import Role
+from livebode.preparation.role_shapes import direct, lags, limit, mean_deg, sized, slope, wide
+from livebode.preparation.role_spectra import RoleSpectra, role_spectra
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+ROLES: tuple[Role, ...] = ("excitation", "input", "output")
+_OPEN_LOOP = "for an open loop set tracking.estimator to 'direct' and name only that input"
+_ACCEPT = "to keep these roles, set tracking.accept_roles"
+# Repeating share of a variance: all of a command, almost nothing of a moving axis.
+_REPEATING_MIN, _REPEATING_USUAL = 0.1, 0.5
+_WINDOWS_MIN, _PAIRS_MIN = 8, 16  # fewer cannot show noise
+_RETURNING_MAX = 0.25  # of noise's power: an excitation below that is dominated by leakage
+# Gain over frequency, as an exponent. A machine's gain falls, except between an antiresonance and the resonance
+# above it. The width of that zone is the square root of the inertia ratio: a factor of 6 needs a ratio above 35.
+_RISES, _RISES_CLEARLY, _ZONE, _ZONE_MAX = 0.15, 0.5, 3.0, 6.0
+_LAGGING_MAX = 0.25  # of the lines: below such a zone and above it a machine lags
+_RESPONSE_INPUT, _RESPONSE_OUTPUT, _RESPONSE_ITSELF = 1.0, 0.75, -0.75
+_LOOP_DOUBTFUL, _LOOP_WRONG, _SIGMAS = 0.1, 0.5, 5.0
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """Finding, remedy, whether it is certain, and the channels concerned."""
+
+    message: str
+    remedy: str
+    certain: bool
+    channels: tuple[str | None, ...]
+
+    @property
+    def sentence(self) -> str:
+        """Message and remedy."""
+        return f"{self.message}; {self.remedy}"
+
+
+def check_distinct(settings: Settings) -> None:
+    """SignalError if two roles that the estimator distinguishes have the same channel."""
+    for one, other in combinations(ROLES, 2):
+        name = settings.channel(one)
+        if name is None or name != settings.channel(other):
+            continue
+        open_loop = (one, other) == ("excitation", "input")
+        if not (open_loop and settings.method.reference == "input"):
+            remedy = _OPEN_LOOP if open_loop else "name another"
+            raise SignalError(
+                "role-shared",
+                f"{name!r} is both the {one} and the {other}",
+                f"{remedy}; {_ACCEPT}",
+                channel=name,
+                roles=[one, other],
+                key="tracking.accept_roles",
+            )
+
+
+def suspicions(signals: Mapping[Role, Floats], settings: Settings) -> list[Suspicion]:
+    """All doubts about the roles, from the beginning of a recording, by role, with NaN for missing samples.
+
+    It detects: two roles with the same samples; an excitation that does not repeat, or that is a response of the
+    machine; an input of noise; an output that is unrelated to the excitation; input and output exchanged; for the
+    indirect estimator a description of the loop that contradicts the measured input. A machine whose gain rises over
+    its whole band, up to six times the lowest line, cannot be distinguished from one with exchanged signals.
+    """
+    found = list(_copies(signals, settings))
+    spectra = role_spectra(signals, settings)
+    if spectra is None or any(one.certain for one in found):
+        return found
+    rules: tuple[Callable[[RoleSpectra], Suspicion | None], ...] = (
+        _not_repeating, _answering_excitation, _noise_as_input, _exchanged, _contradicting_loop, _without_answer,
+    )  # fmt: skip
+    with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule rejects
+        return found + [one for rule in rules if (one := rule(spectra)) is not None]
+
+
+def _copies(signals: Mapping[Role, Floats], settings: Settings) -> Iterator[Suspicion]:
+    for one, other in combinations([role for role in ROLES if role in signals], 2):
+        if settings.channel(one) != settings.channel(other) and np.array_equal(
+            signals[one], signals[other], equal_nan=True
+        ):
+            names = f"{settings.channel(one)!r} ({one}) and {settings.channel(other)!r} ({other})"
+            certain = other == "output"
+            remedy = "name the channel of the machine's output" if certain else "correct only without feedback"
+            both = settings.channel(one), settings.channel(other)
+            yield Suspicion(f"{names} have the same samples", f"{remedy}; {_ACCEPT}", certain, both)
+
+
+def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
+    settings = spectra.settings
+    if settings.method.reference != "excitation" or spectra.repeating >= _REPEATING_USUAL:
+        return None
+    return Suspicion(
+        f"{settings.excitation!r} does not repeat like an excitation: "
+        f"{100 * max(spectra.repeating, 0.0):.2g} % of its variance repeats every {settings.lines.window} samples",
+        f"name the channel of the signal that is added, or find it with `livebode inspect`; {_ACCEPT}",
+        spectra.repeating < _REPEATING_MIN,
+        (settings.excitation,),
+    )
+
+
+def _answering_excitation(spectra: RoleSpectra) -> Suspicion | None:
+    """A position as excitation: it falls with frequency, and the signal that should respond to it rises."""
+    settings, f = spectra.settings, spectra.frequency_hz
+    if settings.method.reference != "excitation" or spectra.exact or not wide(f, _ZONE):
+        return None
+    own = slope(f, np.sqrt(np.mean(np.abs(spectra.spectra["excitation"]) ** 2, axis=0)))
+    slopes = {role: slope(f, spectra.ratio(role, "excitation")) for role in ROLES[1:] if role in spectra.spectra}
+    inputs, outputs = slopes.get("input", np.inf) >= _RESPONSE_INPUT, slopes["output"] >= _RESPONSE_OUTPUT
+    if own > _RESPONSE_ITSELF or not inputs or not (outputs or "input" in slopes):
+        return None
+    role: Role = "input" if "input" in slopes else "output"
+    return Suspicion(
+        f"{settings.excitation!r} looks like a response of the machine, not like an excitation: it falls with "
+        f"f^{own:.1f}, and {settings.channel(role)!r} over it rises with f^{slopes[role]:.1f}",
+        f"name the channel of the signal that is added; {_ACCEPT}",
+        outputs,
+        (settings.excitation,),
+    )
+
+
+def _noise_as_input(spectra: RoleSpectra) -> Suspicion | None:
+    settings = spectra.settings
+    if settings.method.reference != "input":
+        return None
+    returning, pairs = spectra.returns("input")
+    if pairs < _PAIRS_MIN or not np.all(returning < min(limit(len(returning), pairs), _RETURNING_MAX)):
+        return None
+    return Suspicion(
+        f"{settings.input!r} is noise at all {len(returning)} lines: at most {100 * returning.max():.2g} % of its "
+        f"power repeats every {settings.lines.window} samples, so that a window leaks",
+        f"name the excited input, or estimate with livebode.welch in Python; {_ACCEPT}",
+        True,
+        (settings.input,),
+    )
+
+
+def _exchanged(spectra: RoleSpectra) -> Suspicion | None:
+    """Input and output exchanged: the specified output follows the excitation, or leads the input."""
+    settings, f = spectra.settings, spectra.frequency_hz
+    if "input" not in spectra.spectra or not wide(f, _ZONE):
+        return None
+    plant = spectra.ratio("output", "input")
+    rising = slope(f, plant)
+    leading = bool(np.mean([lags(one) for one in np.degrees(np.angle(plant))]) < _LAGGING_MAX)
+    shown = None
+    if "excitation" in spectra.spectra:
+        output, input_ = _upper(spectra, "output"), _upper(spectra, "input")
+        if direct(input_) and not direct(output):
+            return None
+        follows = direct(output) and not direct(input_)
+        if follows and (lags(mean_deg(input_)) or rising > _RISES):
+            shown = (
+                f"{settings.output!r} is a share of the excitation {settings.excitation!r} ({sized(output)}), "
+                f"{settings.input!r} is not ({sized(input_)})"
+            )
+            certain = leading or lags(mean_deg(input_))
+    if shown is None and rising > _RISES and not lags(mean_deg(plant)):
+        leads = f"the output leads the input by {mean_deg(plant) % 360:.0f}° on average"
+        shown = f"{leads}, and the gain rises with f^{rising:.2g}"
+        certain = rising > _RISES_CLEARLY and leading and wide(f, _ZONE_MAX)
+    if shown is None:
+        return None
+    names = f"{settings.input!r} as input and {settings.output!r} as output look exchanged"
+    return Suspicion(f"{names}: {shown}", f"exchange them; {_ACCEPT}", certain, (settings.input, settings.output))
+
+
+def _upper(spectra: RoleSpectra, role: Role) -> Complex:
+    """Response from the excitation at the plant input to a signal, at the upper half of the lines."""
+    entry = spectra.settings.loop.entry_at(spectra.frequency_hz)
+    return np.asarray(spectra.ratio(role, "excitation") / entry)[len(entry) // 2 :]
+
+
+def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
+    """Joint against indirect: their quotient is (E·W − F·Y)/U, 1 if the description of the loop is correct."""
+    settings, f = spectra.settings, spectra.frequency_hz
+    if "input" not in spectra.spectra or not settings.method.through_loop:
+        return None
+    w, u, y = (spectra.spectra[role] for role in ROLES)
+    described = settings.loop.entry_at(f) * w - settings.loop.feedback_at(f) * y
+    reference = w.conj()
+    measured = np.sum(u * reference, axis=0)
+    quotient = np.sum(described * reference, axis=0) / measured
+    rest = np.abs(described - quotient * u) ** 2 * np.abs(w) ** 2
+    sigma = np.sqrt(np.sum(rest, axis=0)) / np.abs(measured)
+    away = np.where(np.abs(quotient - 1) > _SIGMAS * sigma, np.abs(quotient - 1), 0.0)
+    worst = int(np.nanargmax(away)) if np.isfinite(away).any() else 0
+    if not away[worst] > _LOOP_DOUBTFUL:
+        return None
+    return Suspicion(
+        f"the description of the loop contradicts {settings.input!r}: at {f[worst]:g} Hz it predicts "
+        f"{abs(quotient[worst]):.3g} times the measured input, so the indirect estimate is off by that",
+        f"check the gains and units in [loop], or set tracking.estimator to 'joint'; {_ACCEPT}",
+        bool(away[worst] > _LOOP_WRONG),
+        (settings.input,),
+    )
+
+
+def _without_answer(spectra: RoleSpectra) -> Suspicion | None:
+    """An output, or an input, that is unrelated to the reference: possible with correct roles, but useless."""
+    if spectra.windows < _WINDOWS_MIN:
+        return None
+    chance = limit(len(spectra.frequency_hz), spectra.windows)
+    for role in ("input", "output"):
+        if role not in spectra.spectra or role == spectra.settings.method.reference:
+            continue
+        coherence = spectra.coherence(role)
+        if np.all(coherence < chance):
+            reference = spectra.settings.channel(spectra.settings.method.reference)
+            return Suspicion(
+                f"{spectra.settings.channel(role)!r} ({role}) does not respond to {reference!r} at any line: their "
+                f"coherence over {spectra.windows} windows is at most {coherence.max():.2g}",
+                "name another channel, or raise the amplitude",
+                False,
+                (spectra.settings.channel(role),),
+            )
+    return None
+
+
+def check_roles(signals: Mapping[Role, Floats], settings: Settings, *, accepted: bool) -> list[str]:
+    """Doubts as sentences; SignalError if one is certain, except if the roles are `accepted`."""
+    found = suspicions(signals, settings)
+    certain = [one for one in found if one.certain]
+    if certain and not accepted:
+        worst = certain[0]
+        raise SignalError(
+            "role-wrong",
+            worst.message,
+            worst.remedy,
+            channels=[name for name in worst.channels if name],
+            key="tracking.accept_roles",
+        )
+    return [one.sentence for one in found]

@@ -1,0 +1,83 @@
+"""Number of periods at the beginning of a recording that differ from the later ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Event, counted
+from livebode.estimation import Movement, Settings
+from livebode.estimation.movement import PLACES
+from livebode.excitation.blocks import cut, spectra
+from livebode.excitation.prepare import filled
+from livebode.excitation.transient import leading, unlike
+from livebode.preparation.aligned import AlignedLog
+from livebode.preparation.plan import beginnings
+from livebode.preparation.roles import ROLES
+
+Floats = NDArray[np.float64]
+
+_PERIODS, _SAMPLES_MAX = 64, 1 << 20  # that are searched, at most
+_PERIODS_MIN = 8
+_SHARE_MAX = 1 / 4  # of the examined periods; more is not a transient, but another state of the machine
+
+
+def leading_transient(log: AlignedLog, settings: Settings) -> int:
+    """Periods at the beginning that differ from the steady state in a signal of the estimate, as `inspect` finds them.
+
+    0 for a machine that moves, by its schedule, whose periods differ anyway; for fewer than eight periods; and if
+    more than a quarter would be excluded.
+    """
+    window = settings.lines.window
+    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
+    channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
+    return transient_periods(
+        dict(zip(channels, beginnings(log, channels, min(_PERIODS * window, _SAMPLES_MAX)))), settings
+    )
+
+
+def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
+    """The same in signals by the names of their channels, of which the first 64 periods count."""
+    window = settings.lines.window
+    size = min(_PERIODS * window, _SAMPLES_MAX)
+    found = {name: x[:size] for name, x in signals.items()}
+    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
+    count = found[names[0]].size // window
+    if count < _PERIODS_MIN or (settings.schedule and _moves(found[settings.schedule], window)):
+        return 0
+    excited = np.zeros((window + 1) // 2, dtype=np.bool_)
+    excited[list(settings.lines.bins)] = True
+    first = max(_transient(found[name], window, excited) for name in names)
+    return first if first <= _SHARE_MAX * count else 0
+
+
+def _transient(x: np.ndarray, window: int, excited: np.ndarray) -> int:
+    if np.count_nonzero(np.isfinite(x)) < window:
+        return 0
+    blocks = cut(filled(x), window)
+    # An interpolated period differs from the others, but not because of the machine.
+    whole = np.flatnonzero(np.isfinite(x[: blocks.size]).reshape(blocks.shape).all(axis=1))
+    count = leading(unlike(blocks[whole], spectra(blocks[whole]), excited))
+    return int(whole[count - 1]) + 1 if count else 0
+
+
+def _moves(schedule: np.ndarray, window: int) -> bool:
+    """Whether the machine moves after the longest possible transient, in which it may settle."""
+    settled = schedule[int(_SHARE_MAX * schedule.size) // window * window :]
+    step = max(1, window // PLACES)
+    periods = settled[: settled.size // window * window].reshape(-1, window)[:, : window // step * step : step]
+    return bool(Movement(periods.shape[1]).process(0, periods.ravel()).any())
+
+
+def transient_event(periods: int, settings: Settings, first: int = 0, time_s: float = 0.0) -> Event:
+    """Event for the excluded samples up to the steady state, at sample `first`, where the excitation begins."""
+    samples = first + periods * settings.lines.window
+    which = "period differs" if periods == 1 else f"{periods} periods differ"
+    before = "with the samples before them, " if first else ""
+    message = (
+        f"the first {which} from the steady state: {before}{counted(samples, 'sample')} "
+        f"({samples / settings.lines.rate_hz:.4g} s) are excluded; --all-periods includes them"
+    )
+    return Event("transient", first, time_s, message, {"periods": periods, "samples": samples})

@@ -1,0 +1,51 @@
+"""Results of the monitoring of a run, as findings of a verdict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from livebode.core import Event
+from livebode.core.document import Finding, Tone
+from livebode.records import Run
+from livebode.reporting.happenings import EventSummary
+from livebode.reporting.wording import many
+
+_ACTIVE_MAX = 5
+
+
+def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
+    """The summary of the monitoring, then the active alarms."""
+    monitoring: dict[str, Any] = run.summary.get("monitoring", {})
+    if not monitoring:
+        return (_so_far(run, happenings),)
+    tone: Tone = "open"
+    active = bool(monitoring.get("standing"))
+    if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
+        tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
+    latest = _newest(happenings)[-_ACTIVE_MAX:] if active else []
+    return (Finding(tone, monitoring["message"]), *(Finding("alarm", event.message) for event in latest))
+
+
+def _newest(happenings: EventSummary) -> list[Event]:
+    """The newest report of each change that has not cleared."""
+    found: dict[tuple[str, str], Event] = {}
+    for event in happenings.in_full:
+        key = str(event.details.get("what")), str(event.details.get("place_m"))
+        if event.kind in ("change", "change-corrected"):
+            found[key] = event
+        elif event.kind == "change-cleared":
+            found.pop(key, None)
+    return list(found.values())
+
+
+def _so_far(run: Run, happenings: EventSummary) -> Finding:
+    """The changes so far, if run.json does not contain a summary yet."""
+    if run.finished:
+        return Finding(
+            "open", "Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs."
+        )
+    came, cleared = happenings.count("change"), happenings.count("change-cleared")
+    if not came:
+        return Finding("open", "No change was reported so far; the final verdict is available at the end of the run.")
+    message = f"So far {many(came, 'change')} reported, {cleared} cleared."
+    return Finding("alarm" if came > cleared else "check", message)

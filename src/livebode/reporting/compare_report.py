@@ -1,0 +1,242 @@
+"""The report of the comparison of two runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from datetime import datetime
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from livebode.analysis.changes import Change, Changes, changes, percent
+from livebode.analysis.difference import ALPHA, Compared, Difference, compare
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core.clock import moment
+from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.records import Run
+from livebode.records.grouped_events import event_counts
+from livebode.reporting.comparison_verdict import verdict
+from livebode.reporting.material import written
+from livebode.reporting.wording import BOUND_95, decibels, many, polar, signed, to_toml, with_bound
+
+_TEST = (
+    "A line differs if |G₂ − G₁|², divided by the variance of both means, exceeds a limit that chance exceeds with a "
+    "probability of {alpha:.2g}: 5 % for all {m} together (Bonferroni). For two runs of an unchanged machine, the "
+    "probability that any line differs is at most 5 %. The variance is from the scatter between windows, with degrees "
+    "of freedom by Welch and Satterthwaite."
+)
+_TONES = {**TONES, "ok": "no difference shown"}
+_LINES_SHOWN, _PLACES_SHOWN = 80, 40
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two runs compared, and the sentences, tables and document that report it."""
+
+    found: Compared
+    changes: Changes
+
+    @classmethod
+    def of(cls, before: Path, after: Path) -> Comparison:
+        """Read and compare two runs; raises the errors of `compare`."""
+        found = compare(Run.open(before), Run.open(after))
+        return cls(found, changes(found))
+
+    @property
+    def sentences(self) -> tuple[Finding, ...]:
+        """The verdict, the most urgent finding first."""
+        return verdict(self.found, self.changes)
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Tables for the terminal: ratio at each line, changes of parameters and margins."""
+        d = self.found.overall
+        rows = [
+            f"{f:>10g} Hz {signed(db):>9} ± {around:<8} dB {signed(deg):>9} ± {turned:<8} °{'  differs' * bool(on)}"
+            for f, (db, around, deg, turned), on in zip(
+                d.before.lines.frequency_hz, map(polar, d.ratio.tolist(), d.bound.tolist()), d.differs
+            )
+        ]
+        more = len(rows) - _LINES_SHOWN
+        lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} more lines; --json prints all"] * (more > 0))
+        changed = [
+            f"  {c.words:22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
+            + "  changed" * c.significant
+            for c in (*self.changes.parameters, *self.changes.margins)
+        ]
+        return tuple(filter(None, (lines, "\n".join(changed))))
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        places = [{"from": p.low, "to": p.high, "back": p.back} | _lines(p.difference) for p in self.found.places]
+        return {
+            "before": str(self.found.runs[0].path),
+            "after": str(self.found.runs[1].path),
+            "quantity": self.found.overall.before.quantity,
+            "unit": self.found.overall.before.unit,
+            "alpha": ALPHA,
+            "tested_together": self.found.overall.m,
+            "lines": _lines(self.found.overall)["lines"],
+            "places": places,
+            "parameters": [_plain_change(c) for c in self.changes.parameters],
+            "margins": [_plain_change(c) for c in self.changes.margins],
+            "warnings": list(self.found.warnings),
+            "sentences": [finding.text for finding in self.sentences],
+        }
+
+    def document(self, made: datetime) -> Document:
+        """The report."""
+        one, other = self.found.runs
+        title = f"{one.path.resolve().name} and {other.path.resolve().name}"
+        rows = (
+            ("before", str(one.path)), ("after", str(other.path)),
+            ("before written", written(one.path / "run.json")), ("after written", written(other.path / "run.json")),
+            ("responses", " and ".join(f"{a.count:,}" for a in self.found.averages)),
+            ("compared at", _span(self.found)), ("report written", moment(made.timestamp())),
+        )  # fmt: skip
+        sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
+        there = tuple(section for section in sections if section is not None)
+        return Document(
+            "Before and after", title, rows, self.sentences, there, f"{title} · livebode",
+            "What changed", _TONES,
+        )  # fmt: skip
+
+    def _response(self) -> Section:
+        d = self.found.overall
+        how = "means over the common places, each place counted alike" if self.found.places else "means of the runs"
+        caption = f"Before and after: {how}, with 95 % bounds. Below: ratio after/before, with the bound that covers "
+        caption += f"all {d.m} lines together with 95 %; filled marks differ."
+        picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
+                                         "differs": d.differs}, caption)  # fmt: skip
+        radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
+        rows = [
+            (
+                f"{f:g}", *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],
+                *polar(complex(d.after.value[i]), float(radius[1][i]))[:2],
+                *polar(complex(d.ratio[i]), float(d.bound[i])), _p(d.p[i]), "yes" if d.differs[i] else "no",
+            )
+            for i, f in enumerate(d.before.lines.frequency_hz)
+        ]  # fmt: skip
+        step = -(-len(rows) // _LINES_SHOWN)
+        shown = [row for i, row in enumerate(rows) if i % step == 0 or d.differs[i]]
+        note = f"Every {step}th line, and those that differ. " if step > 1 else ""
+        headings = ("Hz", "before dB", "±", "after dB", "±", "ratio dB", "±", "ratio °", "±", "p", "differs")
+        table = Table(headings, tuple(shown), tuple(range(10)), note + "± of the ratio: 95 % at all lines together.")
+        return Section("Frequency response", (picture, Paragraph(_TEST.format(alpha=ALPHA / d.m, m=d.m)), table))
+
+    def _places(self) -> Section | None:
+        places = self.found.places
+        if not places:
+            return None
+        caption = "Change of the magnitude at each place and line, forward and return; dots mark those that differ."
+        data = {
+            "frequency_hz": self.found.overall.before.lines.frequency_hz,
+            "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
+        }
+        found = [
+            (
+                f"{p.low:.3g} … {p.high:.3g}", "return" if p.back else "forward", f"{f:g}",
+                *polar(complex(p.difference.ratio[i]), float(p.difference.bound[i])), _p(p.difference.p[i]),
+            )
+            for p in places
+            for i, f in enumerate(p.difference.before.lines.frequency_hz)
+            if p.difference.differs[i]
+        ]  # fmt: skip
+        parts: list[Part] = [Picture("places", data, caption)]
+        if found:
+            left_out = len(found) - _PLACES_SHOWN
+            note = f"{left_out} more rows not shown; --json prints all." if left_out > 0 else ""
+            headings = ("place", "direction", "Hz", "ratio dB", "±", "ratio °", "±", "p")
+            parts.append(Table(headings, tuple(found[:_PLACES_SHOWN]), tuple(range(2, 8)), note))
+        return Section("By place", tuple(parts))
+
+    def _parameters(self) -> Section:
+        parts: list[Part] = []
+        for words, table in (
+            (self.changes.parameter_words, self.changes.parameters),
+            (self.changes.margin_words, self.changes.margins),
+        ):
+            parts += [Paragraph(words)] if words else []
+            if table:
+                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "significant")
+                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), _NOTE))
+        return Section("Parameters and margins", tuple(parts))
+
+    def _events(self) -> Section:
+        counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
+        kinds = sorted(counts[0].keys() | counts[1].keys())
+        rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
+        parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []
+        for run, when in zip(self.found.runs, ("Before", "After")):
+            message = run.summary.get("monitoring", {}).get("message", "changes are not assessed.")
+            parts.append(Paragraph(f"{when}: {message}"))
+        return Section("Events", tuple(parts))
+
+
+_NOTE = "± of before and after covers 95 % each; ± of the change covers the whole table together (Bonferroni)."
+
+
+def _settings(before: Run, after: Run) -> Section:
+    """Differences between the configurations."""
+    one, other = (set(_flat(recorded_configuration(run.summary))) for run in (before, after))
+    rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
+    if not rows:
+        return Section("Settings", (Paragraph("Both runs have the same settings."),))
+    return Section("Settings that differ", (Table(("setting", "before", "after"), rows),))
+
+
+def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
+    found = []
+    for name, value in values.items():
+        if isinstance(value, dict):
+            found += _flat(value, f"{path}{name}.")
+        else:
+            found.append((path + name, to_toml({"x": value}).removeprefix("x = ")))
+    return found
+
+
+def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
+    return next((value for name, value in lines if (name,) == key), "—")
+
+
+def _row(c: Change) -> tuple[str, ...]:
+    changed = with_bound(c.amount, c.bound)
+    return (
+        c.words, *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed, f"{percent(c, c.amount):+.2g}",
+        "yes" if c.significant else "no",
+    )  # fmt: skip
+
+
+def _plain_change(c: Change) -> dict[str, Any]:
+    return {
+        "name": c.name, "unit": c.unit, "before": c.before[0], "before_bound_95": c.before[1], "after": c.after[0],
+        "after_bound_95": c.after[1], "change": c.amount, "change_bound": c.bound, "significant": c.significant,
+    }  # fmt: skip
+
+
+def _lines(d: Difference) -> dict[str, Any]:
+    f = d.before.lines.frequency_hz
+    lines = [
+        {
+            "frequency_hz": float(f[i]), "ratio_db": decibels(abs(d.ratio[i])),
+            "ratio_deg": float(np.degrees(np.angle(d.ratio[i]))), "ratio_bound": float(d.bound[i]),
+            "p": float(d.p[i]), "differs": bool(d.differs[i]),
+        }
+        for i in range(len(f))
+    ]  # fmt: skip
+    return {"lines": lines}
+
+
+def _p(p: float) -> str:
+    return f"{p:.2g}" if isfinite(p) else "—"
+
+
+def _span(of: Compared) -> str:
+    f = of.overall.before.lines.frequency_hz
+    where = (
+        f"; {many(len(of.places), 'place')} of the schedule, forward and return counted separately" if of.places else ""
+    )
+    return f"{many(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz{where}"

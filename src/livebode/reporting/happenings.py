@@ -1,0 +1,88 @@
+"""The events of a run, grouped by kind, in bounded memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from livebode.core import Event
+from livebode.core.clock import moment
+from livebode.core.document import Paragraph, Part, Table
+from livebode.records.grouped_events import each_event, event_counts
+from livebode.reporting.wording import many
+
+ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
+"""Kinds that are listed individually; so are the events of the record itself."""
+_IN_FULL = 20  # of the first and of the newest events, each
+_LETTERS = 600
+
+
+@dataclass
+class Kind:
+    """The first and the newest event of a kind, and their number."""
+
+    first: Event
+    newest: Event
+    count: int = 0
+
+
+@dataclass
+class EventSummary:
+    """Events by kind, and the first and the newest of those that are listed individually."""
+
+    kinds: dict[str, Kind] = field(default_factory=dict)
+    early: list[Event] = field(default_factory=list)
+    late: deque[Event] = field(default_factory=lambda: deque(maxlen=_IN_FULL))
+    told: int = 0
+
+    @classmethod
+    def of(cls, events: Iterable[Event]) -> EventSummary:
+        found = cls()
+        for event in events:
+            for one in each_event(event):
+                found._add(one)
+            for kind, count in event_counts(event).items():
+                found.kinds.setdefault(kind, Kind(event, event)).count += count
+        return found
+
+    def _add(self, event: Event) -> None:
+        kind = self.kinds.setdefault(event.kind, Kind(event, event))
+        kind.newest = event
+        if event.kind not in ALARMS and not event.kind.startswith("record-"):
+            return
+        self.told += 1
+        (self.early if len(self.early) < _IN_FULL else self.late).append(event)
+
+    def count(self, kind: str) -> int:
+        """Number of events of this kind."""
+        return self.kinds[kind].count if kind in self.kinds else 0
+
+    @property
+    def in_full(self) -> list[Event]:
+        """The first and the newest alarms and events of the record, in their order."""
+        return [*self.early, *self.late]
+
+    @property
+    def left_out(self) -> int:
+        """Number of events between the first and the newest that are not retained."""
+        return self.told - len(self.early) - len(self.late)
+
+    def parts(self) -> tuple[Part, ...]:
+        """A table of the kinds, and a list of the alarms."""
+        if not self.kinds:
+            return (Paragraph("The run has no events."),)
+        rows = tuple(
+            (name, f"{k.count:,}", moment(k.first.time_s, 2), moment(k.newest.time_s, 2), k.newest.message[:_LETTERS])
+            for name, k in self.kinds.items()
+        )
+        grouped = Table(("kind", "count", "first", "newest", "newest message"), rows, (1,))
+        if not self.told:
+            return (grouped,)
+        note = (
+            f"{many(self.left_out, 'event')} between them not shown; events.jsonl contains all."
+            if self.left_out
+            else ""
+        )
+        in_full = tuple((moment(e.time_s, 2), e.kind, e.message[:_LETTERS]) for e in self.in_full)
+        return grouped, Table(("time", "kind", "message"), in_full, note=note)

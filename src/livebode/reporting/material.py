@@ -1,0 +1,144 @@
+"""The data of a report, read once from a run directory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from livebode.analysis.averaged import Averaged, averaged
+from livebode.analysis.fits import fit_averaged
+from livebode.analysis.loop_report import LoopReport, loop_report
+from livebode.analysis.parameter_track import Track, tracks
+from livebode.configuration.axis import FitSection, LoopSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import LivebodeError, Responses
+from livebode.core.clock import moment
+from livebode.fitting import Fit
+from livebode.records import Run
+from livebode.reporting.happenings import EventSummary
+
+if TYPE_CHECKING:
+    from livebode.validation import Validation
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Validation of the model: name of the recording, verdicts and notes."""
+
+    on: str
+    found: tuple[Validation, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """The data of a run that a report needs.
+
+    Attributes
+    ----------
+    run, configuration
+        The run and its complete configuration.
+    of
+        Its mean response.
+    fit, fit_words
+        The model fitted to the mean and the data of the fit; or None and the reason.
+    loop, loop_words
+        Margins of the described loop; or None and the reason.
+    tracks
+        Parameters and margins over the run, by model.
+    happenings
+        Its events.
+    judged
+        The validation, if requested.
+    """
+
+    run: Run
+    configuration: dict[str, Any]
+    of: Averaged
+    fit: Fit | None
+    fit_words: str
+    loop: LoopReport | None
+    loop_words: str
+    tracks: dict[str, Track]
+    happenings: EventSummary
+    judged: Judged | None = None
+
+    @property
+    def title(self) -> str:
+        """Name of the recording or source, for titles."""
+        source = self.configuration.get("source", {})
+        name = Path(source["log"]).name if "log" in source else source.get("url", "")
+        if "demo" in self.configuration:
+            name = "simulated belt axis"
+        return str(name or self.run.path.name)
+
+    @property
+    def described(self) -> bool:
+        """Whether the configuration describes the controllers."""
+        return any(name in self.configuration.get("loop", {}) for name in ("velocity", "position", "position_pd"))
+
+    @property
+    def samples(self) -> int:
+        """Number of tracked samples; of an unfinished run, up to its last response."""
+        return int(self.run.summary.get("counts", {}).get("samples", self.of.response.sample + 1))
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Channel names by their role."""
+        return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
+
+
+def read(directory: Path, judged: Judged | None = None) -> Material:
+    """Read the run.
+
+    Raises
+    ------
+    RecordError, SignalError
+        If the directory is not a run, cannot be read, or has no valid response.
+    """
+    run = Run.open(directory)
+    configuration, of = recorded_configuration(run.summary), averaged(run)
+    fit, fit_words = _fit(configuration, of)
+    loop, loop_words = _loop(configuration, of, fit)
+    over = tracks(run, of.overview.sample, of.overview.time_s)
+    happenings = EventSummary.of(run.each_event_and_damage())
+    return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
+
+
+def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
+    if "fit" not in configuration:
+        return None, "No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one."
+    try:
+        found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
+    except LivebodeError as error:
+        return None, f"No model was fitted: {error}."
+    return (found, words) if found.status == "ok" else (None, f"The fit to {words} was rejected: {found.sentence}.")
+
+
+def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple[LoopReport | None, str]:
+    described = LoopSection.model_validate(configuration.get("loop", {})).build(of.overview.lines.rate_hz)
+    if described.feedback is None:
+        return None, "No margins: the run's configuration does not describe the loop ([loop])."
+    if fit is None:
+        return None, "No margins: they need a fitted model, and there is none."
+    try:
+        found = loop_report(fit, "the mean", of.overview, described)
+    except LivebodeError as error:
+        return None, f"No margins: {error}."
+    return replace(found, responses=Responses.of(of.response)), ""
+
+
+def written(path: Path) -> str:
+    """Time at which a file was written; empty if the file does not exist."""
+    try:
+        return moment(path.stat().st_mtime)
+    except OSError:
+        return ""
+
+
+def by_schedule(of: Averaged) -> bool:
+    """Whether the response can be plotted over the schedule."""
+    return of.moved and bool(np.isfinite(of.overview.schedule).any())

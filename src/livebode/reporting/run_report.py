@@ -1,0 +1,73 @@
+"""The report of a run."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from livebode.core.clock import moment
+from livebode.core.document import Document, Paragraph, Section
+from livebode.reporting import sections
+from livebode.reporting.material import Judged, Material, read, written
+from livebode.reporting.measured import how
+from livebode.reporting.verdict import verdict
+from livebode.reporting.wording import duration
+
+_SECTIONS = (
+    how, sections.response, sections.tracking, sections.parameters, sections.motion, sections.margins, sections.events,
+    sections.quality, sections.validation, sections.settings, sections.versions,
+)  # fmt: skip
+
+
+def run_report(directory: Path, judged: Judged | None = None, *, made: datetime) -> Document:
+    """Build the report of a run.
+
+    The run is read once, in parts. Curves are thinned to 2048 responses; tables and means use all of them.
+
+    Parameters
+    ----------
+    directory
+        Run directory, in one piece or in segments, finished or not.
+    judged
+        Validation of its model on independent data.
+    made
+        Time of the report, for the title block.
+
+    Raises
+    ------
+    RecordError, SignalError
+        If the directory is not a run, cannot be read, or has no valid response.
+    """
+    of = read(directory, judged)
+    found = [make(of) for make in _SECTIONS]
+    absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
+    there = [section for section in found if isinstance(section, Section)]
+    version = of.run.summary.get("versions", {}).get("livebode", "")
+    return Document(
+        kind="Report of a run",
+        title=of.title,
+        facts=facts(of, made),
+        verdict=verdict(of),
+        sections=(*there, Section("Not in this report", absent)) if absent else tuple(there),
+        foot=f"{of.title} · {of.run.path.resolve().name} · livebode {version}".strip(),
+    )
+
+
+def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
+    """The title block."""
+    source = of.configuration.get("source", {})
+    log, first_s, last_s = source.get("log"), *of.of.spans_s
+    begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
+    rows = (
+        ("machine", of.title),
+        ("source", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
+        ("run", of.run.path.resolve().name),
+        ("run's clock", f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
+        ("started", moment(float(begun)) if begun is not None else ""),
+        ("duration", duration(of.samples / of.run.lines.rate_hz)),
+        ("recording written", written(Path(log)) if log else ""),
+        ("run written", written(of.run.path / "run.json")),
+        ("report written", moment(made.timestamp())),
+        ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
+    )
+    return tuple((name, value) for name, value in rows if value)

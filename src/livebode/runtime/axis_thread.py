@@ -1,0 +1,81 @@
+"""AxisThread: one axis of a session in a thread of its own."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from livebode.configuration.axis import Axis
+from livebode.core import LivebodeError
+from livebode.runtime.destination import Destination
+from livebode.runtime.following import Outcome
+from livebode.runtime.live import run_live
+from livebode.runtime.orders import Orders, StoppedError
+from livebode.runtime.recording import run
+from livebode.runtime.status import Status
+
+_logger = logging.getLogger(__name__)
+
+
+class AxisThread:
+    """Runs an axis until it ends, is stopped, or fails, without effect on the others.
+
+    Attributes
+    ----------
+    axis
+        Its present configuration.
+    orders
+        Requests to it.
+    status
+        Its status.
+    outcome, error
+        Result; one of the two after the end.
+    ended_early
+        Whether it was stopped before there was anything to record.
+    """
+
+    def __init__(self, name: str, axis: Axis, to: Destination, status: Status) -> None:
+        self.name, self.axis, self.status = name, axis, status
+        self.orders = Orders()
+        self.outcome: Outcome | None = None
+        self.error: Exception | None = None
+        self.ended_early = False
+        self._to = to
+        # The process does not wait for it: recorded data is safe, and a second signal ends the process at once.
+        self._thread = threading.Thread(target=self._work, name=f"livebode axis {name}", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        return self._thread.is_alive()
+
+    def end(self) -> None:
+        """Request its end."""
+        if self.alive:
+            self.status.state = "finishing"
+        self.orders.end()
+
+    def result(self) -> Outcome:
+        """Its result after the end; raises the error with which it failed."""
+        if self.outcome is None:
+            assert self.error is not None
+            raise self.error
+        return self.outcome
+
+    def _work(self) -> None:
+        name = self.name or "axis"
+        _logger.info("%s begins", name)
+        try:
+            job = run_live if self.axis.source.live else run
+            self.outcome = job(self.axis, self._to, self.orders)
+        except Exception as error:  # a usage error or an internal error: the other axes continue
+            self.error = error
+            nothing = isinstance(error, StoppedError) or self.status.directory is None
+            self.ended_early = self.orders.ended and nothing
+            level = logging.INFO if self.ended_early else logging.ERROR
+            internal = not isinstance(error, (LivebodeError, StoppedError))
+            _logger.log(level, "%s: %s", name, error, exc_info=error if internal else None)
+        _logger.info("%s ends", name)
+        self.status.state = "done" if self.error is None else "ended" if self.ended_early else "refused"

@@ -1,0 +1,82 @@
+"""Change: effect of an edited configuration on a running axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from livebode.configuration.axis import Axis, RecordSection
+from livebode.core import ConfigError, Event
+from livebode.runtime.orders import Orders
+from livebode.runtime.pipeline import Pipeline
+from livebode.sources.live import LiveSource
+
+_KIND = "configuration-applied"
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Request to an axis: use other record settings (`kept`), or continue in another run (`pipeline`)."""
+
+    sections: tuple[str, ...]
+    kept: RecordSection | None = None
+    pipeline: Pipeline | None = None
+
+    @property
+    def event(self) -> Event:
+        """The event that reports it."""
+        names = " and ".join(f"[{name}]" for name in self.sections)
+        how = "in place" if self.pipeline is None else "in another run, from the next sample"
+        return Event(_KIND, 0, 0.0, f"{names} changed: applied {how}", {"sections": list(self.sections)})
+
+    def tell(self, orders: Orders) -> None:
+        """Send the request; the event goes to the current record."""
+        orders.say(_KIND, self.event.message, **self.event.details)
+        if self.kept is not None:
+            orders.keep(self.kept)
+        if self.pipeline is not None:
+            orders.change(self.pipeline)
+
+
+def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
+    """The change from one configuration to the other; None if they are equal.
+
+    Raises
+    ------
+    LivebodeError
+        If the new one cannot be applied without losing samples, or does not fit the source.
+    """
+    if old == new:
+        return None
+    sections = tuple(name for name in type(new).model_fields if getattr(old, name) != getattr(new, name))
+    if source is None and old.source.live:
+        raise ConfigError(
+            "change-too-early",
+            "the live source has sent no samples yet, which are needed to check the new configuration",
+            "wait for them and save the file again, or remove the axis",
+            key="source",
+        )
+    if source is None:
+        raise ConfigError(
+            "change-needs-restart",
+            "the configuration of a recording cannot be changed while it is tracked",
+            "stop livebode and start it again",
+            keys=list(sections),
+        )
+    if "source" in sections:
+        raise ConfigError(
+            "change-needs-restart",
+            "[source] cannot be changed without losing samples",
+            "stop livebode, or remove the axis and add it again with another name",
+            keys=["source"],
+        )
+    if "serve" in sections:
+        raise ConfigError(
+            "change-needs-restart",
+            "[serve] belongs to the whole session, and cannot be changed while it runs",
+            "stop livebode first",
+            keys=["serve"],
+        )
+    kept, before = new.record or RecordSection(), old.record or RecordSection()
+    if sections == ("record",) and kept.samples == before.samples:
+        return Change(sections, kept=kept)
+    return Change(sections, pipeline=Pipeline.live(new, source))

@@ -1,0 +1,148 @@
+"""Checks of the signals of a live run: doubtful roles, a transient at the start, phase slips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Block, Event, counted
+from livebode.estimation import Settings
+from livebode.preparation.aligned import SlipSearch, bridged
+from livebode.preparation.role_spectra import role_spectra
+from livebode.preparation.roles import ROLES, suspicions
+from livebode.preparation.transients import transient_event, transient_periods
+
+_WINDOWS, _SECONDS, _SAMPLES_MAX = 32, 10.0, 1 << 22  # length of a stretch that is judged, whichever is longer
+_EXCITED_MIN = 16  # windows with power in it, to distinguish noise from a response
+_SLIP_PERIODS = 32  # that are searched at a time
+
+
+class LiveChecks:
+    """Judges stretches of the signals until one is excited, and always searches the excitation for phase slips.
+
+    It stops and changes nothing; findings are events.
+
+    Parameters
+    ----------
+    settings
+        Settings of the follower.
+    channels
+        Channels of the Blocks that are used.
+    roles, transient
+        Whether the roles are judged, and whether the run may begin with a transient.
+    judged
+        Called once, when a stretch was judged.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        channels: list[str],
+        *,
+        roles: bool,
+        transient: bool,
+        judged: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._settings, self._channels, self._tell_judged = settings, channels, judged
+        self._roles, self._transient = roles, transient
+        lines = settings.lines
+        self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
+        self._stretch = _Stretch()
+        self._reference = settings.excitation if settings.method.reference == "excitation" else None
+        self._slips = SlipSearch(lines.window)
+        self._searched = _Stretch()
+
+    def over(self, blocks: Iterable[Block], say: Callable[[Event], None]) -> Iterator[Block]:
+        """The same Blocks; findings are reported before the next one is requested."""
+        for block in blocks:
+            yield block
+            for event in self.take(block):
+                say(event)
+
+    def take(self, block: Block) -> Iterator[Event]:
+        """Findings with this Block."""
+        if not len(block):
+            return
+        if self._roles or self._transient:
+            if self._stretch.add(block, self._channels, self._size):
+                self._transient = False  # the excitation may have begun in samples that are not judged
+            if self._stretch.samples >= self._size:
+                yield from self._judged(block)
+        if self._reference is not None:
+            yield from self._slipped(block, self._reference)
+
+    def _judged(self, block: Block) -> Iterator[Event]:
+        settings = self._settings
+        start, data = self._stretch.hand_out()
+        signals = dict(zip(self._channels, data))
+        by_role = {role: signals[name] for role in ROLES if (name := settings.channel(role))}
+        spectra = role_spectra(by_role, settings)
+        if spectra is None:
+            return  # no excitation yet: the next stretch is judged
+        if spectra.windows < _EXCITED_MIN:
+            self._transient = False  # the excitation began in this stretch, not with the next one
+            return
+        if self._roles:
+            for one in suspicions(by_role, settings):
+                yield Event("roles-doubtful", start, _time_s(block, start), one.sentence)
+        if self._transient and (periods := transient_periods(signals, settings)):
+            yield transient_event(periods, settings, first=start, time_s=_time_s(block, start))
+        self._roles = self._transient = False
+        self._tell_judged()
+
+    def _slipped(self, block: Block, name: str) -> Iterator[Event]:
+        size = _SLIP_PERIODS * self._settings.lines.window
+        if self._searched.add(block, [name], 2 * size):
+            self._slips = SlipSearch(self._settings.lines.window)
+        if self._searched.samples < size:
+            return
+        start, data = self._searched.hand_out()
+        if self._slips.begins_at is None:
+            self._slips.begins_at = start
+        for slip in self._slips.take(bridged(data[0])):
+            way, what = ("forward", "missing") if slip.missing > 0 else ("back", "repeated")
+            message = (
+                f"the phase of {name!r} jumps {way} by {counted(abs(slip.missing), 'sample')} at sample {slip.sample}, "
+                f"where the source reports no gap: samples are {what}, or the generator was restarted; the "
+                "responses of the windows around it are wrong; do not restart the generator, and let the sender number "
+                "each sample when it is taken"
+            )
+            details = {"missing_samples": slip.missing}
+            yield Event("phase-slip", slip.sample, _time_s(block, slip.sample), message, details)
+
+
+class _Stretch:
+    """Consecutive samples, NaN for missing ones."""
+
+    def __init__(self) -> None:
+        self.start = self.samples = 0
+        self._begun = False
+        self._parts: list[NDArray[np.float64]] = []
+
+    def hand_out(self) -> tuple[int, NDArray[np.float64]]:
+        """Number of the first sample, and all samples; the next sample is expected directly after them."""
+        start, data = self.start, np.concatenate(self._parts, axis=1)
+        self._begin(start + self.samples)
+        return start, data
+
+    def add(self, block: Block, channels: list[str], samples_max: int) -> bool:
+        """Append; True if it begins again instead, after a loss that is too long or of unknown length."""
+        missing = block.start - self.start - self.samples
+        again = self._begun and (not 0 <= missing <= samples_max or (block.gap and not missing))
+        if again or not self._begun:
+            self._begin(block.start)
+            missing = 0
+        if missing:
+            self._parts.append(np.full((len(channels), missing), np.nan))
+        self._parts.append(np.array([block[name] for name in channels]))
+        self.samples += missing + len(block)
+        return again
+
+    def _begin(self, start: int) -> None:
+        self.start, self.samples, self._parts, self._begun = start, 0, [], True
+
+
+def _time_s(block: Block, sample: int) -> float:
+    return block.origin_s + sample / block.rate_hz

@@ -1,0 +1,97 @@
+"""Pipeline: processing of the samples of an axis, from the tracker to the alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from livebode.configuration.axis import Axis
+from livebode.core import LivebodeError, SignalError, nearest_name
+from livebode.preparation.follower import Follower
+from livebode.preparation.plan import live_follower
+from livebode.runtime.fits import Fits
+from livebode.runtime.stateful import Stateful
+from livebode.runtime.watching import Watching, make_watching
+from livebode.sources.live import LiveSource
+
+
+@dataclass(frozen=True, eq=False)
+class Pipeline:
+    """Processing of the samples of an axis; new, it has no state yet.
+
+    Attributes
+    ----------
+    axis
+        Configuration from which it was created; None if it was assembled in Python.
+    follower
+        Turns samples into responses.
+    fits
+        A model fitted to each response, if one is configured.
+    watching
+        Detects changes, or reports that it cannot.
+    """
+
+    follower: Follower
+    fits: Fits | None = None
+    watching: Watching | None = None
+    axis: Axis | None = None
+
+    @classmethod
+    def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
+        """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
+        settings = follower.settings
+        return cls(follower, Fits.of(axis.fit, settings.loop), make_watching(axis, settings, samples=samples), axis)
+
+    @classmethod
+    def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
+        """The same for a live source, whose channels and rate are known; LivebodeError if they do not fit."""
+        pipeline = cls.of(axis, live_follower(axis, source.rate_hz, source.spectra), samples=source.spectra is None)
+        names = [channel.name for channel in source.channels]
+        for name in pipeline.channels:
+            if name not in names:
+                raise SignalError(
+                    "channel-unknown",
+                    f"there is no channel {name!r}",
+                    nearest_name(name, names),
+                    channel=name,
+                    allowed=names,
+                )
+        return pipeline
+
+    @property
+    def signals(self) -> list[str]:
+        """Channels that the follower correlates."""
+        settings = self.follower.settings
+        return [name for role in settings.roles if (name := settings.channel(role))]
+
+    @property
+    def channels(self) -> list[str]:
+        """All channels in use, each once."""
+        schedule = self.follower.settings.schedule
+        covariates = self.watching.covariates if self.watching is not None else ()
+        return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates]))
+
+    @property
+    def parts(self) -> Mapping[str, Stateful]:
+        """Stages with a state, by name."""
+        optional = {"fits": self.fits, "watching": self.watching}
+        return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
+
+    def take_over(self, before: Pipeline) -> bool:
+        """Continue with the state of the previous one, if the settings that it depends on are unchanged.
+
+        Returns whether the follower continues, so that no window is lost; else it begins again.
+        """
+        try:
+            self.follower.restore(before.follower.snapshot())
+        except LivebodeError:
+            return False
+        if self._same(before, "signals", "tracking", "loop", "motion"):
+            if self.fits and before.fits and self._same(before, "fit"):
+                self.fits.restore(before.fits.snapshot())
+            if self.watching and before.watching and self._same(before, "monitoring", "fit"):
+                self.watching.restore(before.watching.snapshot())
+        return True
+
+    def _same(self, other: Pipeline, *sections: str) -> bool:
+        return all(getattr(self.axis, name) == getattr(other.axis, name) for name in sections)

@@ -1,0 +1,57 @@
+"""One run on a recording."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from livebode.configuration.axis import Axis
+from livebode.core import Event
+from livebode.estimation import Tracker
+from livebode.preparation.aligned import AlignedLog, slip_event, slips_of
+from livebode.preparation.early_spikes import early_spikes
+from livebode.preparation.plan import make_follower, roles_in_doubt
+from livebode.preparation.transients import leading_transient, transient_event
+from livebode.runtime.destination import Destination
+from livebode.runtime.following import Outcome, Tracking
+from livebode.runtime.orders import Orders
+from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.tracking import whole
+from livebode.sources import open_log
+
+
+def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
+    """Track a recording and write a run directory; in segments if the axis has a [record].
+
+    Raises
+    ------
+    LivebodeError
+        For any error in the recording or the configuration; then nothing is written, or in segments what was recorded
+        so far remains.
+    StoppedError
+        If `orders` end it; the directory is as for an error.
+    """
+    started = time.perf_counter()
+    assert axis.source.log is not None
+    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
+    pipeline = Pipeline.of(axis, make_follower(axis, log))
+    settings = pipeline.follower.settings
+    noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
+    slips = slips_of(log, settings)
+    if slips:
+        noticed.append(slip_event(slips, settings))
+    source = AlignedLog(log, slips)
+    if not axis.tracking.all_periods and axis.motion is None and (transient := leading_transient(source, settings)):
+        source = replace(source, first=transient * settings.lines.window)
+        noticed.append(transient_event(transient, settings))
+    if isinstance(pipeline.follower, Tracker):
+        pipeline.follower.know_spikes(early_spikes(source, settings))
+    found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
+    found["left_out_samples"] = source.first
+    about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
+    outcome = whole(
+        Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders, noticed=noticed)
+    )
+    for event in noticed:
+        to.tell(event)
+    return outcome

@@ -1,0 +1,301 @@
+"""The record of a run in segments, and the states that continue at its end: the tracker and the session's counts."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from livebode.configuration.axis import RecordSection
+from livebode.core import Block, Channel, Event, Parameters, RecordError, Responses
+from livebode.core.clock import RunClock
+from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
+from livebode.records.inside import check_folder
+from livebode.records.removal import check_removable, remove
+from livebode.records.sample_table import as_rows, samples_of
+from livebode.records.segments.disk import why
+from livebode.records.segments.journal import FOLDER
+from livebode.records.segments.limits import Limits
+from livebode.records.segments.lock import Lock
+from livebode.records.segments.store import Store
+from livebode.runtime.continuing import SOURCE, Before, StreamPosition, in_pieces, offered_again
+from livebode.runtime.orders import StoppedError
+from livebode.runtime.stateful import Stateful
+
+FOUND_ON_THE_WAY = "clock", "left_out_samples"
+_INTERVAL_S = 0.5
+_PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
+_SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
+
+
+class SegmentedRun:
+    """Responses, events and, on request, samples of one run; an unfinished run in the directory is continued.
+
+    Used like `RunDirectory`, except that the Blocks pass through `feed`, and that all committed data remains after an
+    exception.
+
+    Parameters
+    ----------
+    path
+        Directory of the run.
+    kept
+        Settings of the record.
+    summary
+        run.json at the beginning: configuration and findings.
+    channels, rate_hz
+        Channels and rate of the Blocks.
+    parts
+        States that continue at the end of the record, by name: restored on entering, stored with every commit.
+    force
+        Replace an existing run instead of continuing it.
+    again
+        Whether the source begins with the same samples again each time; else its numbers continue.
+    ends
+        Whether the source has an end, at which the run is finished; without an end a stopped run can continue.
+    tell
+        Called immediately with events of the record itself.
+    waiting
+        Events that are not passed to `write_event` yet; they are stored with every commit.
+    position
+        Position of a live source, stored with every commit.
+    before
+        The run that this one continues with the next sample.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        kept: RecordSection,
+        *,
+        summary: Mapping[str, Any],
+        channels: Sequence[Channel],
+        rate_hz: float,
+        parts: Mapping[str, Stateful],
+        force: bool,
+        again: bool,
+        ends: bool,
+        tell: Callable[[Event], None],
+        waiting: Callable[[], Sequence[Event]] = tuple,
+        position: StreamPosition | None = None,
+        before: Before | None = None,
+    ) -> None:
+        self.path = path
+        self._position, self._waiting = position, waiting
+        self._followed: tuple[int, float] | None = None
+        self._new, self._waited = False, waiting()
+        self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
+        self._more: dict[str, Any] = {} if before is None else {"continues": before.name}
+        self._summary, self._rate_hz = dict(summary), rate_hz
+        self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
+        self._force, self._again, self._ends, self._tell = force, again, ends, tell
+        self._samples = samples_of(channels) if kept.samples else None
+        tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
+            {"samples": self._samples} if self._samples else {}
+        )
+        self._store = Store(path, tables, self._limits(kept))
+        self.partial = path / ".pictures.partial"
+
+    def __enter__(self) -> SegmentedRun:
+        if self._force:
+            make_way(self.path)
+        with contextlib.ExitStack() as undo:
+            undo.enter_context(self._store)
+            if self._store.last is None:
+                self._store.begin(self._named(self._summary), *self._first, self._states())
+                self._continued = False
+            else:
+                self._restore(self._store.last.states)
+                self._continued = self._new = True  # the continuation is reported as an event
+                self._followed = self._store.last.sample, self._store.last.time_s
+            self._undo = undo.pop_all()
+        self._hear()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._undo.close()
+        if kind in (KeyboardInterrupt, SystemExit, StoppedError) and self._store.last is not None:
+            self._tell(self.stopped())
+
+    def stopped(self) -> Event:
+        """Message for a run that stops here, before it is finished."""
+        last = self._store.last
+        assert last is not None
+        message = f"stopped at sample {last.sample}; the same command continues the run in {str(self.path)!r}"
+        return Event("record-stopped", last.sample, last.time_s, message)
+
+    def keep(self, kept: RecordSection) -> None:
+        """Use other record settings from now; the selection of recorded samples does not change."""
+        self._store.limits = self._limits(kept)
+
+    def _limits(self, kept: RecordSection) -> Limits:
+        return Limits(
+            interval_samples=max(1, round(_INTERVAL_S * self._rate_hz)),
+            segment_samples=max(1, round(kept.segment_s * self._rate_hz)),
+            interval_s=_INTERVAL_S,
+            budget_bytes=kept.budget_bytes,
+        )
+
+    def before(self) -> Iterator[Responses]:
+        """The newest responses of the continued run."""
+        if self._continued or "continues" in self._more:
+            run = Run.open(self.path, self._found_damaged)
+            newest = run.batches(_SEEN_AGAIN_BYTES)
+            yield next(newest, None) or run.responses()  # an empty batch contains the lines, unlike no run
+            yield from newest
+
+    @property
+    def continued(self) -> bool:
+        """Whether the run existed before."""
+        return self._continued
+
+    @property
+    def clock(self) -> list[tuple[float, float]]:
+        """Relation of the run's seconds to the time of day, as in `RunClock` and run.json."""
+        return RunClock.of(self._more).pieces
+
+    def renew(self, **found: Any) -> None:
+        """Write findings during the run to run.json."""
+        self._more |= found
+        self._store.renew(self._named(self._summary))
+
+    def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """The Blocks that are not tracked yet; each request records all results of the previous Block.
+
+        Raises
+        ------
+        RecordError
+            At the end, if the last results cannot be written.
+        """
+        for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
+            if self._samples:
+                self._store.write("samples", as_rows(block, self._samples))
+            if self._position is not None:
+                self._position.take(block)
+            yield block
+            self._followed, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
+            if self._store.due(block.stop):
+                self._commit(*self._followed)
+        if self._followed is not None:
+            self._commit(*self._followed)
+
+    def commit_while_silent(self) -> None:
+        """Record the results of the last Block, and later events, while waiting for the next one.
+
+        The last Block may be from before the run was continued.
+        """
+        if self._followed is None or not self._store.due(self._followed[0]):
+            return
+        if self._new or self._waiting() != self._waited:
+            self._commit(*self._followed)
+
+    def write(self, responses: Responses) -> None:
+        """Append responses."""
+        if len(responses):
+            self._store.write("responses", as_batch(responses))
+
+    def write_parameters(self, *parts: Parameters) -> None:
+        """Append fitted parameters and derived quantities."""
+        for parameters in parts:
+            if len(parameters):
+                self._store.write("parameters", parameter_rows(parameters))
+
+    def write_event(self, event: Event) -> None:
+        """Append an event."""
+        self._store.write_event(event)
+        self._new = True
+
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
+        """Draw the pictures, close open files and write run.json; `ends`: another run continues."""
+        check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would block at a pipe of that name
+        try:
+            shutil.rmtree(self.partial, ignore_errors=True)
+            os.mkdir(self.partial)
+            draw(self.partial)
+            for picture in self.partial.iterdir():
+                os.replace(picture, self.path / picture.name)
+        except OSError as error:
+            raise RecordError(
+                "not-written",
+                f"the pictures could not be written to {str(self.path)!r}: {why(error)}",
+                "check the disk and its permissions",
+                path=str(self.path),
+            ) from None
+        finally:
+            shutil.rmtree(self.partial, ignore_errors=True)
+        last = self._store.last
+        assert last is not None
+        # Results that were delayed until the end were written after the last commit, and belong to the present states.
+        self._store.commit(last.sample, last.time_s, self._states())
+        self._store.finish(self._named(summary), finished=self._ends or ends)
+        self._hear()
+
+    def _still_due(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        last = self._store.last
+        if last is not None and self._continued and self._again:
+            return offered_again(blocks, last.sample)
+        return iter(blocks)
+
+    def _commit(self, sample: int, time_s: float) -> None:
+        self._new, self._waited = False, self._waiting()
+        self._store.commit(sample, time_s, self._states(), self._waited)
+        self._hear()
+
+    def _hear(self) -> None:
+        for event in self._store.drain_events():
+            self._tell(event)
+
+    def _found_damaged(self, damage: Event) -> None:
+        if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # the store reports damaged journals
+            self._tell(damage)
+
+    def _states(self) -> dict[str, bytes]:
+        return {name: part.snapshot() for name, part in self._parts.items()}
+
+    def _restore(self, states: Mapping[str, bytes]) -> None:
+        before = Run.open(self.path, self._found_damaged).summary
+        now = json.loads(to_json(self._summary))
+        if states.keys() != self._parts.keys() or _identity(before) != _identity(now):
+            raise RecordError(
+                "configuration-differs",
+                f"the unfinished run in {str(self.path)!r} was started with another configuration",
+                "use that one again, choose another directory, or replace the run with force",
+                path=str(self.path),
+            )
+        for name, part in self._parts.items():
+            part.restore(states[name])
+        self._more = {name: before[name] for name in ("continues", *FOUND_ON_THE_WAY) if name in before}
+        self._store.renew(self._named(self._summary))
+
+    def _named(self, summary: dict[str, Any]) -> dict[str, Any]:
+        return self._more | summary
+
+
+def _identity(summary: Mapping[str, Any]) -> list[Any]:
+    # The segmentation of the record may change during a run; what is recorded may not.
+    configuration = dict(summary["configuration"])
+    kept = configuration.pop("record", None) or {}
+    found = {key: value for key, value in summary["found"].items() if key not in ("motion", "judged")}  # learned
+    return [configuration, found, kept.get("samples")]
+
+
+def make_way(path: Path) -> None:
+    """Remove an existing run; RecordError if the directory contains something else."""
+    if not os.path.lexists(path):
+        return
+    check_removable(path)
+    lock = Lock(path)
+    try:
+        remove(path)
+    except OSError as error:
+        raise RecordError(
+            "not-removable",
+            f"the run in {str(path)!r} cannot be removed: {why(error)}",
+            "check its permissions",
+            path=str(path),
+        ) from None
+    finally:
+        lock.release()

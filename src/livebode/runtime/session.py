@@ -1,0 +1,203 @@
+"""Session: the axes of a configuration, each in its thread, until all ended; also applies edits of the file."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from livebode.configuration.axes import Axes, ConfigurationFile
+from livebode.configuration.axis import Axis
+from livebode.core import ConfigError, Event, LivebodeError
+from livebode.runtime.axis_thread import AxisThread
+from livebode.runtime.change import Change, change_of
+from livebode.runtime.destination import Destination
+from livebode.runtime.status import Status
+
+TICK_S = 0.1
+LOOK_S = 1.0
+"""Interval of checks of the file."""
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+_logger = logging.getLogger(__name__)
+
+
+class Session:
+    """Runs axes until all ended; an axis that fails does not end the others.
+
+    SIGINT and SIGTERM end every axis with complete records; the second one calls `leave`. On SIGHUP or an edit, the
+    file is checked completely and then applied or rejected for all axes. Signals are handled in the main thread only.
+
+    Parameters
+    ----------
+    axes
+        Axes by name.
+    to
+        Destination of an axis, by name and configuration.
+    tell
+        Called with an axis's name and an event.
+    file
+        File of `axes`, if they may change.
+    leave
+        Called at the second signal with its number and a message for each unfinished run; it does not return.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        to: Callable[[str, Axis], Destination],
+        *,
+        tell: Callable[[str, Event], None],
+        leave: Callable[[int, Mapping[str, Event]], None],
+        file: ConfigurationFile | None = None,
+    ) -> None:
+        self._to, self._tell, self._leave, self._file = to, tell, leave, file
+        self.threads: dict[str, AxisThread] = {}
+        """The axes of the present configuration, by name."""
+        self.taken_out: list[AxisThread] = []
+        """Axes that an edit removed."""
+        self.ended_by = 0
+        """The signal that ended it, or 0."""
+        self._reload_asked = threading.Event()
+        self._postponed = ""
+        for name, axis in axes.items():
+            self._add(name, axis)
+
+    def run(self, look: Callable[[], None] = lambda: None) -> None:
+        """Wait until every axis ended; `look` is called ten times a second, in this thread."""
+        with self._hearing():
+            for thread in list(self.threads.values()):
+                thread.start()
+            looked_s = time.monotonic()
+            while any(thread.alive for thread in self.all):
+                time.sleep(TICK_S)
+                look()
+                asked, now = self._reload_asked.is_set(), time.monotonic()
+                if self._file is not None and not self.ended_by and (asked or now - looked_s >= LOOK_S):
+                    looked_s = now
+                    self._look_at(self._file, asked)
+
+    @property
+    def all(self) -> list[AxisThread]:
+        """Every axis that was started."""
+        return [*self.taken_out, *self.threads.values()]
+
+    def end(self) -> None:
+        """End every axis with a complete record."""
+        for thread in self.all:
+            thread.end()
+
+    def _add(self, name: str, axis: Axis, *, anew: bool = True) -> AxisThread:
+        """Start an axis that may replace records from before this session, but none of this session."""
+        to = self._to(name, axis)
+        status = Status(to.audience)
+        to = replace(to, force=to.force and anew, audience=status, tell=lambda event: self._tell(name, event))
+        self.threads[name] = AxisThread(name, axis, to, status)
+        return self.threads[name]
+
+    def _look_at(self, file: ConfigurationFile, asked: bool) -> None:
+        if not file.changed() and not asked:
+            return
+        self._reload_asked.clear()
+        try:
+            axes = file.read()
+            if finishing := self._finishing(axes):
+                self._postpone(finishing)
+                return
+            self._postponed = ""
+            changes = self._checked(axes)
+        except (LivebodeError, MemoryError) as error:
+            why = str(error) or "there is not enough memory for it"
+            self._say("configuration-refused", f"configuration rejected: {why}; the previous one stays active")
+            return
+        if axes == {name: thread.axis for name, thread in self.threads.items()}:
+            if asked:
+                self._say("configuration-applied", "the configuration is the same", record=False)
+            return
+        self._apply(axes, changes)
+
+    def _finishing(self, axes: Axes) -> str:
+        """One of these axes that was removed and whose run is not finished yet."""
+        return next((thread.name for thread in self.taken_out if thread.alive and thread.name in axes), "")
+
+    def _postpone(self, name: str) -> None:
+        """Check the file again soon: the axis begins when its previous run is finished."""
+        self._reload_asked.set()
+        if self._postponed != name:
+            self._postponed = name
+            message = f"axis {name} was removed, its run is being finished; the configuration is applied after that"
+            self._say("configuration-postponed", message, record=False)
+
+    def _checked(self, axes: Axes) -> dict[str, Change | None]:
+        """The change for each running axis; LivebodeError if one of them cannot continue with it."""
+        changes: dict[str, Change | None] = {}
+        if ("" in axes) != ("" in self.threads):
+            raise ConfigError(
+                "change-needs-restart",
+                "one axis cannot become several while it runs",
+                "stop livebode and start it again",
+                keys=["axes"],
+            )
+        for name, thread in self.threads.items():
+            if name not in axes or not thread.alive:
+                continue
+            try:
+                changes[name] = change_of(thread.axis, axes[name], thread.orders.source)
+            except LivebodeError as error:
+                raise (error.at(f"axis {name}") if name else error) from None
+        return changes
+
+    def _apply(self, axes: Axes, changes: Mapping[str, Change | None]) -> None:
+        for name, change in changes.items():
+            thread = self.threads[name]
+            if change is not None:
+                change.tell(thread.orders)
+                thread.axis = axes[name]
+                self._report(name, change.event)
+        for name in [name for name in self.threads if name not in axes]:
+            self._report(name, Event("configuration-applied", 0, 0.0, "the axis was removed and ends"))
+            self.taken_out.append(self.threads.pop(name))
+            self.taken_out[-1].end()
+        for name, axis in axes.items():
+            old = self.threads.get(name)
+            if old is None or (not old.alive and old.axis != axis):
+                self._report(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
+                self._add(name, axis, anew=False).start()
+
+    def _say(self, kind: str, message: str, *, record: bool = True) -> None:
+        self._report("", Event(kind, 0, 0.0, message))
+        for thread in self.threads.values() if record else ():
+            if thread.alive:
+                thread.orders.say(kind, message)
+
+    def _report(self, name: str, event: Event) -> None:
+        """Log and publish the result of an edit."""
+        level = logging.WARNING if event.kind == "configuration-refused" else logging.INFO
+        _logger.log(level, "%s%s", f"axis {name}: " if name else "", event.message)
+        self._tell(name, event)
+
+    @contextmanager
+    def _hearing(self) -> Iterator[None]:
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        handlers: dict[signal.Signals, Any] = dict.fromkeys(_ENDING, self._heard)
+        if self._file is not None and hasattr(signal, "SIGHUP"):
+            handlers[signal.SIGHUP] = lambda *_: self._reload_asked.set()
+        before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _heard(self, number: int, _frame: object) -> None:
+        if self.ended_by:
+            left = {t.name: t.orders.left() for t in self.all if t.alive and t.orders.left is not None}
+            self._leave(number, left)
+        self.ended_by = number
+        self.end()

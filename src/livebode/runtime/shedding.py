@@ -1,0 +1,123 @@
+"""LoadShedding: work that a live run omits when it is behind, so that no sample is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from livebode.core import Event, Responses
+from livebode.runtime.fit_budget import FitBudget
+from livebode.sources.live import LiveSource
+
+MONITORING_STOPS_S, MONITORING_RESUMES_S = 15.0, 1.0
+"""Backlog at which monitoring is omitted, and backlog at which it resumes."""
+ALARM_S, CLEARED_S = 10.0, 1.0
+"""Backlog that is reported, and backlog at which its end is reported."""
+ENDING_S = 0.5
+"""Backlog above which a stopping run makes no fits."""
+REPORT_S = 10.0
+"""Shortest interval between reports of omitted work, in seconds of machine time."""
+
+
+class LoadShedding:
+    """Decides which work a run has time for: always samples and responses, then monitoring, then fits.
+
+    If the sender waits, no samples can be lost and nothing is omitted, except after a request to end: then the backlog
+    is tracked as fast as possible.
+
+    Parameters
+    ----------
+    source
+        Source of the samples.
+    ended
+        Whether the end was requested.
+    budget
+        Budget of the fits.
+    """
+
+    def __init__(self, source: LiveSource, ended: Callable[[], bool], budget: FitBudget | None = None) -> None:
+        self._source, self._ended, self._budget = source, ended, budget or FitBudget()
+        self._monitors = True
+        self._alarm_since_s: float | None = None
+        self._longest_s = 0.0
+        self._left_out = {"fits": 0, "monitoring": 0}
+        self._since: int | None = None
+        self._reported_s = -np.inf
+
+    @property
+    def behind_s(self) -> float:
+        """Backlog in seconds of machine time, if it can cause lost samples or delay the end."""
+        return self._source.waiting_s if not self._source.waits or self._ended() else 0.0
+
+    @property
+    def _limited(self) -> bool:
+        return not self._source.waits or self._ended()
+
+    def monitors(self) -> bool:
+        """Whether there is time for monitoring."""
+        behind_s = self.behind_s
+        self._monitors = behind_s < (MONITORING_STOPS_S if self._monitors else MONITORING_RESUMES_S)
+        return self._monitors
+
+    def to_monitor(self, responses: Responses) -> bool:
+        """The same; omitted work is counted."""
+        if not self._monitors:
+            self._leave_out("monitoring", len(responses), responses)
+        return self._monitors
+
+    @contextmanager
+    def fitting(self, responses: Responses) -> Iterator[Responses]:
+        """Responses that there is time to fit, evenly spread, including the newest; they are fitted in this context."""
+        fitted = responses
+        if self._limited and len(responses):
+            behind_s = np.inf if self._ended() and self.behind_s > ENDING_S else self.behind_s
+            rows = self._budget.rows(len(responses), behind_s)
+            stride = -(-len(responses) // rows) if rows else 0
+            fitted = responses[(len(responses) - 1) % stride :: stride] if rows else responses[0:0]
+            self._leave_out("fits", len(responses) - len(fitted), responses)
+        with self._budget.spending(len(fitted)):
+            yield fitted
+
+    def drain_events(self, sample: int, time_s: float) -> list[Event]:
+        """Events at this sample: the backlog, and omitted work."""
+        return [*self._backlog(sample, time_s), *self._thinned(sample, time_s, REPORT_S)]
+
+    def finish(self, sample: int, time_s: float) -> list[Event]:
+        """Events that are not reported yet."""
+        return self._thinned(sample, time_s, 0.0)
+
+    def _leave_out(self, what: str, rows: int, responses: Responses) -> None:
+        if rows:
+            self._left_out[what] += rows
+            self._since = int(responses.sample[0]) if self._since is None else self._since
+
+    def _backlog(self, sample: int, time_s: float) -> list[Event]:
+        behind_s = self.behind_s
+        if self._alarm_since_s is None:
+            if behind_s < ALARM_S:
+                return []
+            self._alarm_since_s, self._longest_s = time_s, behind_s
+            message = (
+                f"tracking is {behind_s:.1f} s behind the machine; fits and monitoring are omitted, and samples are "
+                "lost when the queue is full; use a longer tracking.hop, fewer lines or fewer axes on this computer"
+            )
+            return [Event("backlog", sample, time_s, message, {"backlog_s": behind_s})]
+        self._longest_s = max(self._longest_s, behind_s)
+        if behind_s > CLEARED_S:
+            return []
+        since_s, self._alarm_since_s = self._alarm_since_s, None
+        message = f"tracking has caught up; the largest backlog was {self._longest_s:.1f} s"
+        details = {"backlog_s": behind_s, "longest_s": self._longest_s, "duration_s": time_s - since_s}
+        return [Event("backlog-cleared", sample, time_s, message, details)]
+
+    def _thinned(self, sample: int, time_s: float, every_s: float) -> list[Event]:
+        if self._since is None or time_s - self._reported_s < every_s:
+            return []
+        fits, judged = self._left_out["fits"], self._left_out["monitoring"]
+        details = {"fits": fits, "monitoring": judged, "first_response": self._since, "backlog_s": self.behind_s}
+        self._reported_s, self._since, self._left_out = time_s, None, {"fits": 0, "monitoring": 0}
+        message = f"no time for the fits of {fits} responses" + f" and the monitoring of {judged}" * bool(judged)
+        message += "; a simpler model or a longer tracking.hop needs less"
+        return [Event("thinned", sample, time_s, message, details)]

@@ -1,0 +1,66 @@
+"""Contents of run.json."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from livebode.analysis.loop_report import loop_report
+from livebode.core import Responses
+from livebode.core.clock import moment
+from livebode.fitting import Fit
+from livebode.kernel import instruction_set
+from livebode.preparation.follower import Follower
+from livebode.runtime.fits import Fits
+from livebode.runtime.tally import Tally
+from livebode.sources.live import LiveSource
+
+
+def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, Any]:
+    """Entries at the beginning: configuration, findings, versions."""
+    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit}
+    versions = {
+        "livebode": version("livebode"),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "instruction_set": instruction_set(),
+    }
+    return dict(about) | {"found": about.get("found", {}) | found, "versions": versions}
+
+
+def done(tracker: Follower, tally: Tally) -> dict[str, Any]:
+    """Entries at the end: counts and speed."""
+    counts, run_s = tally.counts(tracker.counts), tally.run_s
+    recorded_s = counts["samples"] / tracker.settings.lines.rate_hz
+    speed = {
+        "recorded_s": recorded_s,
+        "run_s": run_s,
+        "tracking_s": tally.tracked_s,
+        "times_real_time": recorded_s / run_s,
+        "samples_per_s": counts["samples"] / tally.tracked_s,
+    }
+    counts |= {"responses": tally.responses, "invalid_responses": tally.invalid}
+    return {"counts": counts, "speed": speed}
+
+
+def of_source(source: object) -> dict[str, Any]:
+    """Entries on a live source; none for a recording."""
+    if not isinstance(source, LiveSource):
+        return {}
+    return {"source": asdict(source.health) | {"first_sample": source.first_sample}}
+
+
+def fitted(fits: Fits | None, newest: Fit | None, responses: Responses) -> dict[str, Any]:
+    """Results of the fits, and the margins of a known loop with them."""
+    if fits is None:
+        return {}
+    summary = {"fit": fits.summary(newest)}
+    if newest is not None and fits.loop is not None:
+        words = f"newest fit, at {moment(newest.parameters.time_s[0], 2)}"
+        summary["loop"] = loop_report(newest, words, responses, fits.loop).plain()
+    return summary
