@@ -71,25 +71,25 @@ healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricit
 	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
 
 fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
-	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
-	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
-	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
-	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
-	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
+	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/sources/test_readers_fault.py
+	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/configuration/test_axes_fault.py
+	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/sources/test_live_parsers_fault.py tests/sources/test_live_variants_fault.py
+	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/structured_text/test_settings_property.py
+	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/dashboard/test_requests_fault.py
 
 damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
-	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_bit_flips.py
-	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_hostile.py
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_bit_flips_fault.py
+	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/records/test_hostile_run_fault.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
-	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
-	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/fault/test_live_killed.py  # they mostly wait
+	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/records/test_live_kills_fault.py  # they mostly wait
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak
 
 attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
-	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/fault/test_dashboard_attacks.py
+	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/dashboard/test_attacks_fault.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq

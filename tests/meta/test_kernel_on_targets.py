@@ -6,7 +6,7 @@ import pytest
 
 from bench.firmware import KERNEL, M4F, M7, ROOT, kept, run, undefined
 from bench.mcu import LIMIT, TABLES, count
-from tests.targets import need_tools
+from tests.support.targets import need_tools
 
 STEP = ("push", "queue", "read", "count", "instruction_set")
 # What libgcc has for a processor: divisions of 64 bits, and the double precision that a Cortex-M4F does without.
