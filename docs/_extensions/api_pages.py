@@ -63,7 +63,9 @@ def write_pages(app: Sphinx) -> None:
             path.write_text(text, encoding="utf-8")
 
 
-def as_restructured_text(_app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
+def as_restructured_text(
+    _app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
     """|G| and F* in a docstring are mathematics, not markup."""
     lines[:] = [re.sub(r"(?<!\\)\|", r"\\|", line) for line in lines]
 
