@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from examples.closed_loop import RATE_HZ
 from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
+from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.browser import Tab, chromium
 from tests.support.dashboards import LINES, SETTINGS, UNITS, begin, data
@@ -78,6 +78,18 @@ def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Brow
         now(hubs[1], at_s=1.0)
         tab.until("bode.curves.measured?.frame.axis === 1 && bode.curves.measured.frame.columns === 1")
         tab.until("document.getElementById('lamp').className === 'lamp live'")
+        assert tab.wrong == []
+
+
+def test_a_page_that_is_opened_before_the_run_begins_shows_it_when_it_begins(browser: Browser) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("z")
+    with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
+        tab.until("document.title === 'z · livebode' && !page.facts.begun && map.begun")
+        assert status(tab) == ["z · waiting for the first samples", "lamp stale"]
+        begin(hub, Path("/nowhere"), LINES)
+        now(hub, at_s=1.0)
+        tab.until("bode.curves.measured?.frame.axis === 0")
         assert tab.wrong == []
 
 
