@@ -3,6 +3,9 @@
 import sys
 from pathlib import Path
 
+from pygments.lexers import DelphiLexer
+from sphinx.application import Sphinx
+
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "livebode"
@@ -42,3 +45,8 @@ html_theme_options = {
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
+
+
+def setup(app: Sphinx) -> None:
+    """Structured Text has the words of Delphi; Pygments has no lexer of its own for it."""
+    app.add_lexer("iecst", DelphiLexer)

@@ -1,4 +1,4 @@
-"""`python -m tools.command_line > docs/reference/command-line.md`: the page of commands, from the commands themselves."""
+"""`python -m tools.command_line > docs/reference/command-line.md`: the page of commands, from Typer."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _paragraphs(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    return re.sub(r"(?<!\\)\|", r"\\|", " ".join(text.split()))
+    return re.sub(r"(?<!\\)\|", r"\\|", " ".join(text.replace("\\[", "[").split()))
 
 
 if __name__ == "__main__":
