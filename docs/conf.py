@@ -1,5 +1,6 @@
 """How Sphinx builds the site; `make docs` runs it."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -7,6 +8,8 @@ from pygments.lexers import DelphiLexer
 from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+
+os.environ |= {"TTY_COMPATIBLE": "0", "COLUMNS": "100"}  # a page has no spinner
 
 project = "livebode"
 author = "the authors of livebode"
