@@ -9,7 +9,7 @@ from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
-os.environ |= {"TTY_COMPATIBLE": "0", "COLUMNS": "100"}  # a page has no spinner
+os.environ |= {"TTY_COMPATIBLE": "0", "COLUMNS": "80"}  # a page has no spinner
 
 project = "livebode"
 author = "the authors of livebode"
@@ -19,8 +19,9 @@ exclude_patterns = ["_build", "**/README.md"]
 # Markdown
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
-nb_execution_mode = "cache"
+nb_execution_mode = "force"
 nb_execution_in_temp = True
+nb_merge_streams = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 60
 
