@@ -15,9 +15,7 @@ def visit_inline(writer: Any, node: nodes.Element) -> None:
 
 
 def visit_block(writer: Any, node: nodes.Element) -> None:
-    number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
-    equation = convert(node.astext(), display="block")
-    writer.body.append(f'<div class="math" id="{node["ids"][0] if node["ids"] else ""}">{equation}{number}</div>')
+    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
     raise nodes.SkipNode
 
 
