@@ -15,7 +15,6 @@ project = "livebode"
 author = "the authors of livebode"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc", "mathml", "api_pages"]
 exclude_patterns = ["_build", "**/README.md"]
-suppress_warnings = ["toc.empty_glob"]  # a shelf lists its pages in order, and then any new one
 
 # Markdown
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
