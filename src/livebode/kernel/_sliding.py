@@ -23,7 +23,7 @@ class SlidingDFT(_native.Engine):
     bins
         Different integers 0 ≤ k < N; their order is that of the results. Bin k is k·rate/N in Hz.
     channels
-        Signals that share one index.
+        Number of signals, which share one index.
     dtype
         float64 or float32, of samples and sums; results are complex128 or complex64.
     variant
@@ -36,7 +36,7 @@ class SlidingDFT(_native.Engine):
     Raises
     ------
     ValueError
-        An argument is out of its range; the message names it, its value and the permitted values.
+        If an argument is out of its range; the message names it, its value and the permitted values.
 
     Examples
     --------
