@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
+.PHONY: help demo test docs lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -34,6 +34,13 @@ demo: $(BUILT)   ## track a simulated machine, live
 
 test: $(BUILT) lint  ## lint, types, import contract and every test
 	$(BIN)/python -m pytest -n auto
+
+$(VENV)/.docs: $(BUILT) requirements-docs.lock
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-docs.lock
+	touch $@
+
+docs: $(VENV)/.docs  ## the documentation as a site in build/docs, its tutorials executed; every warning is an error
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 lint: $(BUILT) $(NODE)  ## style, types and the import contract
 	$(BIN)/ruff check .
@@ -114,6 +121,7 @@ lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv lock --upgrade
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
+	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group docs -o requirements-docs.lock
 	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest typescript@latest
 
 clean:           ## remove what was built

@@ -162,9 +162,10 @@ def _imported(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def test_locks_name_no_host_and_agree_with_each_other() -> None:
-    pins = [_pins(ROOT / lock) for lock in ("requirements-dev.lock", "requirements-bench.lock")]
-    for package in pins[0].keys() & pins[1].keys():
-        assert pins[0][package] == pins[1][package], package
+    pins = [_pins(ROOT / f"requirements-{lock}.lock") for lock in ("dev", "bench", "docs")]
+    for others in pins[1:]:
+        for package in pins[0].keys() & others.keys():
+            assert pins[0][package] == others[package], package
     wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     assert {re.match(r"[a-z0-9-]+", w).group() for w in wanted} <= set(pins[0])
 

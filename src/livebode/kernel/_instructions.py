@@ -24,11 +24,15 @@ def instruction_set() -> str:
     By default the widest that the machine has; the environment variable LIVEBODE_INSTRUCTION_SET names another. The
     results are the same to the bit with each.
 
-    Returns:
+    Returns
+    -------
+    str
         "baseline", "avx2" or "avx512".
 
-    Raises:
-        ValueError: the environment names an unknown instruction set.
+    Raises
+    ------
+    ValueError
+        The environment names an unknown instruction set.
     """
     return NAMES[chosen() or _native.best_instruction_set()]
 

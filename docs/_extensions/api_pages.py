@@ -1,0 +1,74 @@
+"""Reference pages of the Python names, from the packages' `__all__` and the docstrings: one page per package.
+
+A name that `livebode` itself offers is documented on its page, every other name on the page of its package.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from sphinx.application import Sphinx
+
+import livebode
+
+NOT_PYTHON = {"cli"}
+"""Packages whose reference is another page."""
+
+
+def packages() -> dict[str, ModuleType]:
+    """The packages with public names, by name."""
+    names = [f"livebode.{m.name}" for m in pkgutil.iter_modules(livebode.__path__) if m.name not in NOT_PYTHON]
+    modules = {name: import_module(name) for name in names}
+    return {name: module for name, module in modules.items() if getattr(module, "__all__", None)}
+
+
+def page(name: str, module: ModuleType) -> str:
+    """The page of one package in reStructuredText."""
+    elsewhere = [] if module is livebode else sorted(set(module.__all__) & set(livebode.__all__))
+    title = f"``{name}``" if module is livebode else name
+    first = (inspect.getdoc(module) or "").split("\n\n")[0]
+    parts = [title, "=" * len(title), "", first, ""]
+    if elsewhere:
+        parts += ["In :mod:`livebode`: " + ", ".join(f":py:obj:`~livebode.{n}`" for n in elsewhere) + ".", ""]
+    parts += [f".. py:module:: {name}", ""]
+    for own in sorted(set(module.__all__) - set(elsewhere), key=str.lower):
+        parts += [_entry(name, own, getattr(module, own)), ""]
+    return "\n".join(parts)
+
+
+def _entry(package: str, name: str, value: object) -> str:
+    """The directive that documents one name."""
+    if inspect.isclass(value):
+        return f".. autoclass:: {package}.{name}\n   :members:\n"
+    if callable(value):
+        return f".. autofunction:: {package}.{name}\n"
+    return f".. autodata:: {package}.{name}\n   :no-value:\n"
+
+
+def write_pages(app: Sphinx) -> None:
+    folder = Path(app.srcdir) / "reference" / "api"
+    folder.mkdir(exist_ok=True)
+    wanted = {f"{name}.rst": page(name, module) for name, module in {"livebode": livebode, **packages()}.items()}
+    for old in folder.glob("*.rst"):
+        if old.name not in wanted:
+            old.unlink()
+    for file, text in wanted.items():
+        path = folder / file
+        if not path.exists() or path.read_text("utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def keep_bars(_app: Sphinx, _what: str, _name: str, _value: object, _options: object, lines: list[str]) -> None:
+    """|G| in a docstring is a magnitude, not a substitution."""
+    lines[:] = [re.sub(r"(?<!\\)\|", r"\\|", line) for line in lines]
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-docstring", keep_bars, priority=100)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
