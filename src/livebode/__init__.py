@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         SignalError,
         SimulationError,
         SourceError,
+        StateError,
         UsageError,
     )
     from livebode.estimation import Settings, Tracker, welch
@@ -75,6 +76,7 @@ _HOME = {
     "motion": ("MotionCorrection",),
     "core": (
         "UsageError",
+        "StateError",
         "SourceError",
         "SimulationError",
         "SignalError",
@@ -146,6 +148,7 @@ __all__ = [
     "SimulationError",
     "SlidingDFT",
     "SourceError",
+    "StateError",
     "Strokes",
     "Tracker",
     "UsageError",

@@ -18,6 +18,7 @@ from livebode.core.errors import (
     SignalError,
     SimulationError,
     SourceError,
+    StateError,
     UsageError,
 )
 from livebode.core.event import Event
@@ -27,6 +28,7 @@ from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
 from livebode.core.response import PER_LINE, PER_RESPONSE, Quantity, Response, Responses, widened
 from livebode.core.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
+from livebode.core.state import Stage, Stateful, StatefulBase, decode, encode, restore_parts
 from livebode.core.wording import counted, rounded_down
 
 __all__ = [
@@ -65,10 +67,17 @@ __all__ = [
     "SourceError",
     "Spectra",
     "SpectraLayout",
+    "Stage",
+    "StateError",
+    "Stateful",
+    "StatefulBase",
     "UsageError",
     "as_model",
     "counted",
+    "decode",
+    "encode",
     "nearest_name",
+    "restore_parts",
     "rms",
     "rounded_down",
     "widened",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import NOT_WHOLE, SPIKE, Block, Responses, SignalError, Spectra, SpectraLayout, UsageError
+from livebode.core import NOT_WHOLE, SPIKE, Block, Responses, SignalError, Spectra, SpectraLayout, Stage, UsageError
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
@@ -46,6 +46,8 @@ class SpectraTracker(AroundLines[SpectraWatch]):
     LivebodeError
         If a signal, a bin or the schedule that the settings need is not sent, or they need samples.
     """
+
+    _stage = Stage("spectra-tracker", 1)
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
         _check(settings, layout)

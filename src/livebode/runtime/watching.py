@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from livebode.configuration.axis import Axis, MonitoringSection
-from livebode.core import Block, Event, Parameters, RecordError, Responses
+from livebode.core import Block, Event, Parameters, RecordError, Responses, Stage, decode, encode
 from livebode.estimation import Settings
 
 if TYPE_CHECKING:
@@ -19,6 +18,8 @@ _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no 
 _NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples, but the drive sends spectra."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _KEPT = 100  # sentences in run.json; events.jsonl has all
+
+_STAGE = Stage("change-detection", 1)
 
 Write = Callable[[Event], None]
 
@@ -59,21 +60,21 @@ class Watching:
 
     def snapshot(self) -> bytes:
         """Its messages, and the state that the next event depends on; see `restore`."""
-        said = json.dumps(self._alarms).encode()
-        return len(said).to_bytes(4, "little") + said + (self._monitor.snapshot() if self._monitor is not None else b"")
+        monitor = {} if self._monitor is None else {"monitor": self._monitor}
+        return encode(_STAGE, {"alarms": self._alarms} | monitor)
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot with the same baseline; RecordError if it belongs to another one."""
-        rest = 4 + int.from_bytes(snapshot[:4], "little")
-        if (self._monitor is None) != (len(snapshot) == rest):
+        state = decode(_STAGE, snapshot)
+        if (self._monitor is None) != ("monitor" not in state):
             raise RecordError(
                 "baseline-differs",
                 "the run was started with another baseline or none",
                 "continue with that one, or choose another directory",
             )
         if self._monitor is not None:
-            self._monitor.restore(snapshot[rest:])
-        self._alarms = json.loads(snapshot[4:rest])
+            self._monitor.restore(state["monitor"])
+        self._alarms = state["alarms"]
 
     def _publish(self, events: list[Event], write: Write) -> None:
         for event in events:
