@@ -87,7 +87,7 @@ def test_any_cut_gives_the_same_and_so_does_a_restored_one(places: int, at: list
     found, movement = [], Movement(places)
     for start, stop in pairwise(sorted({0, 400, *at})):
         again = Movement(places)
-        again.load(movement.state())
+        again.restore(movement.snapshot())
         movement = again
         found.append(movement.process(start % places, x[start:stop]))
     np.testing.assert_array_equal(np.concatenate(found), whole)

@@ -83,9 +83,9 @@ class RippleWatch(StatefulBase):
 
     def _load(self, state: dict[str, Any]) -> None:
         self.orders = tuple(RippleOrder(float(cycles), float(amplitude)) for cycles, amplitude in state["orders"])
-        self._spectrum = None
+        self._spectrum, self._made_for = None, state["made_for"]
         if state["spectrum"] is not None:
-            self._make(state["made_for"]).restore(state["spectrum"])
+            self._make(self._made_for).restore(state["spectrum"])
 
 
 class _Gain:
