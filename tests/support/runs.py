@@ -1,4 +1,4 @@
-"""A run of a small recording, without pictures."""
+"""A run of a small recording, without pictures, and a directory with the tables of another program."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from livebode.configuration import Axis
+from livebode.records import Run
+from livebode.records.piece import parts_of
+from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, run
 from tests.support.command import write_parquet
 
@@ -19,3 +22,9 @@ def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[
         "signals": {"output": "y", "input": "u", "excitation": "w"},
     }
     return run(Axis.of(given | sections, "test"), Destination(folder / "run", lambda *_: None)).directory
+
+
+def describe(folder: Path, like: Path) -> None:
+    """Write the run.json of a run for the tables in a directory."""
+    files = {path.name: parts_of(path) for path in sorted(folder.glob("*.parquet"))}
+    (folder / RUN).write_bytes(to_document(Run.open(like).summary | {"files": files}))
