@@ -3,9 +3,11 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
+NODE    = node_modules/.package-lock.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
+C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
 .PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages lock clean
 
@@ -21,17 +23,26 @@ $(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
+# Node.js is from PyPI; the lock file has the hashes of the packages.
+$(NODE): $(VENV)/.installed package.json package-lock.json
+	PATH="$(abspath $(BIN)):$$PATH" npm ci --ignore-scripts --no-audit --no-fund --loglevel=error \
+		|| { echo "npm could not install TypeScript and Biome: see Set up in CONTRIBUTING.md"; exit 1; }
+	touch $@
+
 demo: $(BUILT)   ## track a simulated machine, live
 	$(BIN)/livebode demo
 
 test: $(BUILT) lint  ## lint, types, import contract and every test
 	$(BIN)/python -m pytest -n auto
 
-lint: $(BUILT)   ## style, types and the import contract
+lint: $(BUILT) $(NODE)  ## style, types and the import contract
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/clang-format --dry-run -Werror $(C_SOURCES)
+	PATH="$(abspath $(BIN)):$$PATH" node_modules/.bin/biome check --error-on-warnings .
+	PATH="$(abspath $(BIN)):$$PATH" node_modules/.bin/tsc
 
 $(VENV)/.bench: $(BUILT) requirements-bench.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-bench.lock
@@ -100,6 +111,7 @@ lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv lock --upgrade
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
+	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest typescript@latest
 
 clean:           ## remove what was built
-	rm -rf build $(VENV)
+	rm -rf build node_modules $(VENV)

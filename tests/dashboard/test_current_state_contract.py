@@ -81,6 +81,18 @@ def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Brow
         assert tab.wrong == []
 
 
+def test_a_page_that_is_opened_before_the_run_begins_shows_it_when_it_begins(browser: Browser) -> None:
+    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    hub = dashboard.hub("z")
+    with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
+        tab.until("document.title === 'z · livebode' && !page.facts.begun && map.begun")
+        assert status(tab) == ["z · waiting for the first samples", "lamp stale"]
+        begin(hub, Path("/nowhere"), LINES)
+        now(hub, at_s=1.0)
+        tab.until("bode.curves.measured?.frame.axis === 0")
+        assert tab.wrong == []
+
+
 def test_a_visit_to_an_axis_with_one_line_leaves_the_choice_of_lines(browser: Browser) -> None:
     with axes(browser, "y", "z") as (hubs, tab):
         begin(hubs[1], Path("/nowhere"), ONE)

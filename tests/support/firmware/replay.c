@@ -50,8 +50,9 @@ static void process_all(const header *h, dft_type *dft, int out)
     demand(FN(rows)(dft, h->samples, h->hop, &rows) == LB_OK, 20);
     const size_t bytes = rows * h->channels * h->bin_count * 2 * sizeof(real);
     demand(bytes <= sizeof made, 21);
-    demand(FN(process)(dft, samples, 1, (ptrdiff_t)h->channels, h->samples, h->hop, (lb_phase)h->phase, made,
-                       rows) == LB_OK, 22);
+    demand(FN(process)(dft, samples, 1, (ptrdiff_t)h->channels, h->samples, h->hop, (lb_phase)h->phase, made, rows) ==
+               LB_OK,
+           22);
     demand(host_write(out, made, bytes), 23);
 }
 
@@ -60,8 +61,15 @@ static void play(const header *h, int in, int out)
     static uint32_t bins[BINS_MAX];
     demand(h->channels <= CHANNELS_MAX && h->bin_count <= BINS_MAX, 30);
     demand(host_read(in, bins, h->bin_count * sizeof *bins), 31);
-    const lb_config config = {h->window, h->channels, h->bin_count, bins, (lb_variant)h->variant, 0.9999, LB_BEST,
-                              (lb_table)h->table};
+    const lb_config config = {
+        .window = h->window,
+        .channels = h->channels,
+        .bin_count = h->bin_count,
+        .bins = bins,
+        .variant = (lb_variant)h->variant,
+        .damping = 0.9999,
+        .table = (lb_table)h->table,
+    };
     dft_type *dft;
     size_t bytes;
     demand(FN(size)(&config, &bytes) == LB_OK && bytes <= sizeof memory, 32);
