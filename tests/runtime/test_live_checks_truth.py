@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from livebode.analysis.averaged import averaged
-from livebode.core import Block, Channel, Event, Lines, Stage, decode
+from livebode.core import Block, Channel, Event, Lines
+from livebode.core.state import Stage, decode
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.records import Run

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 import livebode
-from livebode.core import Stage, StateError, Stateful, StatefulBase, decode, encode
+from livebode.core import StateError, Stateful, StatefulBase
+from livebode.core.state import Stage, decode, encode
 
 HEAD_BYTES = 20
 FLIPS = 24

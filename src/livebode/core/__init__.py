@@ -28,7 +28,7 @@ from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
 from livebode.core.response import PER_LINE, PER_RESPONSE, Quantity, Response, Responses, widened
 from livebode.core.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
-from livebode.core.state import Stage, Stateful, StatefulBase, decode, encode, restore_parts
+from livebode.core.state import Stage, Stateful, StatefulBase
 from livebode.core.wording import counted, rounded_down
 
 __all__ = [
@@ -74,10 +74,7 @@ __all__ = [
     "UsageError",
     "as_model",
     "counted",
-    "decode",
-    "encode",
     "nearest_name",
-    "restore_parts",
     "rms",
     "rounded_down",
     "widened",

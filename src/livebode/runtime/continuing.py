@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from livebode.core import Block, RecordError, Stage, decode, encode
+from livebode.core import Block, RecordError
+from livebode.core.state import Stage, decode, encode
 from livebode.sources.live import LiveBlock, Position
 from livebode.sources.live.computer_clock import ClockReading
 

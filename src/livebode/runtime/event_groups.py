@@ -7,7 +7,8 @@ from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from livebode.core import Event, Stage, decode, encode
+from livebode.core import Event
+from livebode.core.state import Stage, decode, encode
 
 QUIET_S = 60.0
 """A cause without events for this time has ended; its next event begins another group."""

@@ -9,7 +9,8 @@ import numpy as np
 from livebode.analysis.fits import plain_fit
 from livebode.configuration.axis import FitSection
 from livebode.configuration.fit_settings import fitter_of
-from livebode.core import Event, Loop, Parameters, Responses, Stage, decode, encode
+from livebode.core import Event, Loop, Parameters, Responses
+from livebode.core.state import Stage, decode, encode
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 from livebode.margins import OpenLoop, against_lines, margins
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from livebode.core import Responses, Stage, decode, encode, restore_parts
+from livebode.core import Responses
+from livebode.core.state import Stage, decode, encode, restore_parts
 from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.continuing import Before
 from livebode.runtime.event_groups import EventGroups

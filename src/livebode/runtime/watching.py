@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from livebode.configuration.axis import Axis, MonitoringSection
-from livebode.core import Block, Event, Parameters, RecordError, Responses, Stage, decode, encode
+from livebode.core import Block, Event, Parameters, RecordError, Responses
+from livebode.core.state import Stage, decode, encode
 from livebode.estimation import Settings
 
 if TYPE_CHECKING:
