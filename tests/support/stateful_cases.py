@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from examples.kernel_drive import KernelDrive
 from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Event, Lines, Parameters, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
@@ -25,6 +24,7 @@ from livebode.runtime.tally import Tally
 from livebode.runtime.watching import Watching
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
 from livebode.sources.live import LiveBlock
+from livebode.sources.live.kernel_drive import KernelDrive
 from livebode.sources.live.position import Origin
 from studies.monitoring_axis import LINES as AXIS_LINES
 from tests.fitting.test_fits_truth import LINES as FITTED
