@@ -97,7 +97,7 @@ def test_responses_of_a_run_before_are_known() -> None:
     assert not Quantities("sensitivity", "", LINES, None).fit(made(1, LINES))
 
 
-def test_what_cannot_be_shown_says_why() -> None:
+def test_a_quantity_that_is_not_available_has_a_reason() -> None:
     quantities = Quantities("plant", "rad/s", LINES, None)
     assert quantities.why_not("plant") == ""
     assert "describe its controllers" in quantities.why_not("open loop")
@@ -105,7 +105,7 @@ def test_what_cannot_be_shown_says_why() -> None:
         quantities.of_responses(made(1, LINES), "sensitivity")
 
 
-def test_nobody_looks_and_memory_stays_bounded() -> None:
+def test_memory_is_bounded_and_losses_are_counted_when_nobody_reads() -> None:
     """A dashboard that never takes anything: the newest is kept, the rest given up, and counted."""
     hub, many = Hub("axis"), made(64, LINES)
     batches = 3 * VALUES_MAX // many.value.size
@@ -141,7 +141,7 @@ def test_delay_is_from_arrival_to_published() -> None:
     assert (hub.samples, hub.gaps) == (80, 1)
 
 
-def test_recent_keeps_the_newest_and_not_too_dense() -> None:
+def test_recent_responses_are_the_newest_and_thinned() -> None:
     recent, hop = Recent(), 20
     for start in range(0, 40_000, 500):
         rows = made(500, Lines((2, 3), 60, 1000.0), hop=hop, seed=start)
@@ -237,7 +237,7 @@ def test_moments_have_a_clock_where_a_machine_sends(tmp_path: Path) -> None:
     assert state.span()["clock"] == [(0.0, 0.0)]
 
 
-def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Path) -> None:
+def test_a_continued_run_is_not_mixed_with_the_previous_one(tmp_path: Path) -> None:
     """In one piece a run appears when it is done; until then an older one in its place is not read."""
     old = tmp_path / "run"
     with Watched(old) as watched:
@@ -259,7 +259,7 @@ def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Pat
     assert len(next(Past.of(state).all_between(-10, 10))) > 50
 
 
-def test_an_axis_that_begins_anew_has_other_lines(tmp_path: Path) -> None:
+def test_an_axis_that_begins_a_new_run_may_have_other_lines(tmp_path: Path) -> None:
     hub = Hub("axis")
     state = State("axis", 0, hub)
     for lines in (LINES, Lines((2, 5), 60, 1000.0)):

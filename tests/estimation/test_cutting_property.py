@@ -79,7 +79,7 @@ def test_any_cut_gives_the_same_bits(options: dict, at: list[int], jump: int, se
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 @settings(max_examples=15, deadline=None)
 @given(at=st.lists(st.integers(1, SAMPLES - 1), min_size=1, max_size=6), seed=st.integers(0, 9))
-def test_a_restored_tracker_goes_on_with_the_same_bits(options: dict, at: list[int], seed: int) -> None:
+def test_a_restored_tracker_continues_with_the_same_bits(options: dict, at: list[int], seed: int) -> None:
     block = record(seed)
     expected = Responses.join([new(options).process(block)])
     tracker, parts = new(options), []
@@ -92,7 +92,7 @@ def test_a_restored_tracker_goes_on_with_the_same_bits(options: dict, at: list[i
     assert_same(Responses.join(parts), expected)
 
 
-def test_one_sample_at_a_time() -> None:
+def test_single_samples_give_the_same_as_one_block() -> None:
     block = record(3)
     tracker = new({})
     parts = [tracker.process(block.cut(i, i + 1)) for i in range(len(block))]

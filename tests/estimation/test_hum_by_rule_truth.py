@@ -85,7 +85,7 @@ def test_frequencies_and_amplitudes_of_hum_are_found_in_a_recording_without_exci
     assert three.amplitude == pytest.approx({"y": 0.1}, rel=0.08)
 
 
-def test_noise_of_any_slope_is_no_hum() -> None:
+def test_noise_of_any_slope_is_not_reported_as_hum() -> None:
     """200 recordings of 20 multiples, each taken for hum by chance less than once in 1e8."""
     rng = np.random.default_rng(5)
     for pole in (-0.9, 0.0, 0.9, 0.999):
@@ -170,7 +170,7 @@ def test_hum_is_shown_where_the_excitation_is_not_recognised(tmp_path: Path) -> 
     assert "The excitation is not recognised" in shown.out
 
 
-def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) -> None:
+def test_inspect_reports_that_hum_was_not_found_or_could_not_be_judged(tmp_path: Path) -> None:
     quiet = recording(tmp_path / "quiet.parquet", 4.0, 0.0, level=0.0)
     assert "no hum of the mains is visible in 4 s" in livebode("inspect", quiet, *LINES, *SIGNALS).out
     excited = recording(tmp_path / "excited.parquet", 0.5, 3.0)

@@ -237,7 +237,7 @@ def test_any_cutting_and_a_restored_tracker_give_the_same(record: Block, cuts: l
         ({"differenced": ("y",)}, {}, "signal.layout-differs"),
     ],
 )
-def test_what_spectra_cannot_give_is_refused(options: dict, what: dict, code: str) -> None:
+def test_settings_that_need_samples_are_refused_for_spectra(options: dict, what: dict, code: str) -> None:
     with pytest.raises(LivebodeError) as caught:
         SpectraTracker(described(**({"hop": 20} | options)), layout(**what))
     assert caught.value.code == code

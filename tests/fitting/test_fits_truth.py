@@ -81,7 +81,7 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
     )
 
 
-def test_sigmas_that_are_far_too_small_are_made_good_by_epsilon() -> None:
+def test_epsilon_corrects_sigmas_that_are_far_too_small() -> None:
     """Noise of 3 % that is said to be 0.1 %: ε finds the 3 %, and the bounds hold."""
     found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
     assert np.median(found.epsilon) == pytest.approx(0.03, rel=0.05)
@@ -132,7 +132,7 @@ def test_invalid_lines_are_left_out_and_too_few_are_no_response() -> None:
 
 
 @pytest.mark.parametrize("newtons", [15.0, 30.0])
-def test_friction_at_standstill_gives_no_numbers_and_none_without(newtons: float) -> None:
+def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fitted(newtons: float) -> None:
     words = {}
     for force in (0.0, newtons):
         axis = BeltAxis(
@@ -197,7 +197,7 @@ def bench() -> Response:
 
 
 @pytest.mark.parametrize("band_hz", [(11.0, 250.0), (20.0, 150.0), (30.0, 120.0)])
-def test_the_motor_bench_is_what_its_description_says(band_hz: tuple[float, float]) -> None:
+def test_the_motor_bench_has_the_parameters_of_its_description(band_hz: tuple[float, float]) -> None:
     found = fit(bench(), "two-mass-gain", output="position", band_hz=band_hz)
     print(f"{band_hz}: ε {found.epsilon:.3f}, {found.rows()}")
     assert found.status == "ok"

@@ -53,7 +53,7 @@ def test_any_way_of_cutting_gives_the_same(cuts: list[int], late_s: float) -> No
 
 
 @pytest.mark.parametrize("late_s", [0.0, 4e-4])
-def test_a_resumed_fitter_equals_one_that_went_on(late_s: float) -> None:
+def test_a_restored_fitter_continues_with_the_same_bits(late_s: float) -> None:
     every = run(late_s)
     expected = Fitter(BELT).process(every)
     first = Fitter(BELT)
@@ -71,7 +71,7 @@ def test_a_delay_is_taken_by_every_row_that_shows_it_and_by_none_where_it_is_hel
     assert np.all(Fitter(BELT).process(run())["delay"][found.ok] == 0.0)
 
 
-def test_events_tell_where_fits_fail_and_hold_again() -> None:
+def test_events_report_when_fits_are_rejected_and_valid_again() -> None:
     fitter = Fitter(BELT)
     fitter.process(run())
     events = fitter.drain_events()
@@ -92,7 +92,7 @@ def test_events_tell_where_fits_fail_and_hold_again() -> None:
         ((BELT,), {"band_hz": (50.0, 90.0)}, (FitError, "too-few-lines", {"lines": 2, "parameters": 4})),
     ],
 )
-def test_what_cannot_be_is_refused(arguments: tuple, options: dict, error: tuple) -> None:
+def test_impossible_fits_are_refused(arguments: tuple, options: dict, error: tuple) -> None:
     kind, code, facts = error
     with refused(kind, code, **facts):
         Fitter(*arguments, **options).process(run())

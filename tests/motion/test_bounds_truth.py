@@ -24,7 +24,7 @@ def hits(run: BeltAxis, found: Responses) -> np.ndarray:
 
 
 @pytest.mark.parametrize("speed_m_per_s", [0.1, 0.2, 0.38])
-def test_coverage_over_strokes(speed_m_per_s: float) -> None:
+def test_bounds_cover_the_truth_over_strokes_as_often_as_stated(speed_m_per_s: float) -> None:
     each = []
     for seed in range(3):
         run = axis(0.1, strokes=2, seed=seed, motion=Strokes(speed_m_per_s=speed_m_per_s))

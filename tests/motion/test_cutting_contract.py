@@ -76,7 +76,7 @@ def test_any_cut_gives_the_same_bits(at: list[int], jump: int) -> None:
 
 @settings(max_examples=5, deadline=None)
 @given(at=cuts, jump=st.sampled_from([0, 23]))
-def test_a_restored_correction_goes_on_with_the_same_bits(at: list[int], jump: int) -> None:
+def test_a_restored_correction_continues_with_the_same_bits(at: list[int], jump: int) -> None:
     correction, parts, events = new(), [], []
     for block in pieces(at, jump):
         parts.append(correction.process(block))

@@ -44,7 +44,7 @@ def check_pause(kinds: list[str]) -> None:
     assert len(closing) + 2 == len(kinds)
 
 
-def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
+def test_a_file_at_its_size_limit_pauses_the_record(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     said, say = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(say, tmp_path / "run"))
@@ -54,7 +54,7 @@ def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
     check_pause(said.recv())
 
 
-def test_a_disk_that_is_full(tmp_path: Path) -> None:
+def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
     mount = f"mount -t tmpfs -o size=2m none {tmp_path}"
     allowed = subprocess.run(["unshare", "-Urm", "sh", "-c", mount], capture_output=True, text=True, check=False)
     if allowed.returncode:
@@ -68,7 +68,7 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
     check_pause(done.stdout.split())
 
 
-def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
+def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
     # It is lost where memory holds no more; events are not.
     limits = Limits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -165,7 +165,7 @@ def size_of(run: Path) -> int:
     return size
 
 
-def test_a_budget_is_kept_and_events_stay(tmp_path: Path) -> None:
+def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> None:
     # Segments of 0.8 MB, as random numbers do not compress; 40 of samples and of responses each are 64 MB.
     budget, rng = 8 << 20, np.random.default_rng(0)
     limits = Limits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)

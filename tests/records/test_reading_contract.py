@@ -82,7 +82,7 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sample", [1, 700, 1850, 3990])
-def test_a_run_that_ended_anywhere_is_read_and_goes_on(tmp_path: Path, sample: int) -> None:
+def test_a_run_that_ended_anywhere_is_read_and_continues(tmp_path: Path, sample: int) -> None:
     record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, sample - RATE_HZ)
     assert not Run.open(tmp_path / "run").finished
@@ -152,7 +152,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     assert Run.open(tmp_path / "run").summary["counts"]["gaps"] == 2
 
 
-def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
+def test_a_run_of_another_configuration_or_of_a_running_process_is_not_written(tmp_path: Path) -> None:
     record_until(700, tmp_path / "run")
     with refused(RecordError, "configuration-differs", path=str(tmp_path / "run")):
         record_machine(machine(SAMPLES), tmp_path / "run", kept=RecordSection(samples=False))
@@ -175,7 +175,7 @@ def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
         record_machine(machine(SAMPLES), tmp_path / "mine")
 
 
-def test_the_segments_may_be_cut_otherwise_when_it_goes_on(tmp_path: Path) -> None:
+def test_a_continued_run_may_have_segments_of_another_length(tmp_path: Path) -> None:
     record_until(1700, tmp_path / "run")
     record_machine(machine(SAMPLES), tmp_path / "run", kept=KEPT.model_copy(update={"segment_s": 60.0}))
     check_whole(tmp_path / "run", SAMPLES)
@@ -199,7 +199,7 @@ def given(tmp_path: Path, asked: tuple[object, ...]) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_the_command_goes_on_where_it_was_ended(
+def test_the_same_command_continues_where_it_was_ended(
     tmp_path: Path, given: tuple[object, ...], number: signal.Signals
 ) -> None:
     # Ended from within, after two thirds of the recording.
@@ -298,7 +298,7 @@ def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, says: s
     assert sorted(os.listdir(tmp_path / "run")) == before
 
 
-def test_signals_that_mean_nothing_are_said_and_kept(tmp_path: Path) -> None:
+def test_a_constant_excitation_is_reported_and_the_run_is_finished(tmp_path: Path) -> None:
     silent = replace(machine(SAMPLES), data=data(SAMPLES) * np.array([[0.0], [1.0], [1.0], [1.0]]))
     record_machine(silent, tmp_path / "run")
     run = Run.open(tmp_path / "run")

@@ -70,7 +70,7 @@ def test_a_run_that_is_continued_reports_the_same(steps: list[tuple[str, int]], 
 
 @settings(max_examples=15, deadline=None)
 @given(happened)
-def test_what_is_reported_and_what_waits_are_every_event_at_any_moment(steps: list[tuple[str, int]]) -> None:
+def test_reported_and_waiting_events_are_together_all_events_at_any_moment(steps: list[tuple[str, int]]) -> None:
     groups, lines, events = EventGroups(), list[Event](), events_of(steps)
     for number, event in enumerate(events, start=1):
         lines += groups.take(event)
@@ -87,7 +87,7 @@ def test_a_thousand_events_of_one_cause_are_one_group_and_each_is_exact() -> Non
     assert (last["count"], last["first_s"], last["last_s"]) == (1065, 0.0, 266.0)
 
 
-def test_what_an_event_without_a_group_counts_stays_with_it() -> None:
+def test_the_count_of_a_single_event_is_not_changed_by_grouping() -> None:
     event = Event("phase-slips", 5, 0.1, "two leaps", {"count": 2, "slips": [[5, 1], [9, 1]]})
     assert [one for line in reported(EventGroups(), [event]) for one in each_event(line)] == [event]
 
@@ -186,7 +186,7 @@ class Gaps:
             yield Block(data, NAMES, RATE_HZ, start=start, gap=start > 0)
 
 
-def test_the_record_of_a_killed_run_tells_every_event_up_to_a_second_before(tmp_path: Path) -> None:
+def test_the_record_of_a_killed_run_contains_every_event_until_a_second_before(tmp_path: Path) -> None:
     machine, page = Gaps(tmp_path / "run"), Page()
     lines = Lines((4, 7), WINDOW, RATE_HZ)
     record(

@@ -55,7 +55,7 @@ def found(data: np.ndarray, settings: Settings = SETTINGS, gaps: tuple[int, ...]
     return events
 
 
-def test_right_roles_and_a_steady_start_say_nothing(recorded: np.ndarray) -> None:
+def test_correct_roles_and_a_steady_start_raise_no_event(recorded: np.ndarray) -> None:
     assert found(recorded) == []
 
 
@@ -97,7 +97,7 @@ def test_a_transient_is_judged_only_where_nothing_was_excited_before(recorded: n
 
 
 @pytest.mark.parametrize("missing", [-7, 1, 60])
-def test_a_slip_that_no_number_tells_is_named(recorded: np.ndarray, missing: int) -> None:
+def test_a_slip_that_sample_numbers_do_not_show_is_reported(recorded: np.ndarray, missing: int) -> None:
     at = 21_234
     slipped = np.hstack([recorded[:, :at], recorded[:, at + missing :]])
     events = [event for event in found(slipped, roles=False, transient=False) if event.kind == "phase-slip"]

@@ -81,7 +81,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     assert (tmp_path / "live" / "bode.png").is_file()
 
 
-def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
+def test_a_live_source_without_specified_lines_is_refused(tmp_path):
     path = axis(tmp_path, 'url = "stdin:"', SMALL_AXIS.replace("window = 100", ""))
     process = started(path, tmp_path / "live")
     _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
@@ -102,7 +102,7 @@ def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
         ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
     ],
 )
-def test_sources_that_cannot_be(tmp_path, source, message):
+def test_impossible_sources_are_refused_without_repeating_secrets(tmp_path, source, message):
     result = livebode("run", axis(tmp_path, source), "--out", tmp_path / "live")
     assert result.code == 2
     assert message in result.err

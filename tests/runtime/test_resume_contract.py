@@ -54,7 +54,9 @@ def record_axis(follower: Follower, directory: Path, until: int | None = None) -
     [lambda: Tracker(SETTINGS), lambda: MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=5200)],
     ids=["tracker", "correction"],
 )
-def test_correction_fits_and_monitoring_go_on(tmp_path: Path, follower: Callable[[], Follower]) -> None:
+def test_correction_fits_and_monitoring_continue_in_a_resumed_run(
+    tmp_path: Path, follower: Callable[[], Follower]
+) -> None:
     whole = record_axis(follower(), tmp_path / "whole")
     for until in (6100, 14_300):
         with pytest.raises(StopError):

@@ -125,7 +125,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
 
 
 @pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.reconnects], indirect=True)
-def test_a_broken_connection_comes_back_by_itself(peer):
+def test_a_broken_connection_is_connected_again(peer):
     given = batches(60)
 
     def script() -> None:
@@ -143,7 +143,7 @@ def test_a_broken_connection_comes_back_by_itself(peer):
     ]  # fmt: skip
 
 
-def test_rubbish_is_counted_and_the_stream_goes_on(peer):
+def test_rubbish_is_counted_and_the_stream_continues(peer):
     given = batches(60)
 
     def script() -> None:
@@ -163,7 +163,7 @@ def test_rubbish_is_counted_and_the_stream_goes_on(peer):
 
 
 @pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.numbers_begin_anew], indirect=True)
-def test_a_sender_that_begins_anew_is_a_restart(peer):
+def test_a_sender_that_starts_again_is_a_restart(peer):
     old, new = batches(60, first=10_000_000), batches(60, first=0)
 
     def script() -> None:
@@ -200,6 +200,6 @@ def test_stop_ends_the_blocks_and_a_misspelt_channel_is_named(peer):
             assert block.names == ("y",)
 
 
-def test_silence_is_said_once(peer):
+def test_a_silent_source_is_refused_after_its_timeout(peer):
     with refused(SourceError, "no-samples", timeout_s=0.3):
         opened(peer, timeout_s=0.3)

@@ -71,7 +71,7 @@ def settings(broker: Mosquitto, pki: Path, **changes: object) -> dict[str, objec
     return {key: value for key, value in given.items() if value is not None}
 
 
-def test_mqtt_with_certificates_and_a_password(broker, pki):
+def test_mqtt_with_certificates_and_a_password_delivers_the_samples(broker, pki):
     given = batches(20)
     context = ssl.create_default_context(cafile=pki / "authority.crt")
     context.load_cert_chain(pki / "client.crt", pki / "client.key")
@@ -105,7 +105,7 @@ def test_mqtt_with_certificates_and_a_password(broker, pki):
         ({"certificate_file": None, "key_file": None}, "if it requires a certificate", 3),
     ],
 )
-def test_mqtt_refusals_are_said_once(broker, pki, changes, remedy, attempts):
+def test_mqtt_refusals_are_reported_once(broker, pki, changes, remedy, attempts):
     changes = {key: value if value is None or key == "username" else pki / value for key, value in changes.items()}
     before = broker.logged("New connection")
     with pytest.raises(SourceError) as caught:
@@ -157,7 +157,7 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
         ({"password_file": "users"}, "status"),
     ],
 )
-def test_opc_ua_refusals_are_said_once(pki, tmp_path, changes, fact):
+def test_opc_ua_refusals_are_reported_once(pki, tmp_path, changes, fact):
     with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer, pytest.raises(SourceError) as caught:
         open_source(opcua(peer, pki, **{key: pki / value for key, value in changes.items()}))
     assert (caught.value.code, list(caught.value.facts)) == ("source.refused", [fact])
@@ -197,7 +197,7 @@ def test_secrets_stay_out_of_the_configuration_that_is_recorded(tmp_path, monkey
         ),
     ],
 )
-def test_secrets_that_are_not_there(given, code, facts):
+def test_missing_secrets_are_refused_without_repeating_their_names(given, code, facts):
     with refused(ConfigError, code, **facts):
         open_source(SourceSettings(url="mqtt://127.0.0.1:1/t", **given))
     with pytest.raises(ConfigError) as caught:  # in place of a name may be the password
@@ -246,7 +246,7 @@ def test_secrets_that_are_not_there(given, code, facts):
         ),
     ],
 )
-def test_settings_that_cannot_be(given, code, facts):
+def test_impossible_settings_of_a_source_are_refused(given, code, facts):
     with refused(ConfigError, code, **facts):
         open_source(SourceSettings(**given))
 

@@ -78,7 +78,7 @@ def test_reordering_within_the_bound_and_repeats_change_nothing(lengths, first, 
     bound=st.integers(0, 6),
     data=st.data(),
 )
-def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
+def test_lost_batches_are_exactly_the_gaps(lengths, bound, data):
     batches = stream(lengths, 7)
     lost = data.draw(st.sets(st.integers(1, len(batches) - 2)))
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
@@ -95,7 +95,7 @@ def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=60), st.integers(0, 8))
-def test_whatever_comes_samples_are_right_and_ascend(pieces, bound):
+def test_any_overlapping_batches_give_correct_ascending_samples(pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: every sample that comes out is at its place, once."""
     batches = [stream([length], first)[0] for first, length in pieces]
     blocks = passed(batches, reorder=bound)
@@ -168,7 +168,7 @@ def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strang
 
 @settings(deadline=None)
 @given(st.integers(0, 8), st.integers(1, 2), st.integers(20, 40))
-def test_batches_half_an_hour_ahead_are_not_believed_while_the_stream_goes_on(reorder, strange, at):
+def test_batches_half_an_hour_ahead_are_rejected_while_the_stream_continues(reorder, strange, at):
     good = stream([10] * 60, 1000)
     ahead = stream([10] * strange, 1000 + int(1800 * RATE_HZ))
     said = Said()
@@ -204,7 +204,7 @@ def resumed(position: Position, batches: list[Batch], said: Said, **options: int
 
 @settings(deadline=None)
 @given(st.sampled_from([0, 1]), st.integers(0, 8), st.integers(0, 40_000), st.integers(0, 300))
-def test_a_stream_continues_by_the_senders_numbers_whatever_the_clock_says(epoch, reorder, missing, again):
+def test_a_stream_continues_by_the_numbers_of_the_sender_whatever_the_clock(epoch, reorder, missing, again):
     """A broker that kept what came in 20 s, and gives some of it again, as well as a sender that was not heard."""
     again -= again % 10
     position = left_at(5000, 105_000, epoch, 20.0)
@@ -222,7 +222,7 @@ def test_a_stream_continues_by_the_senders_numbers_whatever_the_clock_says(epoch
 
 
 @pytest.mark.parametrize("epoch", [0, 2])
-def test_a_sender_that_began_anew_meanwhile_is_an_estimate_by_the_computers_clock(epoch):
+def test_the_gap_of_a_restarted_sender_is_estimated_by_the_computers_clock(epoch):
     position = left_at(5000, 905_000, 0 if epoch == 0 else 1, 20.0)
     said = Said()
     blocks = resumed(position, stream([10] * 60, 0, epoch), said, reorder=0)
@@ -269,7 +269,7 @@ def counts_of(batches: list[Batch], **options: float) -> dict[str, int]:
     return {kind: count for kind, count in said.counts.items() if count}
 
 
-def test_what_goes_wrong_is_told_apart():
+def test_each_fault_of_a_stream_is_counted_as_its_own_kind():
     """Each fault alone gives its own kind and no other."""
     good = stream([100] * 40, stamp_s=1e9)
     assert counts_of(good) == {}
