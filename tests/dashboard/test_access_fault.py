@@ -312,7 +312,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         assert TOKEN not in tab.page.url
         assert tab.page.evaluate("() => document.cookie") == ""
         assert not any(TOKEN in text for text in tab.wrong)
-        watched.hub.write_event(Event("change", 1, 0.1, "changed", {}))
+        watched.hub(Event("change", 1, 0.1, "changed", {}))
     watched.go(11_000)
     assert any("wrong token from" in line for line in watched.told)
     assert len([line for line in watched.told if "127.0.0.1" in line]) == 1

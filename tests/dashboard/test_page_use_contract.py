@@ -152,7 +152,7 @@ def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_pat
     begin(hub, tmp_path, LINES)
     rows = made(1, LINES, hole=0.0, unit="")
     size = np.where(np.arange(len(LINES)) == 4, 1e-3, 1.0)[np.newaxis]
-    hub.write(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
+    hub(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
     with dashboard, Tab(browser, dashboard.url) as tab:
         tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.charts[0].data[1][bode.at[4]] < -59")
         low, high = tab.js("[bode.charts[0].scales.y.min, bode.charts[0].scales.y.max]")
@@ -335,7 +335,7 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
         event = next(e for e in watched.record().events() if e.kind == "non-finite")
         until(lambda: page.locator("#events li", has_text=event.message).count() == 1, "the event on the page")
         alarm = Event("change", 6000, 1.5, "the belt's <b>stiffness</b> is 9 % less", {"share": -0.09})
-        watched.hub.write_event(alarm)
+        watched.hub(alarm)
         button = page.get_by_role("button", name="Acknowledge: the belt's <b>stiffness</b>")
         button.wait_for()
         assert page.locator("#alarm-count").inner_text() == "⚠ 1 alarm"

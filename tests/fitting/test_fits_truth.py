@@ -13,6 +13,7 @@ from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, Simulated
 from tests.support.axes import MULTISINE
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, Pendulum, noisy
+from tests.support.found import with_events
 from tests.support.motor_bench import bench_responses, motorbench
 
 FINE = Lines.parse("20:120:5", rate_hz=4000, window=800)
@@ -102,14 +103,12 @@ def test_without_any_sigma_lines_weigh_by_their_size() -> None:
 def test_lines_that_do_not_show_the_mode_give_no_numbers_and_an_event() -> None:
     low = Lines.parse("2:10:1", rate_hz=4000, window=4000)
     fitter = Fitter(BELT)
-    found = fitter.process(noisy(BELT.at(TRUTH, Grid.of(low)), low, 0.02, 20))
+    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, Grid.of(low)), low, 0.02, 20))
     assert not found.ok.any()
     assert np.isnan(found.value).all()
     assert np.isnan(found.bound()).all()
-    (event, *_) = fitter.drain_events()
     assert event.kind == "fit-failed"
     assert event.details["status"] in ("not seen", "bound hit", "not converged")
-    assert fitter.drain_events() == []
     assert np.isnan(fitter.derived(found).value).all()
 
 
@@ -141,11 +140,10 @@ def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fi
         )  # fmt: skip
         settings = Settings(lines=LINES, output="velocity", input="u", excitation="w", hop=80, noise="quiet")
         tracked = Tracker(settings).process(SimulatedAxis(axis).run()[0])
-        fitter = Fitter(BELT)
-        found = fitter.process(tracked[60:])
+        found, events = with_events(Fitter(BELT).process, tracked[60:])
         words[force] = set(found.status)
         if force:
-            assert fitter.drain_events()[0].kind == "fit-failed"
+            assert events[0].kind == "fit-failed"
     assert words[0.0] == {"ok"}
     assert "ok" not in words[newtons]
     assert "friction" in words[newtons]

@@ -21,7 +21,6 @@ from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
 from livebode.records import Run, RunDirectory
 from livebode.records.grouped_events import each_event
-from livebode.runtime.tracking import record
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
 from tests.support.recorded import (
@@ -36,6 +35,7 @@ from tests.support.recorded import (
     record_machine,
     same,
 )  # fmt: skip
+from tests.support.runs import record
 
 SAMPLES = 4000
 
@@ -64,10 +64,7 @@ def each(run: Run) -> list[Event]:
 
 def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
-    record(
-        machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={}, force=False, progress=lambda *_: None,
-        draw=lambda *_: None,
-    )  # fmt: skip
+    record(machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={})
     check_whole(tmp_path / "segments", SAMPLES)
     runs = [Run.open(tmp_path / name) for name in ("segments", "piece")]
     assert same(runs[0].responses(), runs[1].responses())
@@ -207,12 +204,12 @@ def test_the_same_command_continues_where_it_was_ended(
         "import os, signal, sys; import livebode.runtime.segmented as s; from livebode.cli import main\n"
         # What starts the tests in the background may have told them to ignore it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "feed = s.in_pieces\n"
-        "def ended(blocks, samples):\n"
-        "    for block in feed(blocks, samples):\n"
-        f"        if block.start > 40_000: os.kill(os.getpid(), {int(number)})\n"
-        "        yield block\n"
-        f"s.in_pieces = ended; sys.argv = {['livebode', 'run', *map(str, given)]!r}; main()"
+        "pieces = s.SegmentedRecord.pieces\n"
+        "def ended(self, block):\n"
+        "    for piece in pieces(self, block):\n"
+        f"        if piece.start > 40_000: os.kill(os.getpid(), {int(number)})\n"
+        "        yield piece\n"
+        f"s.SegmentedRecord.pieces = ended; sys.argv = {['livebode', 'run', *map(str, given)]!r}; main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == (-number if number == signal.SIGKILL else 128 + number), done.stderr

@@ -20,9 +20,9 @@ from livebode.records import Run
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query
 from livebode.reporting.happenings import EventSummary
-from livebode.runtime.audience import Audience
+from livebode.runtime import Document
 from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
-from livebode.runtime.tracking import record
+from tests.support.runs import record
 
 RATE_HZ, WINDOW = 1000.0, 50
 NAMES = ("w", "u", "y")
@@ -159,14 +159,15 @@ def test_a_link_that_flaps_adds_a_line_a_second_at_most() -> None:
     assert AT_ONCE < len(found) <= AT_ONCE + 300
 
 
-class Page(Audience):
+class Page:
     """Keeps what a dashboard would show."""
 
     def __init__(self) -> None:
         self.notices = Notices()
 
-    def write_event(self, event: Event) -> None:
-        self.notices.take(event)
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Event):
+            self.notices.take(document)
 
 
 class Gaps:
@@ -191,8 +192,7 @@ def test_the_record_of_a_killed_run_contains_every_event_until_a_second_before(t
     lines = Lines((4, 7), WINDOW, RATE_HZ)
     record(
         machine, Tracker(Settings(lines=lines, output="y", input="u", excitation="w", hop=25)), machine.run,
-        about={"configuration": {}}, force=False, draw=lambda *_: None, progress=lambda *_: None,
-        kept=RecordSection(segment_s=5.0), again=False, audience=page,
+        segments=RecordSection(segment_s=5.0), again=False, subscribers=[page],
     )  # fmt: skip
     killed, whole = Run.open(machine.killed), Run.open(machine.run)
     every = [one.sample for event in whole.events() for one in each_event(event) if one.kind == "gap"]

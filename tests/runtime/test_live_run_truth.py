@@ -9,13 +9,13 @@ import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from livebode.core import Channel, Event
-from livebode.runtime import Audience
+from livebode.runtime import Document
+from livebode.runtime.documents import RunStarted
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
@@ -136,21 +136,20 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):
     """A connection that is lost, and what a person acknowledges, wait for no sample."""
 
-    class Person(Audience):
-        said: ClassVar = [Event("acknowledged", 0, 0.0, "seen")]
+    started: list[RunStarted] = []
 
-        def drain_events(self):
-            return [self.said.pop()] if self.said and disconnected() else []
+    def listen(document: Document) -> None:
+        if isinstance(document, RunStarted):
+            started.append(document)
 
-    def disconnected() -> bool:
-        return any(event.kind == "disconnected" for event in session.events())
-
-    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, Person()) as session:
+    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, listen) as session:
         peer.wait_ready()
         for batch in batches(40, first=0):
             peer.send(batch)
         until(session.events, "the record to begin")
         peer.interrupt()
+        until(lambda: any(event.kind == "disconnected" for event in session.events()), "the connection to be lost")
+        assert started[0].control.record(Event("acknowledged", 0, 0.0, "seen"))
         until(lambda: "acknowledged" in [event.kind for event in session.events()], "both to be recorded")
 
 

@@ -21,7 +21,7 @@ from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.records import Run
-from livebode.runtime.watching import make_watching
+from livebode.runtime.change_detection import change_detection
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
 from livebode.sources.live.kernel_drive import KernelDrive
@@ -248,10 +248,10 @@ def test_the_model_of_the_machine_is_left_out_and_this_is_reported(tmp_path: Pat
     small_baseline().save(tmp_path / "baseline.json")
     axis = configured(REST + f'[monitoring]\nbaseline = "{tmp_path / "baseline.json"}"\n')
     tracker_settings = settings()
-    told = make_watching(axis, tracker_settings, samples=False).finish(lambda _: None)
+    told = change_detection(axis, tracker_settings, samples=False).summary()
     assert told["judged_by"] == "tables"
     assert "model of the machine is not used: it needs samples, but the drive sends spectra" in told["message"]
-    assert make_watching(axis, tracker_settings).finish(lambda _: None)["judged_by"] == "model"
+    assert change_detection(axis, tracker_settings).summary()["judged_by"] == "model"
 
 
 def settings() -> Settings:

@@ -34,7 +34,7 @@ def test_samples_that_exceed_the_queue_become_a_gap_and_memory_is_bounded(tmp_pa
         for batch in batches(12, first=0):
             peer.send(batch)
         assert stuck.held.wait(30)
-        before, source = rss_bytes(), session.orders.source
+        before, source = rss_bytes(), session.control.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)
         until(lambda: source.health.counts["overflow"], "an overflow")

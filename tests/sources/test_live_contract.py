@@ -90,7 +90,7 @@ def test_the_same_samples_come_back_bit_for_bit(peer):
         assert source.samples is None
         assert source.health.connected
         assert source.health.lost == 0
-        events = source.drain_events()
+        events = source.take_events()
     is_truth(blocks)
     truth = np.concatenate([batch.data for batch in given], axis=1)
     found = np.concatenate([block.data for block in blocks], axis=1)
@@ -114,7 +114,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
-        events = [event for event in source.drain_events() if event.kind == "loss"]
+        events = [event for event in source.take_events() if event.kind == "loss"]
         lost = source.health.lost
     is_truth(blocks)
     assert lost == sum(event.details["missing_samples"] for event in events) > 0
@@ -136,7 +136,7 @@ def test_a_broken_connection_is_connected_again(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
-        kinds = [event.kind for event in source.drain_events()]
+        kinds = [event.kind for event in source.take_events()]
     is_truth(blocks)
     assert [kind for kind in kinds if kind in ("connected", "disconnected")][:3] == [
         "connected", "disconnected", "connected",
@@ -156,7 +156,7 @@ def test_rubbish_is_counted_and_the_stream_continues(peer):
 
     with fed(peer, script) as source:
         is_truth(received(source, given[-1].stop - 1))
-        events = source.drain_events()
+        events = source.take_events()
     assert source.health.counts["malformed"] >= 1
     assert {event.kind for event in events} <= set(KINDS)
     assert all("\n" not in event.message for event in events)
@@ -174,7 +174,7 @@ def test_a_sender_that_starts_again_is_a_restart(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, new[-1].stop - 1)
-        kinds = [event.kind for event in source.drain_events()]
+        kinds = [event.kind for event in source.take_events()]
     assert kinds.count("restart") == 1
     at = next(i for i, block in enumerate(blocks) if block["w"][0] < 1_000_000)
     is_truth(blocks[:at])

@@ -89,7 +89,7 @@ def test_mqtt_with_certificates_and_a_password_delivers_the_samples(broker, pki)
             parts.append(block["y"])
             if block["w"][-1] == given[-1].stop - 1:
                 break
-        told = repr(source.drain_events()) + repr(source.health)
+        told = repr(source.take_events()) + repr(source.health)
     stop(client)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
     assert SECRET not in told
@@ -145,7 +145,7 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
                 parts.append(block["y"])
                 if block["w"][-1] == given[-1].stop - 1:
                     break
-            told = repr(source.drain_events()) + repr(source.health)
+            told = repr(source.take_events()) + repr(source.health)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
     assert SECRET not in told
 
@@ -270,7 +270,7 @@ def test_datagrams_of_others_than_the_sender_are_dropped_and_named(interface):
         with Feeding(send), open_source(settings) as source:
             blocks = source.blocks()
             epochs = {next(blocks).origin.epoch for _ in range(10)}
-            events = [event for event in source.drain_events() if event.kind == "foreign"]
+            events = [event for event in source.take_events() if event.kind == "foreign"]
     assert epochs == {5}
     assert events[0].message == "a datagram from 127.0.0.3 was dropped; source.sender is 127.0.0.2"
 
@@ -303,5 +303,5 @@ def test_an_answer_of_a_plc_that_is_too_short_is_a_connection_that_is_tried_agai
         source = make_source(SourceSettings(**peer.settings | {"timeout_s": PATIENCE_S}))
         with Feeding(script), source.open():
             assert next(source.blocks()).rate_hz == RATE_HZ
-        (event,) = [event for event in source.drain_events() if event.kind == "disconnected"]
+        (event,) = [event for event in source.take_events() if event.kind == "disconnected"]
     assert "the PLC's answer is invalid" in event.message

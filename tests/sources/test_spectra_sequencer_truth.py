@@ -63,7 +63,7 @@ def test_lost_batches_are_exactly_the_gaps_and_phases_are_unchanged(hop, lengths
     blocks = passed(displaced(kept, bound, data), said, bound)
     assert [block.start for block in blocks] == [batch.first_sample - first * hop for batch in kept]
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
-    assert sum(e.details["missing_samples"] for e in said.drain() if e.kind == "loss") == sum(
+    assert sum(e.details["missing_samples"] for e in said.take() if e.kind == "loss") == sum(
         b.first_sample - a.stop for a, b in pairwise(kept)
     )
     for block, batch in zip(blocks, kept):
@@ -102,7 +102,7 @@ def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_repor
     said = Said()
     blocks = passed([*given_[:4], samples, samples, other, other, *given_[4:]], said, 0)
     assert [block.start for block in blocks] == list(range(0, 240, 20))
-    messages = [event.message for event in said.drain() if event.kind == "layout-changed"]
+    messages = [event.message for event in said.take() if event.kind == "layout-changed"]
     assert messages == [
         "the sender now sends samples; they are skipped until the first layout is back",
         "the sender now sends spectra of another layout; they are skipped until the first layout is back",
@@ -111,7 +111,7 @@ def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_repor
     said = Said()
     begun = [replace(samples, first_sample=at) for at in (0, 20)]
     assert len(passed([begun[0], given_[1], begun[1]], said, 0)) == 2
-    assert [e.message[:31] for e in said.drain()] == ["the sender now sends spectra; t"]
+    assert [e.message[:31] for e in said.take()] == ["the sender now sends spectra; t"]
 
 
 def test_a_changed_rate_is_reported():

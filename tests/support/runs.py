@@ -1,17 +1,24 @@
-"""A run of a small recording, without pictures, and a directory with the tables of another program."""
+"""Runs without pictures, and a directory with the tables of another program."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from livebode.configuration import Axis
+from livebode.configuration.axis import RecordSection
+from livebode.preparation.follower import Follower
 from livebode.records import Run
 from livebode.records.piece import parts_of
 from livebode.records.summary_file import RUN, to_document
-from livebode.runtime import Destination, run
+from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.fits import Fits
+from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_loop import Source
 from tests.support.command import write_parquet
 
 
@@ -28,3 +35,22 @@ def describe(folder: Path, like: Path) -> None:
     """Write the run.json of a run for the tables in a directory."""
     files = {path.name: parts_of(path) for path in sorted(folder.glob("*.parquet"))}
     (folder / RUN).write_bytes(to_document(Run.open(like).summary | {"files": files}))
+
+
+def record(
+    source: Source,
+    follower: Follower,
+    directory: Path,
+    *,
+    about: Mapping[str, Any] | None = None,
+    subscribers: Sequence[Subscriber] = (),
+    fits: Fits | None = None,
+    detection: ChangeDetection | None = None,
+    segments: RecordSection | None = None,
+    again: bool = True,
+) -> Outcome:
+    """A run of these parts, which no configuration describes."""
+    to = Destination(directory, lambda *_: None, subscribers=tuple(subscribers))
+    pipeline = Pipeline(follower, fits, detection)
+    about = {"configuration": {}} if about is None else dict(about)
+    return RunLoop(source, pipeline, to, about=about, segments=segments, again=again).run()

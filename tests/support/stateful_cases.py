@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 
 from livebode.configuration.axis import FitSection
-from livebode.core import Block, Channel, Event, Lines, Parameters, Responses, Spectra, SpectraLayout
+from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import Fitter, Grid, TwoMass
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
+from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.continuing import StreamPosition
 from livebode.runtime.fits import Fits
-from livebode.runtime.tally import Tally
-from livebode.runtime.watching import Watching
+from livebode.runtime.run_counts import RunCounts
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
 from livebode.sources.live import LiveBlock
 from livebode.sources.live.kernel_drive import KernelDrive
@@ -62,8 +62,15 @@ def block() -> Block:
     return Block(np.array([y, u, w, x]), ("y", "u", "w", "x"), RATE_HZ)
 
 
-def processed(blocks: list[Block]) -> list[Callable[[Any], object]]:
-    return [lambda stage, part=part: (stage.process(part), stage.drain_events()) for part in blocks]
+def processed(parts: Sequence[Block | Responses]) -> list[Callable[[Any], object]]:
+    def step(part: Block | Responses) -> Callable[[Any], object]:
+        def run(stage: Any) -> object:
+            events: list[Event] = []
+            return stage.process(part, events.append), events
+
+        return run
+
+    return [step(part) for part in parts]
 
 
 def cut(whole: Block, *edges: int) -> list[Block]:
@@ -130,8 +137,7 @@ def rows() -> list[Responses]:
 
 
 def fitter() -> Case:
-    steps = [lambda stage, part=part: (stage.process(part), stage.drain_events()) for part in rows()]
-    return Case(lambda: Fitter(BELT), steps, [lambda: Fitter(BELT, free=["delay"])])
+    return Case(lambda: Fitter(BELT), processed(rows()), [lambda: Fitter(BELT, free=["delay"])])
 
 
 def baseline(by_model: bool) -> Baseline:
@@ -169,64 +175,36 @@ def monitor_by_model() -> Case:
     )
 
 
-def steps_by_tables() -> list[Callable[[Any], object]]:
+def changing() -> list[Responses]:
+    """Responses that change at the fortieth."""
     rng = np.random.default_rng(10)
     value = (
         1.0 + 0.01 * rng.standard_normal((90, len(MONITORED.lines))) + np.where(np.arange(90) > 40, 0.1, 0.0)[:, None]
     )
     found = plain_responses(value.astype(np.complex128))
-    return [lambda stage, part=found[a:b]: stage.process_responses(part) for a, b in ((0, 30), (30, 44), (44, 90))]
+    return [found[a:b] for a, b in ((0, 30), (30, 44), (44, 90))]
 
 
 def monitor_by_tables() -> Case:
     learned = baseline(by_model=False)
-    return Case(lambda: Monitor(learned, MONITORED), steps_by_tables(), [lambda: Monitor(baseline(True), MONITORED)])
+    steps = [lambda stage, part=part: stage.process_responses(part) for part in changing()]
+    return Case(lambda: Monitor(learned, MONITORED), steps, [lambda: Monitor(baseline(True), MONITORED)])
 
 
-def watching() -> Case:
+def change_detection() -> Case:
     learned = baseline(by_model=False)
-
-    def followed(step: Callable[[Any], object]) -> Callable[[Any], object]:
-        def run(stage: Watching) -> list[Event]:
-            events: list[Event] = []
-            stage._publish(step(stage._monitor), events.append)  # type: ignore[arg-type]
-            return events
-
-        return run
-
-    return Case(
-        lambda: Watching(Monitor(learned, MONITORED), "baseline.json"), [followed(step) for step in steps_by_tables()]
-    )
-
-
-class Written:
-    """Where fits go."""
-
-    def __init__(self) -> None:
-        self.all: list[object] = []
-
-    def write_parameters(self, *parts: Parameters) -> None:
-        self.all += parts
-
-    def write_event(self, event: Event) -> None:
-        self.all.append(event)
+    steps = [lambda stage, part=part: stage.take_responses(part, None) for part in changing()]
+    return Case(lambda: ChangeDetection(Monitor(learned, MONITORED), "baseline.json"), steps)
 
 
 def fits() -> Case:
-    def step(part: Responses) -> Callable[[Fits], object]:
-        def run(stage: Fits) -> object:
-            out = Written()
-            return stage.take(part, out), out.all
-
-        return run
-
     section = FitSection(model="two-mass", output="velocity", radius_m=0.019)
-    return Case(lambda: Fits(section), [step(part) for part in rows()])
+    return Case(lambda: Fits(section), [lambda stage, part=part: stage.process(part) for part in rows()])
 
 
-def tally() -> Case:
-    def step(part: Block, kind: str) -> Callable[[Tally], object]:
-        def run(stage: Tally) -> object:
+def run_counts() -> Case:
+    def step(part: Block, kind: str) -> Callable[[RunCounts], object]:
+        def run(stage: RunCounts) -> object:
             stage.check.take(part)
             stage.take(responses(), 0.25)
             stage.stop, stage.left_out_samples = part.stop, part.start
@@ -237,7 +215,7 @@ def tally() -> Case:
 
     steps = [step(part, kind) for part, kind in zip(cut(block(), 500, 1000), ("gap", "spike", "gap"))]
     return Case(
-        lambda: Tally(ChannelCheck(("w", "u", "y"), "w"), time.perf_counter()), steps, volatile=frozenset({"run_s"})
+        lambda: RunCounts(ChannelCheck(("w", "u", "y"), "w"), time.perf_counter()), steps, volatile=frozenset({"run_s"})
     )
 
 
@@ -255,7 +233,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, watching, fits, tally,
-        stream_position,
+        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, change_detection, fits,
+        run_counts, stream_position,
     )
 }  # fmt: skip

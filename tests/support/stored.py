@@ -18,9 +18,9 @@ from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records.segments.last_commit import last_commit
 from livebode.runtime import Destination, run
-from livebode.runtime.tracking import record
 from tests.support.command import write_parquet
 from tests.support.recorded import NAMES, Machine
+from tests.support.runs import record
 from tests.support.stateful_cases import baseline
 
 RATE_HZ, SAMPLES, BLOCK, ENDS_AT = 400.0, 1000, 50, 700
@@ -55,10 +55,8 @@ def in_segments(folder: Path) -> None:
 
     source = Source(data(), SAMPLES, BLOCK, end)
     try:
-        record(
-            source, Tracker(SETTINGS), folder, about={"configuration": {"record": KEPT.model_dump()}}, force=False,
-            progress=lambda *_: None, draw=lambda *_: None, kept=KEPT, again=True, tell=lambda _: None,
-        )  # fmt: skip
+        about = {"configuration": {"record": KEPT.model_dump()}}
+        record(source, Tracker(SETTINGS), folder, about=about, segments=KEPT)
     except KeyboardInterrupt:
         return
 

@@ -21,7 +21,7 @@ from livebode.core.errors import (
     StateError,
     UsageError,
 )
-from livebode.core.event import Event
+from livebode.core.event import Emit, Event, ignore
 from livebode.core.lines import Lines
 from livebode.core.loop import Loop
 from livebode.core.model import Gain, Model, as_model
@@ -44,6 +44,7 @@ __all__ = [
     "ConfigError",
     "DamageWarning",
     "DesignError",
+    "Emit",
     "Event",
     "ExtraError",
     "FitError",
@@ -74,6 +75,7 @@ __all__ = [
     "UsageError",
     "as_model",
     "counted",
+    "ignore",
     "nearest_name",
     "rms",
     "rounded_down",

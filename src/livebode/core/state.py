@@ -63,7 +63,7 @@ class StatefulBase:
     _STATE: ClassVar[tuple[str, ...]] = ()
 
     def snapshot(self) -> bytes:
-        """Everything that the next result depends on, exact; see `restore`. Events are not part of it: drain them."""
+        """Everything that the next result depends on, exact; see `restore`."""
         return encode(self._stage, self._state(), self._identity)
 
     def restore(self, snapshot: bytes) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, Responses, StatefulBase
+from livebode.core import Emit, Event, Responses, StatefulBase, ignore
 from livebode.estimation.counted import Counted
 from livebode.estimation.line_stage import LineStage
 
@@ -22,6 +22,7 @@ class AroundLines(StatefulBase, Generic[W]):
     _lines: LineStage
     _watch: W
     _parts: Mapping[str, StatefulBase]
+    _events: list[Event]
     _nothing: Responses | None = None
 
     @property
@@ -41,13 +42,15 @@ class AroundLines(StatefulBase, Generic[W]):
         """Share of the reference's power that repeats from period to period, shape (lines,); see `LineStage`."""
         return self._lines.repeatability()
 
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: missing and excluded samples, and verdicts on lines."""
-        return sorted(self._watch.drain() + self._lines.drain(), key=lambda event: event.sample)
-
-    def finish(self) -> Responses | None:
+    def finish(self, _emit: Emit = ignore, /) -> Responses | None:
         """Remaining responses at the end: always an empty batch; None where no samples came."""
         return self._nothing
+
+    def _hand_over(self, emit: Emit) -> None:
+        """Emit the events that its parts found in this batch: missing and excluded samples, and verdicts on lines."""
+        for event in sorted(self._events, key=lambda event: event.sample):
+            emit(event)
+        self._events.clear()
 
     def _state(self) -> dict[str, Any]:
         return dict(self._parts)

@@ -57,7 +57,9 @@ class LineStage(StatefulBase):
     _stage = Stage("line-stage", 1)
     _STATE = ("_moments", "_movement", "_moving", "_largest")
 
-    def __init__(self, settings: Settings, sent: Collection[int] | None = None) -> None:
+    def __init__(
+        self, settings: Settings, sent: Collection[int] | None = None, *, events: list[Event] | None = None
+    ) -> None:
         lines = settings.lines
         self._settings, self._roles = settings, settings.roles
         self._hann = Hann(lines) if settings.hann else None
@@ -71,7 +73,7 @@ class LineStage(StatefulBase):
         self._movement = Movement(self._places)
         self._moving = 0
         self._largest = 0.0
-        self._events: list[Event] = []
+        self._events = [] if events is None else events
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -79,11 +81,6 @@ class LineStage(StatefulBase):
         lines = self._settings.lines
         bins = self._hann.bins if self._hann else np.asarray(lines.bins)
         return np.concatenate([bins, self._detection.bins]).astype(np.int64) if self._detection else bins
-
-    def drain(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
 
     def found(self) -> dict[str, Any]:
         """The basis of the responses as plain data for a record: rate, window, lines, hop, the noise's origin."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Block, SignalError, Stage
+from livebode.core import Block, Event, SignalError, Stage
 from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
 
@@ -20,8 +20,8 @@ class Watch(Counted):
 
     _stage = Stage("sample-counts", 1)
 
-    def __init__(self, window: int) -> None:
-        super().__init__(_KINDS, -window)
+    def __init__(self, events: list[Event], window: int) -> None:
+        super().__init__(events, _KINDS, -window)
         self._window = window
 
     def starts(self, block: Block) -> bool:
@@ -63,4 +63,4 @@ class Watch(Counted):
 
     def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
         message = f"{what}; responses are invalid until a window of {self._window} samples is complete again"
-        self._tell(kind, block, sample, message, **details)
+        self._report(kind, block, sample, message, **details)

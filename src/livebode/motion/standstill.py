@@ -43,13 +43,13 @@ class Standstill(StatefulBase):
     _stage = Stage("standstill", 1)
     _STATE = ("_noise", "_drag", "_until")
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, events: list[Event]) -> None:
         self._settings = settings
         self._window = settings.lines.window
         self._noise = 0.0  # Σ|R|² over the lines where the axis moves
         self._drag = np.inf  # mean torque in steady motion; unlimited while unknown
         self._until = -1  # end of the last stretch in which friction stopped it
-        self._events: list[Event] = []
+        self._events = events
 
     def stretches(self, left: Residual, chunk: Chunk) -> list[tuple[int, int]]:
         """Numbers of the first and last sample of stretches with changes of sign less than a window apart.
@@ -98,16 +98,12 @@ class Standstill(StatefulBase):
             stretch = Stretch(first, last, float(np.sqrt(excess)))
             if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
                 if not goes_on:
-                    self._say(stretch, tracked)
+                    self._report(stretch, tracked)
                 self._until = last
                 done.append(stretch)
         return done
 
-    def drain(self) -> list[Event]:
-        events, self._events = self._events, []
-        return events
-
-    def _say(self, stretch: Stretch, tracked: Responses) -> None:
+    def _report(self, stretch: Stretch, tracked: Responses) -> None:
         lines = self._settings.lines
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
