@@ -233,7 +233,7 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, change_detection, fits,
-        run_counts, stream_position,
+        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, change_detection,
+        fits, run_counts, stream_position,
     )
 }  # fmt: skip
