@@ -81,10 +81,10 @@ def tracker() -> Case:
     def other() -> Tracker:
         return Tracker(Settings(lines=LINES, excitation="w", input="u", output="y", hop=5))
 
-    def as_told() -> Tracker:
+    def configured() -> Tracker:
         return Tracker(SETTINGS)
 
-    return Case(as_told, processed(cut(block(), 333, 777, 1100)), [other])
+    return Case(configured, processed(cut(block(), 333, 777, 1100)), [other])
 
 
 def spectra() -> Iterator[Spectra]:
