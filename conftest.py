@@ -6,6 +6,10 @@ cores, because many tests wait for something: a machine that sends at its pace, 
 """
 
 import os
+import sys
+from collections.abc import Iterator
+
+import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -13,3 +17,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 def pytest_xdist_auto_num_workers() -> int:
     """Of `-n auto`."""
     return (os.cpu_count() or 1) + 1
+
+
+@pytest.fixture(autouse=True)
+def _no_open_figure() -> Iterator[None]:
+    """A figure of pyplot that an example leaves open would be the current one of the next test."""
+    yield
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
+        pyplot.close("all")

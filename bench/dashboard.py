@@ -68,6 +68,8 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
         )  # fmt: skip
         block = Block(np.zeros((1, 10)), ("y",), RATE_HZ, start=n * 10)
         before = time.perf_counter()
+        assert hub.overview is not None
+        hub.overview.add(one)
         hub(one)
         hub(Fitted((fit,)))
         hub(Tracked(block, 0, None))

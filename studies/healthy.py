@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
 from livebode.simulation import Drive, Friction, FrictionChange, Mechanics, Sensor, StrokeSequence, TensionLoss
 from studies.monitoring_axis import (
     CHANNELS,
@@ -38,7 +38,6 @@ from studies.monitoring_axis import (
 )
 
 NAMES = ("u", "velocity", "x")
-ASKED = "one in 30 days of motion"
 SECONDS, LEARNED_RUNS, FRICTION_N = 60.0, 5, 15.0
 _COUNTS = 1 << 20
 _STEP_RAD_PER_S = 2 * np.pi / _COUNTS * RATE_HZ  # of the velocity, for one count
@@ -134,7 +133,7 @@ def learned(condition: Condition) -> Machine:
 
 
 def judged(machine: Machine, blocks: Iterable[Block]) -> list[Event]:
-    monitor = MachineMonitor(machine, LINES, NAMES, seconds_between(ASKED))
+    monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in blocks for event in monitor.process(block)] + monitor.finish()
 
 

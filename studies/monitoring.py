@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event
-from livebode.monitoring import Evidence, Machine, MachineDetector, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, Machine, MachineDetector, MachineMonitor, learn_machine
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine_detector import CHARTS
 from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, StrokeSequence, TensionLoss
@@ -38,7 +38,6 @@ from studies.monitoring_axis import (
 from studies.monitoring_drawing import draw
 
 NAMES = ("u", "velocity", "x")
-ASKED = "one in 30 days of motion"
 SPOT_WIDTH_M = 0.0777  # of the simulation's bell: 10 cm at half its depth
 
 
@@ -46,8 +45,8 @@ def learned() -> Machine:
     return learn_machine(healthy_runs(), LINES, input=NAMES[0], output=NAMES[1], schedule=NAMES[2], radius_m=RADIUS_M)
 
 
-def monitor(machine: Machine, asked: str = ASKED) -> MachineMonitor:
-    return MachineMonitor(machine, LINES, NAMES, seconds_between(asked))
+def monitor(machine: Machine) -> MachineMonitor:
+    return MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from livebode.monitoring import Evidence, Machine, MachineMonitor, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, Machine, MachineMonitor
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.offset import Offset
 from livebode.monitoring.stretches import Stretches
@@ -33,7 +33,7 @@ def draw(machine: Machine, path: Path) -> None:
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), layout="constrained")
     for place, (title, (faults, direction)) in zip(axes.ravel(), _CASES.items()):
         motion = strokes(8, np.random.default_rng(12))
-        watcher = MachineMonitor(machine, LINES, NAMES, seconds_between("one in 30 days of motion"))
+        watcher = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
         plain, stretches = ModelEvidence(machine, LINES), Stretches(NAMES, LINES.window, LINES.rate_hz)
         events, kept = [], []
         for block in run(axis(motion, 4, faults=faults))():

@@ -13,7 +13,7 @@ import numpy as np
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.monitoring import Apart, Rows, Table, TableMonitor, learn_table, places, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Apart, Rows, Table, TableMonitor, learn_table, places
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Standstill, TensionLoss
 
 RATE_HZ, WINDOW, START_S = 4000.0, 1000, 30.0
@@ -48,7 +48,7 @@ def judged(table: Table, loss: float, seed: int) -> tuple[list[bool], float]:
     axis, parts = rows(seed, START_S + 10.0, TensionLoss(loss=loss, start_s=START_S))
     before, after = (axis.linear(0.8, t).sampled(RATE_HZ).response(LINES.frequency_hz) for t in (0.0, START_S + 5.0))
     quotient = dict(zip(table.names, after / before))
-    monitor = TableMonitor(table, seconds_between("one in 30 days of motion"), WINDOW / RATE_HZ)
+    monitor = TableMonitor(table, DEFAULT_INTERVAL_S, WINDOW / RATE_HZ)
     event = next(e for e in monitor.process(parts[0]) + monitor.finish() if e.kind == "change")
     covered = []
     for change in event.details["changes"]:

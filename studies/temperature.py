@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Channel, Event
-from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
 from livebode.simulation import Friction, Mechanics, TensionLoss
-from studies.healthy import ASKED, NAMES, any_start
+from studies.healthy import NAMES, any_start
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, RADIUS_M, axis, run
 
 PER_KELVIN, MEAN_C, DRIFT_K, SENSOR_K = 0.002, 22.0, 0.3, 0.05
@@ -60,7 +60,7 @@ def learned(kelvins: Sequence[float], covariates: Sequence[str], seconds: float 
 
 
 def judged(machine: Machine, blocks: Iterable[Block]) -> list[Event]:
-    monitor = MachineMonitor(machine, LINES, NAMES, seconds_between(ASKED))
+    monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in blocks for event in monitor.process(block)] + monitor.finish()
 
 

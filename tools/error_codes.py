@@ -32,7 +32,8 @@ def page() -> str:
 
 def _section(kind: type[LivebodeError]) -> str:
     codes = "\n".join(f"| `{kind.area}.{code}` | {text} |" for code, text in kind.codes.items())
-    return f"## {kind.__name__}\n\n{inspect.getdoc(kind)}\n\n| code | meaning |\n|---|---|\n{codes}\n"
+    meaning = (inspect.getdoc(kind) or "").partition("\n\nExamples\n")[0]
+    return f"## {kind.__name__}\n\n{meaning}\n\n| code | meaning |\n|---|---|\n{codes}\n"
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ from scipy.io import loadmat
 
 from livebode import Lines, open_log
 from livebode.core import LivebodeError
-from livebode.design import Waveform, choose, write
 from livebode.excitation import multisine
+from livebode.experiment_design import Waveform, choose, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import Run
 from livebode.report import save_excitation_picture

@@ -64,7 +64,7 @@ def test_a_learned_baseline_reports_a_fault_in_a_later_run(tmp_path: Path) -> No
     assert [e["kind"] for e in events(tmp_path / "two")] == ["change", "noise-from-detection-lines"]
 
     again = run(
-        log, tmp_path / "three", *MOVING, "--baseline", tmp_path / "healthy.json", "--false-alarms", "once a day"
+        log, tmp_path / "three", *MOVING, "--baseline", tmp_path / "healthy.json", "--false-alarm-interval", "1"
     )
     assert "No change against the baseline" in again.out
     _refusals(tmp_path, log)
@@ -136,8 +136,8 @@ def _not_fitted(toml: Path, base: Path, tmp_path: Path) -> None:
     blind = livebode("run", toml, "--baseline", base, "--out", tmp_path / "three")
     assert blind.code == 0, blind.err
     assert blind.out.count("parameters are not judged: the run has no [fit]") == 1
-    alone = livebode("run", toml, "--false-alarms", "once a year", "--average", "--out", tmp_path / "four")
-    assert "'once a year' has no effect without one" in alone.out
+    alone = livebode("run", toml, "--false-alarm-interval", "365", "--average", "--out", tmp_path / "four")
+    assert "false_alarm_interval_days = 365 has no effect without one" in alone.out
     averaged = livebode("learn", tmp_path / "four", "--out", tmp_path / "x.json")
     assert (averaged.code, "was created with tracking.average" in averaged.err) == (2, True)
 
@@ -147,8 +147,8 @@ def _refusals(tmp_path: Path, log: Path) -> None:
     other = run(log, tmp_path / "four", *MOVING[:-2], "--baseline", base)
     assert (other.code, "schedule x" in other.err) == (2, True)
     assert not (tmp_path / "four").exists()
-    words = run(log, tmp_path / "four", *MOVING, "--baseline", base, "--false-alarms", "hardly ever")
-    assert (words.code, "cannot be read; write for example" in words.err) == (2, True)
+    never = run(log, tmp_path / "four", *MOVING, "--baseline", base, "--false-alarm-interval", "0")
+    assert (never.code, "--false-alarm-interval" in never.err) == (2, True)
     twice = livebode("learn", tmp_path / "one", "--out", base)
     assert (twice.code, "--force" in twice.err) == (2, True)
     same = livebode("learn", tmp_path / "one", f"{tmp_path / 'one'}/.", "--out", tmp_path / "x.json")
@@ -176,12 +176,12 @@ def test_axis_toml_names_the_baseline(tmp_path: Path) -> None:
     (tmp_path / "axis.toml").write_text(
         '[source]\nlog = "a.parquet"\n[signals]\noutput = "velocity"\ninput = "u"\nexcitation = "w"\n'
         '[lines]\nfrequencies = "20:140:20"\nwindow = 400\n[tracking]\nnoise = "quiet"\n'
-        '[monitoring]\nbaseline = "base.json"\nfalse_alarms = "one in 7 days"\n',
+        '[monitoring]\nbaseline = "base.json"\nfalse_alarm_interval_days = 7\n',
         encoding="utf-8",
     )
     assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "two").code == 0
     monitoring = json.loads((tmp_path / "two" / "run.json").read_text("utf-8"))["monitoring"]
-    assert (monitoring["false_alarms"], monitoring["judged_by"]) == ("one in 7 days", "tables")
+    assert (monitoring["false_alarm_interval_days"], monitoring["judged_by"]) == (7.0, "tables")
 
 
 def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:

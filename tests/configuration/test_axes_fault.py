@@ -51,7 +51,7 @@ spikes = ["u"]
 hann = false
 dtype = "float64"
 [monitoring]
-false_alarms = "one in 30 days of motion"
+false_alarm_interval_days = 30.0
 [loop]
 excitation_at = "plant input"
 entry_gain = 1.0

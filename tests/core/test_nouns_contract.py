@@ -87,7 +87,7 @@ def test_a_response_is_a_model_at_its_lines_and_nowhere_else() -> None:
 
 def test_a_response_becomes_python_controls_frd_at_its_valid_lines() -> None:
     measured = response(Lines.parse("20:80:20", 4000, 400))
-    frd = measured.to_control()
+    frd = measured.to_frd()
     assert np.allclose(frd.omega, 2 * np.pi * np.array([40, 60, 80]))
     assert np.allclose(np.squeeze(frd.frdata), measured.value[1:])
 
@@ -223,7 +223,7 @@ def test_a_feedback_without_a_frequency_response_is_a_type_error() -> None:
 
 @pytest.mark.parametrize("quantity", ["plant", "open loop"])
 def test_an_exported_response_is_drawn_by_python_control(quantity: Quantity) -> None:
-    frd = replace(response(Lines.parse("20:80:20", 4000, 400)), quantity=quantity).to_control()
+    frd = replace(response(Lines.parse("20:80:20", 4000, 400)), quantity=quantity).to_frd()
     drawn = control.bode_plot(frd)
     assert quantity in drawn.axes[0, 0].get_figure()._suptitle.get_text()
     pyplot.close("all")

@@ -255,11 +255,13 @@ def test_a_continued_run_is_not_mixed_with_the_previous_one(tmp_path: Path) -> N
     state = State("axis", 0, hub)
     summary = dict(watched.record().summary)
     summary.pop("record")
-    hub(RunStarted(old, summary, RunControl(), Overview()))
+    overview = Overview()
+    hub(RunStarted(old, summary, RunControl(), overview))
     state.refresh()
     with refused(ServerError, "not-begun"):
         Past.of(state).between(0, 1, 10)
     rows = watched.record().responses()[:5]
+    overview.add(rows)
     hub(rows)
     state.refresh()
     assert len(Past.of(state).between(-10, 10, 1000)) == 5

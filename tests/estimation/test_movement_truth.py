@@ -71,7 +71,7 @@ def test_an_axis_that_moves_is_seen_wherever_it_is(name: str, offset: float, uni
 @pytest.mark.parametrize("hop", [800, 200, 40])
 def test_a_run_records_whether_the_axis_moved(hop: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     for i, (x, moved) in enumerate([(STILL["sensor noise"], False), (50 + MOVING["strokes"], True)]):
-        tracker, responses = tracked(x, hop)
+        tracker, responses, _ = tracked(x, hop)
         found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}
         run = write_run(tmp_path_factory.mktemp(f"{i}") / "run", responses, found=found)
         assert averaged(Run.open(run)).moved == moved

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import Block, Lines, LivebodeError, Loop, SignalError
+from livebode.core import Block, Lines, LivebodeError, Loop, SignalError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.kernel import instruction_sets
 from tests.support.errors import refused
 from tests.support.found import with_events
 
@@ -181,3 +182,10 @@ def test_blocks_that_do_not_fit_are_refused() -> None:
 def test_an_unknown_logging_moment_is_refused() -> None:
     with pytest.raises(LivebodeError, match="input_logged='later'"):
         Loop(input_logged="later")
+
+
+def test_an_instruction_set_that_does_not_exist_is_refused_with_those_that_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIVEBODE_INSTRUCTION_SET", "mmx")
+    allowed = ["best", *instruction_sets()]
+    with refused(UsageError, "not-one-of", argument="LIVEBODE_INSTRUCTION_SET", value="mmx", allowed=allowed):
+        tracker()

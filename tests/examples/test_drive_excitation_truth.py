@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from livebode import Lines, multisine
-from livebode.design import Waveform, write
+from livebode.experiment_design import Waveform, write
 from tools.firmware import KERNEL, ROOT, run
 
 FOLDER = ROOT / "examples" / "drive"

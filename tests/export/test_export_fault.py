@@ -40,8 +40,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         (("--to", "excel"), "'excel' is not a format for responses; choose csv, mat, netcdf or uff"),
         (("--to", "uff", "--parameters"), "'uff' is not a format for parameters; choose csv or mat"),
-        (("--to", "xarray"), "xarray is not a file format; in Python use to_xarray"),
-        (("--to", "control"), "control is not a file format; in Python use mean_response(Run"),
+        (("--to", "xarray"), "xarray is not a file format; in Python use livebode.Run(path).responses.to_xarray()"),
+        (("--to", "control"), "control is not a file format; in Python use livebode.Run(path).average.to_frd()"),
         (("--to", "csv", "--at", "1", "--mean"), "--at and --mean exclude each other"),
         (("--to", "csv", "--at", "nan"), "nan is not finite; give seconds in the recording's clock"),
         (("--to", "csv", "--at", "99"), "no valid response is within half a window (0.05 s) of 99 s; use the nearest"),

@@ -17,7 +17,7 @@ import xarray as xr
 from hypothesis import given, settings
 
 from livebode.core import Lines, Responses, SignalError
-from livebode.export import at, to_xarray, write_csv, write_mat, write_netcdf, write_uff
+from livebode.export import at, write_csv, write_mat, write_netcdf, write_uff
 from livebode.sources import open_log
 from tests.support.errors import refused
 from tests.support.responses import any_responses, cut, made
@@ -74,7 +74,7 @@ def test_netcdf_is_read_back_by_xarray_as_the_responses(
 ) -> None:
     path = tmp_path_factory.mktemp("netcdf") / "a.nc"
     assert write_netcdf(path, cut(responses, 1), ABOUT).rows == len(responses)
-    memory = to_xarray(responses, ABOUT)
+    memory = responses.to_xarray()
     with xr.open_dataset(path) as file:
         file.load()
     assert memory["response"].dims == ("time_s", "frequency_hz")
@@ -87,12 +87,12 @@ def test_netcdf_is_read_back_by_xarray_as_the_responses(
         same(dataset["frequency_hz"], responses.lines.frequency_hz)
         assert dataset["sigma"].attrs["units"] == (responses.unit or "1")
         assert dataset.attrs["rate_hz"] == responses.lines.rate_hz
-        assert json.loads(dataset.attrs["run"]) == ABOUT
+    assert json.loads(file.attrs["run"]) == ABOUT
 
 
 def test_xarray_selects_by_moment_and_line() -> None:
     responses = made(50, LINES, hole=0.0)
-    dataset = to_xarray(responses)
+    dataset = responses.to_xarray()
     found = dataset["response"].sel(time_s=responses.time_s[7] + 1e-4, frequency_hz=60, method="nearest")
     assert complex(found) == responses.value[7, 2]
 
@@ -163,7 +163,7 @@ def test_uff_is_evenly_spaced_where_that_is_exact(tmp_path: Path) -> None:
 def test_one_response_of_many_converts_to_python_control() -> None:
     responses = made(30, LINES, hole=0.2)
     response = at([responses], responses.time_s[11])
-    frd = response.to_control()
+    frd = response.to_frd()
     assert isinstance(frd, control.FrequencyResponseData)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Event
-from livebode.monitoring import Machine, MachineMonitor, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
 from livebode.monitoring.charts import Charts
@@ -18,10 +18,9 @@ from livebode.monitoring.run_offset import RunOffset
 from livebode.simulation import TensionLoss
 from tests.support.axes import LINES
 from tests.support.monitored import NAMES, ideal
-from tests.support.warm import ASKED, at_temperature, judged
+from tests.support.warm import at_temperature, judged
 
 SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
-MEAN_S = seconds_between(ASKED)
 BELT = BetweenRuns(np.array([-0.005, 0.0, 0.0, 0.0]), spread=2.0)
 
 
@@ -112,7 +111,7 @@ def test_windows_without_information_are_projected_to_none_and_charts_refuse_wha
 
 def test_a_loss_is_found_in_a_run_that_begins_without_torque() -> None:
     statuses: list[str] = []
-    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S), []
+    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, DEFAULT_INTERVAL_S), []
     for block in at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=8.0)():
         data = block.data.copy()
         data[block.index("u"), : max(2 * 4000 - block.start, 0)] = 0.0
@@ -220,11 +219,11 @@ def test_cut_and_restored_anywhere_the_events_are_the_same() -> None:
     blocks = list(at_temperature(4.0, 20_000, TensionLoss(loss=0.01, start_s=5.0), seconds=7.0)())
     assert len(blocks) == 1
     pieces = [blocks[0].cut(at, at + 3333) for at in range(0, len(blocks[0]), 3333)]
-    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S), []
+    monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, DEFAULT_INTERVAL_S), []
     for piece in pieces:
         events += monitor.process(piece)
         snapshot = monitor.snapshot()
-        monitor = MachineMonitor(without_sensor(), LINES, NAMES, MEAN_S)
+        monitor = MachineMonitor(without_sensor(), LINES, NAMES, DEFAULT_INTERVAL_S)
         monitor.restore(snapshot)
     events += monitor.finish()
     assert changes(events) == ["stiffness"]

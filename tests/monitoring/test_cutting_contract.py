@@ -75,8 +75,12 @@ def test_a_baseline_of_other_runs_is_refused() -> None:
     ):
         with refused(BaselineError, "settings-differ", setting=setting, learned=own):
             Monitor(learned, other)
-    with refused(UsageError, "unreadable", argument="false_alarms", value="now and then"):
-        Monitor(learned, SETTINGS, "now and then")
+
+
+@pytest.mark.parametrize("interval_s", [0.0, -3.0, float("nan"), float("inf")])
+def test_an_interval_that_is_not_positive_and_finite_is_refused(interval_s: float) -> None:
+    with refused(UsageError, "out-of-range", argument="false_alarm_interval_s"):
+        Monitor(baseline(False), SETTINGS, interval_s)
 
 
 def test_a_run_without_a_judged_window_is_reported() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
 from livebode.simulation import SimulatedAxis, TensionLoss
 from tests.support.axes import LINES
 from tests.support.monitored import CHANNELS, NAMES, RADIUS_M, THERE, axis, pieces, recorded, strokes, told, watcher
@@ -35,7 +35,7 @@ def test_one_speed_and_one_way_fake_no_stiffness_on_the_way_back() -> None:
     learned = one_way()
     assert learned.fastest_m_per_s < 1.1 * SPEED_M_PER_S
     for seed, speed in ((90, 0.92 * SPEED_M_PER_S), (91, 1.07 * SPEED_M_PER_S)):
-        monitor = MachineMonitor(learned, LINES, NAMES, seconds_between("one in 30 days of motion"))
+        monitor = MachineMonitor(learned, LINES, NAMES, DEFAULT_INTERVAL_S)
         events = monitor.process(recorded((speed,) * 6, seed=seed)) + monitor.finish()
         found = [e.details for e in events if e.kind == "change"]
         assert [d["what"] for d in found if d["place_m"] is None] == []

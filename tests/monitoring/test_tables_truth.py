@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from livebode.core import BaselineError
-from livebode.monitoring import Rows, TableMonitor, learn_table, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Rows, TableMonitor, learn_table
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from tests.support.errors import refused
@@ -31,9 +31,9 @@ def made(windows: int, seed: int, *, factor: np.ndarray | float = 1.0, louder: f
     return Rows(mean + scatter, variance, schedule, step, 0.1 * at, 400 * at + 399, ok)
 
 
-def monitor(what: str = "lines", asked: str = "one in 30 days of motion") -> TableMonitor:
+def monitor(what: str = "lines", interval_s: float = DEFAULT_INTERVAL_S) -> TableMonitor:
     table = learn_table(what, NAMES, [made(6000, 1, real=what == "parameters")])
-    return TableMonitor(table, seconds_between(asked), 0.1)
+    return TableMonitor(table, interval_s, 0.1)
 
 
 def test_the_learned_table_has_the_mean_and_variance_of_the_data() -> None:
@@ -81,7 +81,7 @@ def test_an_amount_is_right_while_the_step_is_in_the_rows_own_scatter() -> None:
     """Thirty steps: 95 % of the bounds cover the truth (24 of 30 is 4 sigma below), dates are right to two windows."""
     table, covered = learn_table("lines", NAMES, [made(6000, 1)]), 0
     for seed in range(30):
-        watcher = TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1)
+        watcher = TableMonitor(table, DEFAULT_INTERVAL_S, 0.1)
         event = next(e for e in watcher.process(stepped(100 + seed)) if e.kind == "change")
         change = next(c for c in event.details["changes"] if c["name"] == "60 Hz" and c["of"] == "magnitude")
         covered += abs(change["amount"] + 26.0) <= change["bound"]
@@ -122,7 +122,7 @@ def test_windows_that_hang_together_are_allowed_for() -> None:
 
     table = learn_table("lines", NAMES, [slow(7)])
     assert table.accuracy.inflation.min() > 2.0
-    assert TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1).process(slow(8)) == []
+    assert TableMonitor(table, DEFAULT_INTERVAL_S, 0.1).process(slow(8)) == []
 
 
 def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
@@ -139,9 +139,8 @@ def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
         value = rows.value / place.value
         return Rows(**(vars(rows) | {"value": value, "schedule": nowhere, "step": nowhere, "ok": np.ones(windows) > 0}))
 
-    asked_s = seconds_between("one in 30 days of motion")
     for seed in range(60):
-        watcher = TableMonitor(learn_table("lines", NAMES, [still(40, 1000 + seed)]), asked_s, 0.1)
+        watcher = TableMonitor(learn_table("lines", NAMES, [still(40, 1000 + seed)]), DEFAULT_INTERVAL_S, 0.1)
         assert watcher.process(still(1500, 2000 + seed)) == []
         assert watcher.judged == 1500
 

@@ -62,14 +62,17 @@ def anything(draw: st.DrawFn) -> Responses:
 
 
 @settings(max_examples=40, deadline=None)
-@given(run=anything(), dark=st.booleans(), few_lines=st.booleans())
-def test_no_run_is_too_odd_to_draw(run: Responses, dark: bool, few_lines: bool) -> None:
+@given(
+    run=anything(), dark=st.booleans(), few_lines=st.booleans(),
+    size=st.tuples(st.integers(2, 140), st.integers(1, 50)),
+)  # fmt: skip
+def test_no_run_is_too_odd_to_draw(run: Responses, dark: bool, few_lines: bool, size: tuple[int, int]) -> None:
     for figure in (bode_figure(run, dark=dark), tracking_figure(run, dark=dark)):
         if few_lines or len(run.lines) < 20:
             FigureCanvasAgg(figure).draw()
-    text = terminal_bode(run, 80, 24, colour=False)
-    assert len(text.split("\n")) <= 24
-    assert max(map(len, text.split("\n"))) <= 80
+    text = terminal_bode(run, *size, colour=False)
+    assert len(text.split("\n")) <= size[1]
+    assert max(map(len, text.split("\n"))) <= size[0]
 
 
 def test_pictures_are_the_same_bytes_each_time_and_differ_between_light_and_dark(tmp_path) -> None:
@@ -116,9 +119,9 @@ def test_the_callers_matplotlib_keeps_its_settings_and_does_not_change_ours(tmp_
 
 
 def test_importing_the_report_loads_no_plotting_library() -> None:
-    look = "import sys, livebode.report; print([m for m in ('matplotlib', 'plotext') if m in sys.modules])"
+    look = "import sys, livebode.report; print('matplotlib' in sys.modules)"
     said = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "[]"
+    assert said.stdout.strip() == "False"
 
 
 def test_drawing_never_imports_pyplot(tmp_path) -> None:

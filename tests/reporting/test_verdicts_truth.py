@@ -30,7 +30,7 @@ def monitored(path: Path, seed: int, changes: int, active: int) -> Path:
     """A healthy-looking run whose monitoring reported so many changes, of which some are still active."""
     change = {"what": "stiffness", "amount_percent": -2.01, "bound_percent": 0.02}
     monitoring: dict[str, Any] = {
-        "baseline": "healthy.json", "false_alarms": "once a year", "judged_by": "model", "judged_s": 24.9,
+        "baseline": "healthy.json", "false_alarm_interval_days": 365.25, "judged_by": "model", "judged_s": 24.9,
         "changes": changes, "cleared": changes - active, "standing": [change] * active,
         "message": f"{changes} changes against the baseline" if changes else "No change against the baseline.",
     }  # fmt: skip

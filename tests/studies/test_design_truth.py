@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from livebode.design import belt_machine, peaks, worst
-from livebode.design.waveform import Waveform
+from livebode.experiment_design import belt_machine, peaks, worst
+from livebode.experiment_design.waveform import Waveform
 from livebode.simulation import extremes
 from studies.design import MOVING, STANDING
 

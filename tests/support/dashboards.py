@@ -143,6 +143,9 @@ def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0, rows: Re
     """A run on these lines, with its first responses, that begins at this time."""
     found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
     found |= {"quantity": "plant", "unit": ""}
-    hub(RunStarted(directory, {"found": found, "configuration": {"loop": LOOP}}, RunControl(), Overview()))
+    overview = Overview()
+    hub(RunStarted(directory, {"found": found, "configuration": {"loop": LOOP}}, RunControl(), overview))
     rows = rows or made(30, lines, hole=0.0, unit="")
-    hub(replace(rows, time_s=rows.time_s + from_s))
+    rows = replace(rows, time_s=rows.time_s + from_s)
+    overview.add(rows)
+    hub(rows)

@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Event, Lines
-from livebode.monitoring import Baseline, Machine, MachineMonitor, Rows, learn_machine, learn_table, seconds_between
+from livebode.monitoring import (
+    DEFAULT_INTERVAL_S,
+    Baseline,
+    Machine,
+    MachineMonitor,
+    Rows,
+    learn_machine,
+    learn_table,
+)
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
@@ -39,8 +47,8 @@ def machine() -> Machine:
     return learn_machine(healthy_runs(2, 6), LINES, input="u", output="velocity", schedule="x", radius_m=RADIUS_M)
 
 
-def watcher(asked: str = "one in 30 days of motion") -> MachineMonitor:
-    return MachineMonitor(machine(), LINES, NAMES, seconds_between(asked))
+def watcher(interval_s: float = DEFAULT_INTERVAL_S) -> MachineMonitor:
+    return MachineMonitor(machine(), LINES, NAMES, interval_s)
 
 
 def strokes(speeds: Sequence[float], ends: tuple[float, float] = THERE) -> StrokeSequence:

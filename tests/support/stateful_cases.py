@@ -171,7 +171,7 @@ def monitor_by_model() -> Case:
     return Case(
         lambda: Monitor(learned, MONITORED),
         [*steps, lambda stage: stage.finish()],
-        [lambda: Monitor(learned, MONITORED, "one in 9 days")],
+        [lambda: Monitor(learned, MONITORED, 9 * 86400.0)],
     )
 
 

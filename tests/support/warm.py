@@ -8,13 +8,12 @@ from functools import partial
 import numpy as np
 
 from livebode.core import Block, Channel, Event
-from livebode.monitoring import Machine, MachineMonitor, seconds_between
+from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor
 from livebode.simulation import Fault, Friction, Mechanics, StrokeSequence, TensionLoss
 from tests.support.axes import LINES, RATE_HZ
 from tests.support.monitored import HIGH_M, LOW_M, NAMES, SPEED_M_PER_S, axis, blocks
 
 PER_KELVIN, MEAN_C, DRIFT_K, SENSOR_K = 0.002, 22.0, 0.3, 0.05
-ASKED = "one in 30 days of motion"
 Run = Callable[[], Iterable[Block]]
 
 
@@ -63,5 +62,5 @@ def _with_sensor(run: Run, kelvin: float, seconds: float, seed: int) -> Iterator
 
 
 def judged(machine: Machine, run: Iterable[Block]) -> list[Event]:
-    monitor = MachineMonitor(machine, LINES, NAMES, seconds_between(ASKED))
+    monitor = MachineMonitor(machine, LINES, NAMES, DEFAULT_INTERVAL_S)
     return [event for block in run for event in monitor.process(block)] + monitor.finish()

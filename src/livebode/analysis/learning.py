@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ _ROLES = ("output", "input", "excitation", "schedule")
 _RADIUS_M = 1.0
 
 
-def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) -> Baseline:
-    """The Baseline of runs of the healthy machine, all with the same lines and signals.
+def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lambda _: None) -> Baseline:
+    """The Baseline of runs of the healthy machine, all with the same lines and signals; as `livebode learn`.
 
     Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
     is also learned, from the recordings of the runs; `say` receives the progress.
@@ -31,10 +32,18 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         If a run cannot be read.
     BaselineError
         If the runs do not match, or contain too little data.
+
+    Examples
+    --------
+    >>> import livebode, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     baseline = learn([livebode.example_run(f"{folder}/healthy", seconds=5)])
+    >>> baseline.tables[0].names[:3], baseline.hop
+    (('20 Hz', '30 Hz', '40 Hz'), 100)
     """
     if not paths:
         raise BaselineError("no-runs", "there is no run to learn from", "name at least one run directory")
-    runs = [Run.open(path) for path in paths]
+    runs = [Run.open(Path(path)) for path in paths]
     axes = [_axis(run) for run in runs]
     _check_once(runs, axes)
     for run, axis in zip(runs, axes):
@@ -65,7 +74,7 @@ def learn(paths: Sequence[Path], say: Callable[[str], None] = lambda _: None) ->
         tuple(tables),
         machine,
         axes[0].motion is not None,
-        tuple(str(path) for path in paths),
+        tuple(str(run.path) for run in runs),
         remark,
     )
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from livebode.design import Design
+    from livebode.experiment_design import Design
 
 _LINES_SHOWN = 25
 
@@ -115,7 +115,7 @@ def _table() -> Table:
 
 def _show_lines(console: Console, design: Design) -> None:
     """A table of the lines; of many lines a selection that contains the weakest."""
-    from livebode.design.encoder import COUNTS_MIN
+    from livebode.experiment_design.encoder import COUNTS_MIN
 
     relative, windows = design.accuracy.relative, design.windows
     each = -(-len(relative) // _LINES_SHOWN)

@@ -13,8 +13,8 @@ from livebode.core import Responses, UsageError
 from livebode.records import Run, to_json
 
 _IN_PYTHON = {
-    "xarray": "to_xarray(Run.open(path).responses()); --to netcdf writes a file that xarray opens",
-    "control": "mean_response(Run.open(path).batches())[0].to_control()",
+    "xarray": "livebode.Run(path).responses.to_xarray(); --to netcdf writes a file that xarray opens",
+    "control": "livebode.Run(path).average.to_frd()",
 }
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from livebode.core import LivebodeError, OutputError, UsageError
 
 _OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
-_UNITS = frozenset({"hz", "s", "n", "m", "db", "deg", "rad"})
+_UNITS = frozenset({"hz", "s", "days", "n", "m", "db", "deg", "rad"})
 _FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 
 

@@ -67,9 +67,9 @@ def run_command(
         Path | None,
         typer.Option(metavar="BASELINE", help="Detect changes from this baseline, a file of `livebode learn`."),
     ] = None,
-    false_alarms: Annotated[
-        str | None,
-        typer.Option(metavar="WORDS", help="Permitted rate of false alarms. \\[default: one in 30 days of motion]"),
+    false_alarm_interval: Annotated[
+        float | None,
+        typer.Option(metavar="DAYS", help="Mean time between false alarms, in days of judged motion. \\[default: 30]"),
     ] = None,
     covariate: Annotated[
         list[str] | None,
@@ -113,7 +113,11 @@ def run_command(
             "accept_roles": accept_roles or None,
             "all_periods": all_periods or None,
         },
-        "monitoring": {"baseline": baseline, "false_alarms": false_alarms, "covariates": covariate or None},
+        "monitoring": {
+            "baseline": baseline,
+            "false_alarm_interval_days": false_alarm_interval,
+            "covariates": covariate or None,
+        },
     }
     said = {section: {k: v for k, v in values.items() if v is not None} for section, values in given.items()}
     over = {section: values for section, values in said.items() if values} | ({"record": {}} if go_on else {})

@@ -81,12 +81,12 @@ class MotionSection(_Section):
 
 
 class MonitoringSection(_Section):
-    """[monitoring]: the baseline, the rate of false alarms as text, and the channels that a baseline's parameters may
-    depend on."""
+    """[monitoring]: the baseline, the mean time between false alarms in days of judged motion, and the channels that a
+    baseline's parameters may depend on."""
 
     baseline: File | None = None
     covariates: Annotated[list[str], Field(max_length=4)] = []
-    false_alarms: str = "one in 30 days of motion"
+    false_alarm_interval_days: Positive = 30.0
 
 
 class _ControllerSection(_Section):

@@ -24,7 +24,7 @@ def read_bytes(path: Path) -> bytes:
         with path.open("rb") as file:
             return file.read(FILE_BYTES_MAX + 1)
     except FileNotFoundError:
-        raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
+        raise ConfigError("file-unreadable", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:
         raise ConfigError(
             "file-unreadable",

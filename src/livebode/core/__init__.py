@@ -1,6 +1,13 @@
 """The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
-from livebode.core.block import Block, Channel, nearest_name
+from livebode.core._block import Block, Channel, nearest_name
+from livebode.core._event import Emit, Event, ignore
+from livebode.core._frequency_response import PER_LINE, PlotKind, Quantity
+from livebode.core._loop import Loop
+from livebode.core._plotting import plot_responses
+from livebode.core._response import PER_RESPONSE, Response, Responses, widened
+from livebode.core._spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
+from livebode.core._wording import counted, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
     BaselineError,
@@ -21,15 +28,10 @@ from livebode.core.errors import (
     StateError,
     UsageError,
 )
-from livebode.core.event import Emit, Event, ignore
 from livebode.core.lines import Lines
-from livebode.core.loop import Loop
 from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
-from livebode.core.response import PER_LINE, PER_RESPONSE, Quantity, Response, Responses, widened
-from livebode.core.spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
 from livebode.core.state import Stage, Stateful, StatefulBase
-from livebode.core.wording import counted, rounded_down
 
 __all__ = [
     "NOT_WHOLE",
@@ -56,6 +58,7 @@ __all__ = [
     "Model",
     "OutputError",
     "Parameters",
+    "PlotKind",
     "PositionPD",
     "Quantity",
     "RecordError",
@@ -77,6 +80,7 @@ __all__ = [
     "counted",
     "ignore",
     "nearest_name",
+    "plot_responses",
     "rms",
     "rounded_down",
     "widened",

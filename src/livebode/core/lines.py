@@ -13,7 +13,7 @@ from livebode.core.errors import GridError, UsageError
 
 # A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then contains a
 # whole number of periods to a millionth, and the leakage is below every other error.
-_ON_GRID_BINS = 1e-6
+ON_GRID_BINS = 1e-6
 _LINES_MAX = 100_000
 _DIGITS_MAX, _SHOWN = 40, 120
 WINDOW_MAX = 1 << 24
@@ -122,7 +122,7 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
                     frequency_hz=float(f),
                     nyquist_hz=rate_hz / 2,
                 )
-            if abs(f / resolution_hz - k) > _ON_GRID_BINS:
+            if abs(f / resolution_hz - k) > ON_GRID_BINS:
                 raise _off_grid(f, wanted, rate_hz, window)
         return cls.of_bins(bins, window, rate_hz)
 
@@ -135,6 +135,16 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
 
     def __len__(self) -> int:
         return len(self.bins)
+
+    def take(self, at: NDArray[np.intp]) -> Lines:
+        """The lines at these positions, with the detection lines between the first and the last of them.
+
+        >>> Lines.parse("20:140:40", rate_hz=4000, window=400).take(np.array([0, 1])).frequency_hz
+        array([20., 60.])
+        """
+        bins = tuple(self.bins[i] for i in at)
+        quiet = tuple(k for k in self.quiet if min(bins) < k < max(bins))
+        return Lines(bins, self.window, self.rate_hz, quiet)
 
     @property
     def resolution_hz(self) -> float:

@@ -14,7 +14,14 @@ from livebode.core.errors import UsageError
 
 @runtime_checkable
 class Model(Protocol):
-    """Anything that has a frequency response: a plant, a controller, a fit, a measured response."""
+    """Anything that has a frequency response: a plant, a controller, a fit, a measured response.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> isinstance(livebode.PID(gain=0.2, rate_hz=4000), Model), isinstance(livebode.example_responses()[-1], Model)
+    (True, True)
+    """
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """Complex response at each frequency, the shape of `frequency_hz`."""

@@ -9,6 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core._wording import counted
 from livebode.core.errors import UsageError
 from livebode.core.rows import joined
 
@@ -59,6 +60,16 @@ class Parameters:
         Shape (rows,): weighted sum of squared residuals by sigma alone, and its expected value for a true model.
     sample, time_s, schedule
         Those of the Response: its newest sample, its effective time, the scheduling signal at that time.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> fitter = livebode.Fitter("two-mass")
+    >>> parameters = fitter.process(livebode.example_responses()[-3:])
+    >>> parameters.names, parameters["Js"].round(4)
+    (('Js', 'JL', 'Keff', 'bs', 'B', 'BL', 'delay'), array([0.0028, 0.0028, 0.0028]))
+    >>> bool((parameters.bound(0.95)[:, 0] < 0.0001).all())
+    True
     """
 
     model: str
@@ -73,6 +84,10 @@ class Parameters:
     sample: NDArray[np.int64]
     time_s: Floats
     schedule: Floats
+
+    def __repr__(self) -> str:
+        valid = f"{np.count_nonzero(self.ok)} of {counted(len(self), 'row')} valid"
+        return f"<Parameters: {self.model}, {', '.join(self.names)}; {valid}>"
 
     def __len__(self) -> int:
         return len(self.sample)

@@ -26,7 +26,7 @@ import numpy as np
 
 from livebode.core import Quantity, Responses
 from livebode.dashboard.quantities import QUANTITIES
-from livebode.report.summary import unwrapped
+from livebode.drawing import unwrapped
 
 KINDS = ("newest", "moment", "reference", "baseline", "model", "rows", "history")
 SIGMAS = 3.0

@@ -61,6 +61,12 @@ class Settings:
     ------
     UsageError
         If a signal that the estimator needs is not named, or a number is out of range.
+
+    Examples
+    --------
+    >>> settings = Settings(lines=Lines.parse("20:140:20", 4000, 400), output="y", input="u", excitation="w", hop=100)
+    >>> settings.estimator, settings.quantity
+    ('joint', 'plant')
     """
 
     lines: Lines

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from math import gcd
 from typing import Any, Literal
@@ -9,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Stage, StatefulBase
+from livebode.core import Stage, StatefulBase, UsageError
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.spikes import SpikeGate
-from livebode.kernel import SlidingDFT
+from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -90,6 +91,7 @@ class LineSpectra(StatefulBase):
         self._started = False
 
     def _fresh(self) -> SlidingDFT:
+        _check_instruction_set()
         return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype)
 
     def restart(self, sample: int) -> None:
@@ -187,3 +189,20 @@ def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], 
     factor = z ** advanced[:, np.newaxis]
     factor[differenced] /= 1 - 1 / z
     return np.asarray(factor)
+
+
+def _check_instruction_set() -> None:
+    """UsageError if the environment names an instruction set that the kernel does not have."""
+    try:
+        instruction_set()
+    except ValueError:
+        name, allowed = os.environ[INSTRUCTION_SET_VARIABLE], ["best", *instruction_sets()]
+        raise UsageError(
+            "not-one-of",
+            f"the environment variable {INSTRUCTION_SET_VARIABLE}={name!r} is not one of the instruction sets of this "
+            "computer",
+            f"unset it, or choose {', '.join(allowed)}",
+            argument=INSTRUCTION_SET_VARIABLE,
+            value=name,
+            allowed=allowed,
+        ) from None

@@ -50,6 +50,14 @@ class Excitation:
     slips
         Phase jumps: samples that were dropped or repeated without a gap. All other attributes are those of the
         realigned excitation, whose sample numbers include the missing ones.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> period = livebode.multisine(livebode.Lines.parse("20:140:20", rate_hz=4000, window=400))
+    >>> excitation = livebode.recognise(np.tile(period, 5), rate_hz=4000)
+    >>> excitation.period, excitation.periods, excitation.transient
+    (200, 10, ())
     """
 
     lines: Lines

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from livebode.core import ConfigError, OutputError, UsageError
-from livebode.design import FORMATS, Design, axis_text, choose, write
+from livebode.experiment_design import FORMATS, Design, axis_text, choose, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import to_json
 from livebode.structured_text import PERIOD_MAX

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from livebode.configuration.axis import LoopSection, nearest
 from livebode.configuration.toml_file import shortened
 from livebode.core import ConfigError
-from livebode.design import Bearable, Machine, Wish, belt_machine
+from livebode.experiment_design import Bearable, Machine, Wish, belt_machine
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 
@@ -58,7 +58,7 @@ class Experiment(BaseModel):
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise ConfigError("file-missing", f"there is no file {path}", "check the name", path=str(path)) from None
+            raise ConfigError("file-unreadable", f"there is no file {path}", "check the name", path=str(path)) from None
         except OSError as error:
             raise ConfigError(
                 "file-unreadable",

@@ -11,9 +11,9 @@ from livebode.configuration.axis import LoopSection
 from livebode.configuration.fit_settings import output_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import ConfigError
-from livebode.design import Machine, MeasuredResponse, measured_machine
-from livebode.design.machine import MOTION_KEYS
-from livebode.design.measured import Output
+from livebode.experiment_design import Machine, MeasuredResponse, measured_machine
+from livebode.experiment_design.machine import MOTION_KEYS
+from livebode.experiment_design.measured import Output
 from livebode.fitting import mean_response
 from livebode.records import Run
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from livebode.configuration.axis import SAME_RATE, Axis
 from livebode.core import ConfigError, Lines, UsageError, counted
-from livebode.design import Waveform
-from livebode.design.files.facts import as_lines
 from livebode.excitation import multisine
+from livebode.experiment_design import Waveform
+from livebode.experiment_design.files.facts import as_lines
 from livebode.sources.live.settings import named_channels
 from livebode.structured_text import SMALLEST, Project, check_rate, check_signals
 

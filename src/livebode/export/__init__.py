@@ -2,7 +2,7 @@
 
 from livebode.export.delimited import write_csv
 from livebode.export.formats import ENDINGS, FORMATS, TABLES, save
-from livebode.export.labelled import to_xarray, write_netcdf
+from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
 from livebode.export.parameters import ParameterTable, write_parameters_csv, write_parameters_mat
 from livebode.export.selection import at
@@ -17,7 +17,6 @@ __all__ = [
     "Written",
     "at",
     "save",
-    "to_xarray",
     "write_csv",
     "write_mat",
     "write_netcdf",

@@ -46,6 +46,13 @@ class Fit:
         compliance". Values, bounds, response and margins include them.
     correlation
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> found = livebode.fit(livebode.example_responses(), "two-mass")
+    >>> found.status, round(found["resonance"], 1), found.response([60.0, 61.5]).shape
+    ('ok', 59.4, (2,))
     """
 
     model: PhysicalModel
@@ -60,6 +67,13 @@ class Fit:
     asked: PhysicalModel | None = None
     taken: tuple[str, ...] = ()
     correlation: float | None = None
+
+    def __repr__(self) -> str:
+        band = f"{self.lines} lines, {self.band_hz[0]:g} … {self.band_hz[1]:g} Hz"
+        if self.status != "ok":
+            return f"<Fit: {self.model.name} to {band}: {self.sentence}>"
+        held = (f"{name} = {value:.5g} ± {bound:.2g} {unit}".strip() for name, value, bound, unit in self.rows())
+        return f"<Fit: {self.model.name} to {band}: {', '.join(held)}>"
 
     @property
     def status(self) -> str:

@@ -48,6 +48,12 @@ class Parameter:
         `low` of zero: a quantity that cannot be negative may be zero, and the fit then gives its upper limit.
     held
         Value at which it is fixed by default; None for a fitted parameter.
+
+    Examples
+    --------
+    >>> damping = Parameter("d", "N m s/rad", start=0.1, low=0.0, high=10.0)
+    >>> damping.held is None
+    True
     """
 
     name: str

@@ -16,19 +16,30 @@ class SlidingDFT(_native.Engine):
     √N·‖x‖₂ of the window, and a non-finite sample has no effect after less than 2N samples. Samples before the first
     are zeros. The results have the same bits for any division of the samples into pushes and blocks, on any machine.
 
-    Args:
-        window: N, samples; 1 … 2^24.
-        bins: different integers 0 ≤ k < N; their order is that of the results. Bin k is k·rate/N in Hz.
-        channels: signals that share one index.
-        dtype: float64 or float32, of samples and sums; results are complex128 or complex64.
-        variant: "modulated". To compare with: "plain" (eq. (4); drifts), "damped" (biased by about N·(1 − damping)),
-            and the windows "hann", "hamming" (three-bin taps) and "blackman" (five-bin taps), each exactly the DFT
-            of the samples under the periodic window of that name.
-        damping: pole radius of variant "damped"; default: 0.9999.
+    Parameters
+    ----------
+    window
+        N, samples; 1 … 2^24.
+    bins
+        Different integers 0 ≤ k < N; their order is that of the results. Bin k is k·rate/N in Hz.
+    channels
+        Number of signals, which share one index.
+    dtype
+        float64 or float32, of samples and sums; results are complex128 or complex64.
+    variant
+        "modulated". To compare with: "plain" (eq. (4); drifts), "damped" (biased by about N·(1 − damping)), and the
+        windows "hann", "hamming" (three-bin taps) and "blackman" (five-bin taps), each exactly the DFT of the samples
+        under the periodic window of that name.
+    damping
+        Pole radius of variant "damped"; default: 0.9999.
 
-    Raises:
-        ValueError: an argument is out of its range; the message names it, its value and the permitted values.
+    Raises
+    ------
+    ValueError
+        If an argument is out of its range; the message names it, its value and the permitted values.
 
+    Examples
+    --------
     >>> dft = SlidingDFT(window=8, bins=[1, 2])
     >>> dft.process([1.0, 2.0, 3.0, 4.0], hop=2).shape
     (2, 2)

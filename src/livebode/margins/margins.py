@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Parameters, UsageError
+from livebode.core import Parameters, UsageError, counted
 from livebode.core.parameters import OK, half_width
 from livebode.core.rows import joined
 
@@ -67,6 +67,13 @@ class Margins:
 
     names = NAMES
     units = UNITS
+
+    def __repr__(self) -> str:
+        if not len(self) or not self.ok[-1]:
+            return f"<Margins: {counted(len(self), 'row')}; {self.status[-1] if len(self) else 'none'}>"
+        last = zip(self.names, self.value[-1], self.bound()[-1], self.units)
+        words = ", ".join(f"{name} {value:.4g} ± {bound:.2g} {unit}".strip() for name, value, bound, unit in last)
+        return f"<Margins: {counted(len(self), 'row')}; {words}>"
 
     def __len__(self) -> int:
         return len(self.sample)

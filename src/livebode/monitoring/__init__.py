@@ -2,7 +2,7 @@
 
 from livebode.monitoring.baseline import Baseline, signals_of
 from livebode.monitoring.evidence import Evidence
-from livebode.monitoring.false_alarms import DEFAULT, seconds_between
+from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.learning import learn_machine
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.machine_detector import MachineDetector
@@ -14,7 +14,7 @@ from livebode.monitoring.table_learning import learn_table
 from livebode.monitoring.table_monitor import TableMonitor
 
 __all__ = [
-    "DEFAULT",
+    "DEFAULT_INTERVAL_S",
     "PLACES",
     "Apart",
     "Baseline",
@@ -29,6 +29,5 @@ __all__ = [
     "learn_machine",
     "learn_table",
     "places",
-    "seconds_between",
     "signals_of",
 ]

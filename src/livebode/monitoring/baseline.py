@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
-from livebode.core import BaselineError, Lines
+from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.rows import PLACES, places
@@ -40,6 +41,15 @@ class Baseline:
         The runs that it was learned from.
     remark
         Reason for the missing machine; empty where there is one.
+
+    Examples
+    --------
+    >>> import livebode, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     baseline = livebode.learn([livebode.example_run(f"{folder}/healthy", seconds=5)])
+    ...     baseline.save(f"{folder}/healthy.json")
+    ...     Baseline.load(f"{folder}/healthy.json")
+    <Baseline: lines and parameters, 13 lines, 20 … 140 Hz; learned from 1 run>
     """
 
     lines: Lines
@@ -52,6 +62,12 @@ class Baseline:
     corrected: bool = False
     runs: tuple[str, ...] = ()
     remark: str = ""
+
+    def __repr__(self) -> str:
+        f, what = self.lines.frequency_hz, [table.what for table in self.tables]
+        learned = " and ".join([*what, "a model of the machine"] if self.machine is not None else what)
+        span = f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz"
+        return f"<Baseline: {learned}, {span}; learned from {counted(len(self.runs), 'run')}>"
 
     def check(self, settings: Settings, corrected: bool = False) -> None:
         """BaselineError where a run with these settings cannot be compared with it."""
@@ -121,17 +137,17 @@ class Baseline:
             )
 
     @classmethod
-    def load(cls, path: Path) -> Baseline:
+    def load(cls, path: str | PathLike[str]) -> Baseline:
         """The baseline in a file; BaselineError where it cannot be read or is not a baseline."""
         from livebode.monitoring.baseline_file import load
 
-        return load(path)
+        return load(Path(path))
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | PathLike[str]) -> None:
         """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content."""
         from livebode.monitoring.baseline_file import save
 
-        save(self, path)
+        save(self, Path(path))
 
 
 def signals_of(settings: Settings) -> dict[str, str | None]:

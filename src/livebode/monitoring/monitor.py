@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
-from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase
+from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError
 from livebode.estimation import Settings
 from livebode.monitoring.baseline import Baseline
-from livebode.monitoring.false_alarms import DEFAULT, seconds_between
+from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.rows import Apart, places
 from livebode.monitoring.table_monitor import TableMonitor
@@ -25,8 +26,8 @@ class Monitor(StatefulBase):
         Learned from healthy runs.
     settings
         Those of the run.
-    false_alarms
-        Permitted rate as text (see `seconds_between`); shared by all charts.
+    false_alarm_interval_s
+        Mean time between false alarms in seconds of judged motion, at least; shared by all charts.
     corrected
         Whether the responses are freed from the axis's motion.
 
@@ -35,17 +36,42 @@ class Monitor(StatefulBase):
     BaselineError
         If the baseline was learned with other lines or signals.
     UsageError
-        If `false_alarms` cannot be read.
+        If `false_alarm_interval_s` is not a positive finite number.
+
+    Examples
+    --------
+    >>> import livebode, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     baseline = livebode.learn([livebode.example_run(f"{folder}/healthy", seconds=5)])
+    >>> settings = Settings(lines=baseline.lines, excitation="w", input="u", output="velocity", hop=baseline.hop)
+    >>> tracker, monitor = livebode.Tracker(settings), Monitor(baseline, settings)
+    >>> for block in livebode.example_axis(seconds=2).blocks():
+    ...     events = monitor.process(block, tracker.process(block))
+    >>> monitor.summary()["message"]
+    'No change against the baseline (1.8 s of the run judged).'
     """
 
     _stage = Stage("monitor", 1)
 
     def __init__(
-        self, baseline: Baseline, settings: Settings, false_alarms: str = DEFAULT, *, corrected: bool = False
+        self,
+        baseline: Baseline,
+        settings: Settings,
+        false_alarm_interval_s: float = DEFAULT_INTERVAL_S,
+        *,
+        corrected: bool = False,
     ) -> None:
         baseline.check(settings, corrected)
-        self.false_alarms, self._baseline, self._settings = false_alarms, baseline, settings
-        mean_s, lines = seconds_between(false_alarms), settings.lines
+        if not (isfinite(false_alarm_interval_s) and false_alarm_interval_s > 0):
+            raise UsageError(
+                "out-of-range",
+                f"{false_alarm_interval_s=} is not a positive finite number",
+                "give the mean time between false alarms in seconds of judged motion",
+                argument="false_alarm_interval_s",
+                value=false_alarm_interval_s,
+            )
+        self.false_alarm_interval_s, self._baseline, self._settings = false_alarm_interval_s, baseline, settings
+        mean_s, lines = false_alarm_interval_s, settings.lines
         apart = lines.window if baseline.machine is not None else baseline.apart
         self._step_s = apart / lines.rate_hz
         self._machine: MachineMonitor | None = None
@@ -104,7 +130,7 @@ class Monitor(StatefulBase):
         )
         judged = self._machine.detector.judged if self._machine else max(t.judged for t in self._tables.values())
         summary = {
-            "false_alarms": self.false_alarms,
+            "false_alarm_interval_days": self.false_alarm_interval_s / 86400,
             "judged_by": "model" if self._machine else "tables",
             "covariates": list(self._baseline.covariates),
             "judged_s": judged * self._step_s,
@@ -131,7 +157,7 @@ class Monitor(StatefulBase):
     @property
     def _identity(self) -> str:
         judges = "machine" if self._machine else ", ".join(self._tables)
-        return f"{self._settings.identity} {self.false_alarms} {judges}"
+        return f"{self._settings.identity} {self.false_alarm_interval_s!r} {judges}"
 
 
 def _message(summary: dict[str, Any], together: str) -> str:

@@ -1,6 +1,6 @@
 """The pictures of a run: Bode plot and tracking as PNG, and a Bode plot for the terminal.
 
-The import is cheap: Matplotlib and plotext are loaded when the first picture is drawn.
+The import is cheap: Matplotlib is loaded when the first picture is drawn.
 """
 
 from livebode.report.bode import bode_figure

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from livebode.core import Model, Response, Responses
 from livebode.core.clock import moment
+from livebode.drawing import bound_db, bound_deg, decibels, ticks
+from livebode.drawing.panel import FEW_LINES, alone, band, bound
 from livebode.language import tr, trn
-from livebode.report import ticks, words
-from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, decibels, summarised
+from livebode.report import words
+from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, style
+from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +24,6 @@ Floats = NDArray[np.float64]
 
 _LEFT = 0.085
 _FIT_POINTS = 600
-# A bound that reaches below this is drawn to the lower edge: the response cannot be distinguished from zero.
-_FLOOR_DB = -1000.0
 
 
 def bode_figure(
@@ -116,16 +116,11 @@ def _panels(figure: Figure, coherent: bool) -> list[Axes]:
 
 
 def _newest_db(summary: Summary) -> tuple[Floats, Floats, Floats]:
-    size = np.abs(summary.newest_value)
-    with np.errstate(all="ignore"):
-        low = np.maximum(decibels(np.maximum(size - summary.newest_bound, 0.0)), _FLOOR_DB)
-        return decibels(size), low, decibels(size + summary.newest_bound)
+    return decibels(summary.newest_value), *bound_db(summary.newest_value, summary.newest_bound)
 
 
 def _newest_deg(summary: Summary) -> tuple[Floats, Floats, Floats]:
-    with np.errstate(all="ignore"):
-        ratio = summary.newest_bound / np.abs(summary.newest_value)
-        half = np.where(ratio >= 1, 180.0, np.degrees(np.arcsin(np.minimum(ratio, 1.0))))
+    half = bound_deg(summary.newest_value, summary.newest_bound)
     return summary.newest_phase_deg, summary.newest_phase_deg - half, summary.newest_phase_deg + half
 
 
@@ -144,37 +139,21 @@ def _draw(
     few = len(f) <= FEW_LINES
     run_marker: dict[str, Any] = {"marker": "o", "markersize": 4.5} if few else {}
     if summary.count > 1:
-        _band(axes, f, run[0], run[2], look.run, 0.2, gid="span")
+        band(axes, f, run[0], run[2], look.run, 0.2, gid="span")
     if summary.count > 1 and median:
         axes.plot(f, run[1], color=look.run, linewidth=1.6, zorder=3, gid="median", **run_marker)
+    bound(axes, f, low, high, look.newest, gid="bound")
     if few:
-        known = np.isfinite(low)
-        axes.vlines(f[known], low[known], high[known], color=look.newest, linewidth=1.6, zorder=4, gid="bound")
         axes.plot(f, value, "_", markersize=9, markeredgewidth=2.0, color=look.newest, zorder=5, gid="newest")
     else:
-        _band(axes, f, low, high, look.newest, 0.28, gid="bound")
         axes.plot(f, value, color=look.newest, linewidth=0.9, zorder=4, gid="newest")
-        alone = _alone(value)
-        axes.plot(f[alone], value[alone], color=look.newest, linestyle="", marker="o", markersize=3, zorder=4)
-
-
-def _band(axes: Axes, f: Floats, low: Floats, high: Floats, colour: str, alpha: float, gid: str) -> None:
-    """Fill the range between neighbouring lines; a line without neighbours gets a bar, to be visible."""
-    axes.fill_between(f, low, high, color=colour, alpha=alpha, linewidth=0, zorder=2, gid=gid)
-    alone = _alone(low + high)
-    if alone.any():
-        axes.vlines(f[alone], low[alone], high[alone], color=colour, alpha=alpha * 1.5, linewidth=8, zorder=2)
-
-
-def _alone(values: Floats) -> NDArray[np.bool_]:
-    known = np.isfinite(values)
-    beside = np.zeros_like(known)
-    beside[1:] |= known[:-1]
-    beside[:-1] |= known[1:]
-    return known & ~beside
+        single = alone(value)
+        axes.plot(f[single], value[single], color=look.newest, linestyle="", marker="o", markersize=3, zorder=4)
 
 
 def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
+    from livebode.drawing.scales import frequency_axis
+
     magnitude, phase, *rest = panels
     for axes in panels:
         plain(axes)
@@ -194,21 +173,6 @@ def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *pa
         empty_note(magnitude, look)
         for axes in (magnitude, phase):
             axes.set_yticks([])
-
-
-def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
-    """Logarithmic frequency with plain numbers."""
-    from matplotlib.ticker import FixedFormatter, FixedLocator, NullFormatter
-
-    low_hz, high_hz = ticks.frequency_limits(frequency_hz)
-    axes.set_xscale("log")
-    axes.set_xlim(low_hz, high_hz)
-    major = ticks.line_ticks(frequency_hz, low_hz, high_hz)
-    axes.xaxis.set_major_locator(FixedLocator(major))
-    axes.xaxis.set_major_formatter(FixedFormatter([ticks.frequency_label(f) for f in major]))
-    axes.xaxis.set_minor_locator(FixedLocator(ticks.minor_frequency_ticks(low_hz, high_hz)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(axis="x", labelbottom=labels)
 
 
 def _limits(

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Response
+from livebode.drawing import bound_db, bound_deg, decibels, unwrapped
+from livebode.drawing.panel import FEW_LINES
+from livebode.drawing.panel import bound as draw_bound
 from livebode.language import tr, trn
 from livebode.report import words
-from livebode.report.bode import frequency_axis
 from livebode.report.map import frequency_edges
-from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style
-from livebode.report.summary import MEAN_C, decibels, unwrapped
+from livebode.report.style import Style, drawing, heading, new_figure, plain, style
+from livebode.report.summary import MEAN_C
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +26,6 @@ Complex = NDArray[np.complex128]
 PlaceChange = tuple[float, float, bool, Complex, NDArray[np.bool_]]
 """From, to, whether return, ratio and mask of the lines that differ, (lines,) each."""
 
-_FLOOR_DB = -1000.0
 _HEIGHT_IN = 7.8
 
 
@@ -44,6 +45,8 @@ def comparison_figure(
     dark
         Whether to draw light on dark.
     """
+    from livebode.drawing.scales import frequency_axis
+
     look = style(dark)
     f = before.lines.frequency_hz
     with drawing(look):
@@ -79,21 +82,13 @@ def comparison_figure(
     return figure
 
 
-def _bars(value: Complex, radius: Floats) -> tuple[Floats, Floats, Floats]:
-    """Lower and upper bound in dB, and the half-width in degrees."""
-    size = np.abs(value)
-    with np.errstate(all="ignore"):
-        low = np.maximum(decibels(np.maximum(size - radius, 0.0)), _FLOOR_DB)
-        half = np.where(radius >= size, 180.0, np.degrees(np.arcsin(np.minimum(radius / size, 1.0))))
-    return low, decibels(size + radius), half
-
-
 def _response(
     panels: list[Axes], f: Floats, one: Response, turn: Floats, colour: str, name: str
 ) -> tuple[Floats, Floats]:
     """Draw magnitude and phase, and return them."""
     value = np.where(one.valid, one.value, np.nan)
-    low, high, half = _bars(value, one.bound(MEAN_C))
+    radius = one.bound(MEAN_C)
+    (low, high), half = bound_db(value, radius), bound_deg(value, radius)
     db, deg = decibels(value), np.degrees(np.angle(value))
     deg = deg - 360 * np.rint((deg - turn) / 360)
     _known(panels[0], f, db, low, high, colour, name)
@@ -102,19 +97,15 @@ def _response(
 
 
 def _known(axes: Axes, f: Floats, middle: Floats, low: Floats, high: Floats, colour: str, gid: str) -> None:
-    if len(f) <= FEW_LINES:
-        known = np.isfinite(low) & np.isfinite(middle)
-        axes.vlines(f[known], low[known], high[known], color=colour, linewidth=1.6, zorder=4, gid=f"{gid} bound")
-        axes.plot(f, middle, color=colour, linewidth=0.8, marker="_", markersize=8, markeredgewidth=2, gid=gid)
-        return
-    axes.fill_between(f, low, high, color=colour, alpha=0.25, linewidth=0, gid=f"{gid} bound")
-    axes.plot(f, middle, color=colour, linewidth=1.1, gid=gid)
+    draw_bound(axes, f, low, high, colour, 0.25, gid=f"{gid} bound")
+    few: dict[str, Any] = {"marker": "_", "markersize": 8, "markeredgewidth": 2} if len(f) <= FEW_LINES else {}
+    axes.plot(f, middle, color=colour, linewidth=0.8 if few else 1.1, gid=gid, **few)
 
 
 def _ratio(
     panels: list[Axes], look: Style, f: Floats, ratio: Complex, bound: Floats, differs: NDArray[np.bool_]
 ) -> None:
-    low, high, half = _bars(ratio, bound)
+    (low, high), half = bound_db(ratio, bound), bound_deg(ratio, bound)
     deg = np.degrees(np.angle(ratio))
     for axes, middle, under, over, room in (
         (panels[0], decibels(ratio), low, high, 0.5), (panels[1], deg, deg - half, deg + half, 3.0),
@@ -175,7 +166,7 @@ def places_figure(frequency_hz: Floats, places: list[PlaceChange], *, dark: bool
 def _frequencies(axes: Axes, frequency_hz: Floats, edges_hz: Floats) -> None:
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
-    from livebode.report import ticks
+    from livebode.drawing import ticks
 
     axes.set_yscale("log")
     axes.set_ylim(edges_hz[0], edges_hz[-1])

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.drawing.panel import FEW_LINES
 from livebode.report.pictures import save
-from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style
+from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from livebode.design import Design, Waveform
+    from livebode.experiment_design import Design, Waveform
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ from livebode.core import Responses
 from livebode.fitting import Fit
 from livebode.language import number, recognised, tr
 from livebode.margins import Margins, OpenLoop
-from livebode.report.bode import frequency_axis
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, style
 
@@ -97,6 +96,8 @@ def _degrees(value: Complex) -> Floats:
 
 
 def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, curves: tuple[Complex, Any, Any]) -> None:
+    from livebode.drawing.scales import frequency_axis
+
     value, low, high = curves
     inside = (f >= found.fit.band_hz[0]) & (f <= found.fit.band_hz[1])
     for axes, middle, i in ((magnitude, 20 * np.log10(np.abs(value)), 0), (phase, _degrees(value), 1)):

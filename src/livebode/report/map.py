@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses
+from livebode.drawing import decibels, quantiles, ticks
 from livebode.language import tr
-from livebode.report import ticks, words
+from livebode.report import words
 from livebode.report.style import Style, plain
-from livebode.report.summary import decibels, quantiles
 
 if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 DPI = 110
-# Up to this many lines each has a marker and an error bar; more are drawn as a band.
-FEW_LINES = 40
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Response, Responses
+from livebode.drawing import circular, decibels, near, quantiles, unwrapped
 
 Floats = NDArray[np.float64]
 
@@ -23,10 +24,6 @@ PROBABILITY = 0.9973
 BOUND_C = sqrt(-log(1 - PROBABILITY))
 MEAN_PROBABILITY = 0.95
 MEAN_C = sqrt(-log(1 - MEAN_PROBABILITY))
-SPAN = (0.05, 0.95)
-# The middle of an unwrapped phase curve is between −225° and 135°: the cut is as far as possible from the usual angles
-# of machines (multiples of 90°, with a small delay), so that noise does not shift a curve by a whole turn.
-_TURN_FROM_DEG = -225.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ def summarised(responses: Responses, mean: Response | None = None) -> Summary:
         newest, bound = mean, mean.bound(MEAN_C)
         newest_value = np.where(mean.valid & np.isfinite(mean.value) & (mean.value != 0), mean.value, np.nan)
     magnitude_db = quantiles(decibels(value))
-    middle_deg, deviation_deg = _circular(value)
+    middle_deg, deviation_deg = circular(value)
     weak = np.isfinite(bound) & (bound > np.abs(newest_value))
     phase = unwrapped(middle_deg, weak)
     return Summary(
@@ -75,69 +72,10 @@ def summarised(responses: Responses, mean: Response | None = None) -> Summary:
         newest=newest,
         newest_value=newest_value,
         newest_bound=np.where(np.isfinite(newest_value), bound, np.nan),
-        newest_phase_deg=_near(np.degrees(np.angle(newest_value)), phase),
+        newest_phase_deg=near(np.degrees(np.angle(newest_value)), phase),
     )
 
 
 def usable(responses: Responses) -> NDArray[np.bool_]:
     """Mask of the values that can be drawn: valid, finite and not zero, shape (rows, lines)."""
     return np.asarray(responses.valid & np.isfinite(responses.value) & (responses.value != 0))
-
-
-def decibels(value: NDArray[np.complex128] | Floats) -> Floats:
-    """20·log10|value|, −inf for zero, NaN for NaN, without warnings."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(20 * np.log10(np.abs(value)))
-
-
-def quantiles(values: Floats) -> Floats:
-    """5 %, 50 % and 95 % of each column without its NaN, interpolated, shape (3, columns); NaN for an empty column.
-
-    >>> quantiles(np.array([[1.0], [np.nan], [3.0]])).T
-    array([[1.1, 2. , 2.9]])
-    """
-    if not values.shape[0]:
-        return np.full((3, values.shape[1]), np.nan)
-    ordered = np.sort(np.ascontiguousarray(values.T), axis=1)
-    count = np.count_nonzero(np.isfinite(ordered), axis=1)
-    every = np.arange(len(ordered))
-    found = []
-    for q in (SPAN[0], 0.5, SPAN[1]):
-        position = q * np.maximum(count - 1, 0)
-        below = position.astype(np.intp)
-        above = np.minimum(below + 1, np.maximum(count - 1, 0))
-        low, high = ordered[every, below], ordered[every, above]
-        found.append(low + (high - low) * (position - below))
-    return np.array(found)
-
-
-def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
-    """Phase along frequency without jumps of whole turns; shape (lines,), degrees.
-
-    Lines with an unknown phase (`weak`: the bound is larger than the response) follow the others, so that noise cannot
-    add turns to the curve.
-    """
-    known = np.isfinite(phase_deg)
-    lead = known & ~weak if np.any(known & ~weak) else known
-    if not np.any(lead):
-        return phase_deg.copy()
-    at = np.arange(len(phase_deg))
-    led = np.unwrap(phase_deg[lead], period=360.0)
-    middle = (led.min() + led.max()) / 2
-    led -= 360.0 * np.floor((middle - _TURN_FROM_DEG) / 360.0)
-    return _near(phase_deg, np.interp(at, at[lead], led))
-
-
-def _near(phase_deg: Floats, reference_deg: Floats) -> Floats:
-    """The same angles on the branch within half a turn of the reference."""
-    return np.asarray(phase_deg - 360.0 * np.rint((phase_deg - reference_deg) / 360.0))
-
-
-def _circular(value: NDArray[np.complex128]) -> tuple[Floats, Floats]:
-    """Median angle of each column (columns,), and quantiles of the deviation from the mean direction (3, columns)."""
-    with np.errstate(all="ignore"):
-        turned = value / np.abs(value)
-        direction = np.nansum(turned, axis=0)
-        direction = np.where(np.abs(direction) > 0, direction, 1.0)
-        deviation_deg = quantiles(np.degrees(np.angle(turned * direction.conj())))
-    return np.degrees(np.angle(direction)) + deviation_deg[1], deviation_deg

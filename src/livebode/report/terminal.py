@@ -1,24 +1,28 @@
-"""A Bode plot in characters, for the terminal at the end of a run.
+"""A Bode plot in characters, for the terminal at the end of a run: lines of Braille dots, a circle at each line.
 
-plotext draws on a separate figure with a separate terminal object, so no state remains in its module-wide figure, and
-two calls give the same text.
+docs/decisions/0003-terminal-plot.md has the reasons for drawing it here.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.style import Style
 
 from livebode.core import Responses, counted
-from livebode.report import ticks, words
+from livebode.drawing import ticks
+from livebode.report import words
 from livebode.report.style import shortened
 from livebode.report.summary import Summary, summarised
 
 Floats = NDArray[np.float64]
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
+_BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_CURVE, _CIRCLE = Style(color="cyan"), Style(color="bright_yellow")
 _PLAIN = str.maketrans(
     {"─": "-", "│": "|", "–": "-", "−": "-", "…": "~", "·": "*", "×": "x", "°": "deg", "²": "2", "µ": "u", "μ": "u"}
     | dict.fromkeys("┌┐└┘├┤┬┴┼", "+")
@@ -55,58 +59,106 @@ def terminal_bode(
 
 
 def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: bool) -> str:
-    import plotext
-
-    terminal = type(plotext.terminal)()
-    terminal.limit(False, False)
-    figure = type(plotext.figure)(parent=terminal)
-    figure.plot_size(width, height)
-    figure.subplots(2, 1)
-    figure.theme("colorless")
     magnitude_db, phase_deg = summary.magnitude_db[1], summary.phase_deg[1]
     upper = -(-(height - 1) * 5 // 9)  # the lower panel has one more line, the label of the frequency
-    rows = max((upper - 2) // 2, 2)
+    most = max((upper - 2) // 2, 2)
     ranges = [_range(magnitude_db, 1.0), _range(phase_deg, 5.0)]
-    ticks_at = [ticks.linear_ticks(*ranges[0], most=rows), ticks.phase_ticks(*ranges[1], most=max(rows - 1, 2))]
+    ticks_at = [ticks.linear_ticks(*ranges[0], most=most), ticks.phase_ticks(*ranges[1], most=max(most - 1, 2))]
     labels = [[f"{t:g}" for t in at] for at in ticks_at]
     margin = max(len(label) for panel in labels for label in panel)
-    unit = words.magnitude_label(summary.responses, width - margin - 2)
-    for i, (values, title, size) in enumerate(
-        ((magnitude_db, unit, upper), (phase_deg, "phase in degrees", height - upper))
+    columns = width - margin - 2
+    frequency = _frequency_scale(summary, columns)
+    unit = words.magnitude_label(summary.responses, columns)
+    lines: list[str] = []
+    for values, title, rows, limits, at in (
+        (magnitude_db, unit, upper - 3, ranges[0], dict(zip(ticks_at[0], labels[0]))),
+        (phase_deg, "phase in degrees", height - upper - 4, ranges[1], dict(zip(ticks_at[1], labels[1]))),
     ):
-        panel = figure.subplot(i + 1, 1)
-        panel.plot_size(width, size)
-        panel.axes(False, axis=0, side=1)
-        panel.title(_written(title, width, unicode))
-        panel.ruler(1, 0).lim(*ranges[i]).ticks(ticks_at[i], [label.rjust(margin) for label in labels[i]])
-        _frequency_ruler(panel, summary, width - margin - 2)
-        _curve(panel, summary.responses.lines.frequency_hz, values, width, colour, unicode)
-    figure.subplot(2, 1).label("frequency in Hz", 0, 0)
-    return str(figure.build().string(not colour)).rstrip("\n")
+        canvas = _Canvas.blank(rows, columns)
+        level = _Scale(limits[1], limits[0], rows)
+        _curve(canvas, frequency, level, summary.responses.lines.frequency_hz, values)
+        marked = {level.cell(tick): label for tick, label in at.items()}
+        lines.append(_written(title, width, unicode).center(width).rstrip())
+        for row in range(rows):
+            side = f"{marked.get(row, ''):>{margin}}{'┤' if row in marked else '│'}"
+            lines.append(f"{side}{canvas.row(row, colour, unicode)}│")
+        lines += _frequency_axis(summary, frequency, margin)
+    return "\n".join([*lines, "frequency in Hz".center(width).rstrip()])
 
 
-def _frequency_ruler(panel: Any, summary: Summary, canvas: int) -> None:
-    """Ticks at round frequencies; positions are logarithms, because plotext's log scale labels only powers of ten."""
+@dataclass(frozen=True)
+class _Scale:
+    """Linear from the first to the last of so many cells; `begin` may be larger than `end`."""
+
+    begin: float
+    end: float
+    cells: int
+
+    def dot(self, values: Floats, of_a_cell: int) -> NDArray[np.intp]:
+        """Numbers of the dots at these values, so many in each cell."""
+        share = (values - self.begin) / (self.end - self.begin)
+        return np.clip((share * self.cells * of_a_cell).astype(np.intp), 0, self.cells * of_a_cell - 1)
+
+    def cell(self, value: float) -> int:
+        return int(self.dot(np.array([value]), 1)[0])
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """Cells of 4 × 2 dots, and the cells with a circle."""
+
+    dots: NDArray[np.bool_]
+    circles: NDArray[np.bool_]
+
+    @classmethod
+    def blank(cls, rows: int, columns: int) -> _Canvas:
+        return cls(np.zeros((4 * rows, 2 * columns), bool), np.zeros((rows, columns), bool))
+
+    def row(self, row: int, colour: bool, unicode: bool) -> str:
+        """Text of a row; its parts have the colour of a curve or a circle."""
+        dots = self.dots[4 * row : 4 * row + 4].reshape(4, -1, 2)
+        patterns = np.tensordot(dots, _BRAILLE, ((0, 2), (0, 1)))
+        curve = [(chr(0x2800 + pattern) if unicode else ".") if pattern else " " for pattern in patterns.tolist()]
+        circle = "●" if unicode else "o"
+        cells = [circle if circled else letter for circled, letter in zip(self.circles[row].tolist(), curve)]
+        if not colour:
+            return "".join(cells)
+        styles = {" ": Style(), circle: _CIRCLE}
+        parts = groupby(cells, lambda letter: styles.get(letter, _CURVE))
+        return "".join(style.render("".join(part)) for style, part in parts)
+
+
+def _frequency_scale(summary: Summary, columns: int) -> _Scale:
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
-    at = ticks.line_ticks(summary.responses.lines.frequency_hz, low_hz, high_hz, most=max(3, min(10, canvas // 9)))
-    panel.ruler(0, 0).lim(float(np.log10(low_hz)), float(np.log10(high_hz))).ticks(
-        [float(np.log10(f)) for f in at], [ticks.frequency_label(f) for f in at]
-    )
+    return _Scale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
 
 
-def _curve(panel: Any, frequency_hz: Floats, values: Floats, width: int, colour: bool, unicode: bool) -> None:
-    """Draw the curve, interrupted at lines without a value, and a dot at each line if they are few."""
-    from plotext import marker, pixel
+def _frequency_axis(summary: Summary, scale: _Scale, margin: int) -> list[str]:
+    """The lower edge of a panel with ticks at round frequencies, and their numbers as far as there is room."""
+    edge, numbers = ["─"] * scale.cells, ""
+    low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
+    most = max(3, min(10, scale.cells // 9))
+    for tick_hz in ticks.line_ticks(summary.responses.lines.frequency_hz, low_hz, high_hz, most=most):
+        at, label = scale.cell(float(np.log10(tick_hz))), ticks.frequency_label(tick_hz)
+        edge[at] = "┬"
+        begin = min(at - (len(label) - 1) // 2, scale.cells - len(label))
+        if begin > len(numbers) or not numbers:
+            numbers = numbers.ljust(begin) + label
+    return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
 
+
+def _curve(canvas: _Canvas, frequency: _Scale, level: _Scale, frequency_hz: Floats, values: Floats) -> None:
+    """Draw the curve, interrupted at lines without a value, and a circle at each line if they are few."""
     known = np.isfinite(values)
-    x, y = np.log10(frequency_hz[known]).tolist(), values[known].tolist()
-    trace = panel.signal(x, y, marker=marker("braille" if unicode else ".", pixel("cyan") if colour else None))
-    at = np.flatnonzero(known)
-    for i in range(1, len(at)):
-        trace.line(i, bool(at[i] == at[i - 1] + 1))
-    panel.draw(trace)
-    if len(x) <= width // 4:
-        panel.draw(panel.signal(x, y, marker=marker("●" if unicode else "o", pixel("orange+") if colour else None)))
+    across = frequency.dot(np.log10(frequency_hz), 2)
+    down = level.dot(np.where(known, values, level.begin), 4)
+    canvas.dots[down[known], across[known]] = True
+    for i in np.flatnonzero(known[1:] & known[:-1]):
+        ends = np.array([down[i : i + 2], across[i : i + 2]])
+        share = np.linspace(0, 1, int(np.abs(np.diff(ends)).max()) + 1)
+        canvas.dots[tuple(np.rint(ends[:, :1] + np.diff(ends) * share).astype(int))] = True
+    if np.count_nonzero(known) <= frequency.cells // 4:
+        canvas.circles[down[known] // 4, across[known] // 2] = True
 
 
 def _range(values: Floats, least: float) -> tuple[float, float]:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses
+from livebode.drawing import decibels, ticks
 from livebode.language import numerals, tr
-from livebode.report import ticks, words
+from livebode.report import words
 from livebode.report.map import draw_maps
 from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
-from livebode.report.summary import BOUND_C, PROBABILITY, decibels, usable
+from livebode.report.summary import BOUND_C, PROBABILITY, usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

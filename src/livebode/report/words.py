@@ -6,9 +6,9 @@ import numpy as np
 
 from livebode.core import Response, Responses
 from livebode.core.clock import moment, moment_of_start
+from livebode.drawing.ticks import frequency_label
 from livebode.language import marked, numerals, recognised, tr, trn
 from livebode.report.style import shortened
-from livebode.report.ticks import frequency_label
 
 _SYMBOL = {
     marked("plant"): "G",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import dataclass
 from datetime import datetime
@@ -21,7 +22,7 @@ from livebode.records import Run
 from livebode.records.grouped_events import event_counts
 from livebode.reporting.comparison_verdict import verdict
 from livebode.reporting.material import written
-from livebode.reporting.wording import BOUND_95, decibels, polar, signed, to_toml, with_bound
+from livebode.reporting.wording import BOUND_95, decibels, polar, signed, with_bound
 
 _TONES = {**TONES, "ok": marked("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
@@ -219,8 +220,8 @@ def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
     for name, value in values.items():
         if isinstance(value, dict):
             found += _flat(value, f"{path}{name}.")
-        else:
-            found.append((path + name, to_toml({"x": value}).removeprefix("x = ")))
+        elif value is not None:
+            found.append((path + name, json.dumps(value, ensure_ascii=False)))
     return found
 
 

@@ -185,9 +185,9 @@ def events(of: Material) -> Section:
     words = alarms(of.run, of.happenings)[0].text
     if monitoring.get("baseline"):
         words += " " + tr(
-            "Baseline {baseline}, judged by {judge}; false alarms: {rate}.",
+            "Baseline {baseline}, judged by {judge}; mean time between false alarms: {days} days of motion or more.",
             baseline=monitoring["baseline"], judge=recognised(str(monitoring.get("judged_by", "—"))),
-            rate=recognised(str(monitoring.get("false_alarms", "—"))),
+            days=monitoring.get("false_alarm_interval_days", "—"),
         )  # fmt: skip
         if covariates := monitoring.get("covariates"):
             words += " " + tr("Covariates: {names}.", names=listed(covariates))

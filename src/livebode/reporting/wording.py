@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import re
 from math import floor, isfinite, log10
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from livebode.core import Response
 from livebode.core.document import Table
 from livebode.language import number, tr, trn
 
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 BOUND_95 = float(np.sqrt(np.log(20.0)))
 """`Response.bound(BOUND_95)` covers the true value with 95 %."""
 
@@ -112,27 +110,13 @@ def to_toml(values: dict[str, Any]) -> str:
     window = 400
     frequencies = "20:140:20"
     """
-    return "\n".join(_section(values, ())).strip("\n")
+    return tomli_w.dumps(_specified(values)).strip("\n")
 
 
-def _section(values: dict[str, Any], path: tuple[str, ...]) -> list[str]:
-    inner = {name: value for name, value in values.items() if isinstance(value, dict)}
-    own = [f"{_key(n)} = {_value(v)}" for n, v in values.items() if n not in inner and v is not None]
-    # An empty section switches its feature on; within another section it has no effect.
-    head = [f"\n[{'.'.join(map(_key, path))}]"] if path and (own or (not inner and len(path) == 1)) else []
-    return head + own + [line for name, value in inner.items() for line in _section(value, (*path, name))]
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _value(name)
-
-
-def _value(value: Any) -> str:
+def _specified(value: Any) -> Any:
+    """The value without None, which TOML does not have."""
+    if isinstance(value, dict):
+        return {name: _specified(inner) for name, inner in value.items() if inner is not None}
     if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(item) for item in value if item is not None)}]"
-    if isinstance(value, float) and not isfinite(value):
-        return str(value)
-    if isinstance(value, str):
-        # The escapes of JSON are valid in TOML, except for this character, which JSON does not escape.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return json.dumps(value)
+        return [_specified(item) for item in value if item is not None]
+    return value

@@ -84,8 +84,9 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     section = axis.monitoring
     covariates = tuple(section.covariates) if samples else ()
     if section.baseline is None:
-        asked = section.false_alarms != MonitoringSection().false_alarms
-        remark = f" false_alarms = {section.false_alarms!r} has no effect without one." * asked
+        days = section.false_alarm_interval_days
+        asked = days != MonitoringSection().false_alarm_interval_days
+        remark = f" false_alarm_interval_days = {days:g} has no effect without one." * asked
         return ChangeDetection(None, None, remark, covariates)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
@@ -94,7 +95,7 @@ def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) ->
     left_out = not samples and baseline.machine is not None
     if left_out:
         baseline = replace(baseline, machine=None)
-    monitor = Monitor(baseline, settings, section.false_alarms, corrected=axis.motion is not None)
+    monitor = Monitor(baseline, settings, 86400 * section.false_alarm_interval_days, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
     remark = _NOT_FITTED * blind + _NO_SAMPLES * left_out
     return ChangeDetection(monitor, str(section.baseline), remark, baseline.covariates)

@@ -21,6 +21,17 @@ class Log:
     """A recording: its channels, rate and timing, and its samples as Blocks. Created by `open_log`.
 
     Nothing but the time column is read before `blocks` is iterated; every call of `blocks` reads from the start.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from livebode import open_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "log.csv"
+    ...     _ = path.write_text("t [s],iq [A]\\n0.000,1.5\\n0.001,1.6\\n0.002,1.7\\n")
+    ...     log = open_log(path)
+    >>> log.format, log.rate_hz, log.channels[1]
+    ('csv', 1000.0, Channel(name='iq', unit='A'))
     """
 
     def __init__(

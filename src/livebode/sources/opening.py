@@ -52,6 +52,18 @@ def open_log(
         Where `rate_hz` or `block_samples` is out of range.
     ExtraError
         Where the package that reads the format is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "log.csv"
+    ...     _ = path.write_text("t [s],iq [A]\\n0.000,1.5\\n0.001,1.6\\n0.002,1.7\\n")
+    ...     log = open_log(path)
+    ...     [block["iq"] for block in log.blocks(["iq"])]
+    [array([1.5, 1.6, 1.7])]
+    >>> log.rate_hz, log.channels[1]
+    (1000.0, Channel(name='iq', unit='A'))
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(

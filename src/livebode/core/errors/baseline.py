@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class BaselineError(LivebodeError):
-    """A baseline cannot be learned, read, or compared with this run."""
+    """A baseline cannot be learned, read, or compared with this run.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.Baseline.load("missing.json")
+    ... except livebode.BaselineError as error:
+    ...     print(error.code)
+    baseline.absent
+    """
 
     area: ClassVar[str] = "baseline"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class ConfigError(LivebodeError):
-    """A configuration (axis.toml, experiment.toml) cannot be read, or has a key or value that cannot be used."""
+    """A configuration (axis.toml, experiment.toml) cannot be read, or has a key or value that cannot be used.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.design("missing.toml")
+    ... except livebode.ConfigError as error:
+    ...     print(error.code)
+    config.file-missing
+    """
 
     area: ClassVar[str] = "config"
     codes: ClassVar[Mapping[str, str]] = {
@@ -18,7 +28,6 @@ class ConfigError(LivebodeError):
         "axis-name-invalid": "An axis has a name that cannot be the name of its directory.",
         "change-needs-restart": "A changed key cannot be applied while the axis runs.",
         "change-too-early": "A changed configuration cannot be checked before the live source has sent samples.",
-        "file-missing": "There is no such file.",
         "file-open-to-others": "A file with a secret can be read or changed by other users of the computer.",
         "file-too-long": "The file is longer than a configuration may be.",
         "file-unreadable": "A configuration, or a file that it names, does not exist or cannot be read.",

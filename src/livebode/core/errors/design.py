@@ -9,7 +9,18 @@ from livebode.core.errors.base import LivebodeError
 
 
 class DesignError(LivebodeError):
-    """An excitation or experiment that meets the specification and the limits cannot be made."""
+    """An excitation or experiment that meets the specification and the limits cannot be made.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> axis = {"belt": {"drive": {"torque_n_m_max": 0.1}}, "excitation": {"band_hz": [20, 140], "window": 400}}
+    >>> try:
+    ...     livebode.design(axis, amplitude_n_m=1.0)
+    ... except livebode.DesignError as error:
+    ...     print(error.code)
+    design.limit-exceeded
+    """
 
     area: ClassVar[str] = "design"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,14 @@ from livebode.core.errors.base import LivebodeError
 
 
 class ExtraError(LivebodeError):
-    """An optional package that this needs is not installed."""
+    """An optional package that this needs is not installed.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.ExtraError.codes["not-installed"]
+    'The package that this needs is not installed.'
+    """
 
     area: ClassVar[str] = "extra"
     codes: ClassVar[Mapping[str, str]] = {

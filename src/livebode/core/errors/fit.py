@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class FitError(LivebodeError):
-    """A model cannot be fitted, or what follows from a fit (margins, validation) cannot be computed."""
+    """A model cannot be fitted, or what follows from a fit (margins, validation) cannot be computed.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.fit(livebode.example_responses().sel(frequency_hz=[20]), "two-mass")
+    ... except livebode.FitError as error:
+    ...     print(error.code)
+    fit.too-few-lines
+    """
 
     area: ClassVar[str] = "fit"
     codes: ClassVar[Mapping[str, str]] = {

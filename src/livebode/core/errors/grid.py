@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class GridError(LivebodeError):
-    """A frequency is not a line of the grid, or data on different grids were to be combined."""
+    """A frequency is not a line of the grid, or data on different grids were to be combined.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.Lines.parse("25", rate_hz=4000, window=400)
+    ... except livebode.GridError as error:
+    ...     print(error.code)
+    grid.line-off
+    """
 
     area: ClassVar[str] = "grid"
     codes: ClassVar[Mapping[str, str]] = {

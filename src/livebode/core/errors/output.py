@@ -9,7 +9,19 @@ from livebode.core.errors.base import LivebodeError
 
 
 class OutputError(LivebodeError):
-    """A file that was asked for cannot be written."""
+    """A file that was asked for cannot be written.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> from pathlib import Path
+    >>> from livebode.export import save
+    >>> try:
+    ...     save(Path("."), write=Path.touch)
+    ... except livebode.OutputError as error:
+    ...     print(error.code)
+    output.is-directory
+    """
 
     area: ClassVar[str] = "output"
     codes: ClassVar[Mapping[str, str]] = {

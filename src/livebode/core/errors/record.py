@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class RecordError(LivebodeError):
-    """A run's directory cannot be read, written or continued."""
+    """A run's directory cannot be read, written or continued.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.Run("src")
+    ... except livebode.RecordError as error:
+    ...     print(error.code)
+    record.not-a-run
+    """
 
     area: ClassVar[str] = "record"
     codes: ClassVar[Mapping[str, str]] = {

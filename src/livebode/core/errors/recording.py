@@ -9,7 +9,17 @@ from livebode.core.errors.base import LivebodeError
 
 
 class RecordingError(LivebodeError):
-    """A file with recorded samples cannot be read, or is not what was asked for."""
+    """A file with recorded samples cannot be read, or is not what was asked for.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> try:
+    ...     livebode.open_log("missing.csv")
+    ... except livebode.RecordingError as error:
+    ...     print(error.code)
+    recording.not-found
+    """
 
     area: ClassVar[str] = "recording"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,14 @@ from livebode.core.errors.base import LivebodeError
 
 
 class ServerError(LivebodeError):
-    """The dashboard cannot be served or reached."""
+    """The dashboard cannot be served or reached.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.ServerError.codes["port-taken"]
+    'Another program listens at this port.'
+    """
 
     area: ClassVar[str] = "server"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,18 @@ from livebode.core.errors.base import LivebodeError
 
 
 class SignalError(LivebodeError):
-    """The samples do not fit what was asked: no excitation, no period, too short, channels with the wrong role."""
+    """The samples do not fit what was asked: no excitation, no period, too short, channels with the wrong role.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> block = livebode.Block([[0.0] * 10, [1.0] * 10], ("u", "y"), rate_hz=1000)
+    >>> try:
+    ...     livebode.welch(block, input="u", output="y", window=20)
+    ... except livebode.SignalError as error:
+    ...     print(error.code)
+    signal.too-short
+    """
 
     area: ClassVar[str] = "signal"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,19 @@ from livebode.core.errors.base import LivebodeError
 
 
 class SimulationError(LivebodeError):
-    """A machine with these parameters cannot be simulated."""
+    """A machine with these parameters cannot be simulated.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> import numpy as np
+    >>> axis = livebode.BeltAxis(excitation_n_m=1e9 * np.ones(400), seconds=0.1)
+    >>> try:
+    ...     livebode.SimulatedAxis(axis).run()
+    ... except livebode.SimulationError as error:
+    ...     print(error.code)
+    simulation.diverged
+    """
 
     area: ClassVar[str] = "simulation"
     codes: ClassVar[Mapping[str, str]] = {

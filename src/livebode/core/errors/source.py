@@ -9,7 +9,14 @@ from livebode.core.errors.base import LivebodeError
 
 
 class SourceError(LivebodeError):
-    """A live source cannot be opened, or sends what cannot be used."""
+    """A live source cannot be opened, or sends what cannot be used.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.SourceError.codes["no-samples"]
+    'No samples came in time.'
+    """
 
     area: ClassVar[str] = "source"
     codes: ClassVar[Mapping[str, str]] = {

@@ -9,7 +9,18 @@ from livebode.core.errors.base import LivebodeError
 
 
 class UsageError(LivebodeError):
-    """An argument of a call, or an option of a command, cannot be used."""
+    """An argument of a call, or an option of a command, cannot be used.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> lines = livebode.Lines.parse("20:140:20", rate_hz=4000, window=400)
+    >>> try:
+    ...     livebode.multisine(lines, amplitude=[1.0, 2.0])
+    ... except livebode.UsageError as error:
+    ...     print(error.code)
+    usage.wrong-shape
+    """
 
     area: ClassVar[str] = "usage"
     codes: ClassVar[Mapping[str, str]] = {

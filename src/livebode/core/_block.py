@@ -1,0 +1,160 @@
+"""Block: consecutive samples of named channels."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core.errors import SignalError, UsageError
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Name and unit of one recorded signal; the unit is empty where the source does not report it.
+
+    Examples
+    --------
+    >>> Channel("iq", "A")
+    Channel(name='iq', unit='A')
+    """
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive samples of named channels at one exact rate. Immutable.
+
+    Parameters
+    ----------
+    data
+        float64, shape (channels, samples); taken without a copy where it is float64 already.
+    channels
+        One Channel (or name) for each row of `data`.
+    rate_hz
+        Samples per second, exact.
+    start
+        Number of the first sample. Numbers count from the start of the source and include the samples of gaps.
+    origin_s
+        Time of sample number 0 in seconds, in the clock of the source.
+    gap
+        True where samples are missing between this block and the previous one.
+
+    Raises
+    ------
+    UsageError
+        If names repeat, shapes disagree, or the rate is not a positive number.
+
+    Examples
+    --------
+    >>> block = Block([[0.0, 1.0, 2.0], [5.0, 5.0, 5.0]], ["u", "y"], rate_hz=1000)
+    >>> block["y"]
+    array([5., 5., 5.])
+    >>> len(block), block.stop
+    (3, 3)
+    """
+
+    data: NDArray[np.float64]
+    channels: tuple[Channel, ...]
+    rate_hz: float
+    start: int = 0
+    origin_s: float = 0.0
+    gap: bool = False
+
+    def __post_init__(self) -> None:
+        data = np.asarray(self.data, dtype=np.float64).view()
+        if data.ndim != 2:
+            raise UsageError(
+                "wrong-shape",
+                f"a block's data has shape {data.shape}",
+                "give (channels, samples)",
+                argument="data",
+                shape=list(data.shape),
+            )
+        data.flags.writeable = False
+        channels = tuple(c if isinstance(c, Channel) else Channel(c) for c in self.channels)
+        names = [channel.name for channel in channels]
+        if len(names) != len(data):
+            raise UsageError(
+                "wrong-shape",
+                f"{len(names)} channel names for {len(data)} rows of data",
+                "give one for each row",
+                argument="channels",
+                shape=list(data.shape),
+            )
+        if repeated := sorted({name for name in names if names.count(name) > 1}):
+            raise UsageError(
+                "duplicate",
+                f"channel name {repeated[0]!r} is duplicated",
+                "rename one of the channels",
+                argument="channels",
+                value=repeated[0],
+            )
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise UsageError(
+                "out-of-range",
+                f"rate_hz={self.rate_hz} is not a positive number of samples per second",
+                "specify the rate",
+                argument="rate_hz",
+                value=self.rate_hz,
+            )
+        object.__setattr__(self, "data", data)
+        object.__setattr__(self, "channels", channels)
+
+    def __len__(self) -> int:
+        return int(self.data.shape[1])
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return np.asarray(self.data[self.index(name)])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def stop(self) -> int:
+        """Number of the sample that would follow the last one."""
+        return self.start + len(self)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time of every sample, shape (samples,), seconds."""
+        return self.origin_s + np.arange(self.start, self.stop) / self.rate_hz
+
+    def index(self, name: str) -> int:
+        """Row of the channel `name`; SignalError with the nearest name where it is missing."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise SignalError(
+                "channel-unknown",
+                f"there is no channel {name!r}",
+                nearest_name(name, self.names),
+                channel=name,
+                allowed=list(self.names),
+            ) from None
+
+    def cut(self, first: int, last: int) -> Block:
+        """Samples at positions first … last − 1 of this block, without a copy; all of them are this block itself."""
+        first, last, _ = slice(first, last).indices(len(self))
+        if (first, last) == (0, len(self)):
+            return self
+        return replace(self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0)
+
+
+def nearest_name(name: str, names: Iterable[str], what: str = "Channels") -> str:
+    """The remedy for a name that does not exist: the nearest one, and all of them, which are `what`.
+
+    >>> nearest_name("iq_adX", ["iq_adx", "theta_mx"])
+    "did you mean 'iq_adx'? Channels: iq_adx, theta_mx"
+    """
+    known = list(names)
+    folded = {k.casefold(): k for k in known}
+    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
+    hint = f"did you mean {folded[near[0]]!r}? " if near else ""
+    return f"{hint}{what}: {', '.join(known) or 'none'}"

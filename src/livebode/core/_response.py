@@ -1,0 +1,284 @@
+"""Response: a frequency response with its bounds, and a batch of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from livebode.core import _conversion, _description
+from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
+from livebode.core._line_selection import ends
+from livebode.core.errors import GridError
+from livebode.core.lines import Lines
+from livebode.core.rows import joined
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
+Floats = NDArray[np.float64]
+
+
+def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
+    """Radius around an estimate that covers the truth with probability 1 − exp(−c²): 63.2 % for 1, 98.2 % for 2.
+
+    A `sigma` that was itself estimated with `dof` complex degrees of freedom makes |Ĝ − G|²/sigma² follow
+    F(2, 2·dof); the factor √(d(exp(c²/d) − 1)) instead of c keeps the probability. Unknown (NaN) dof gives NaN, and
+    infinite dof gives c·sigma.
+
+    >>> float(widened(1.0, np.inf, 2.0)), round(float(widened(1.0, 3.0, 2.0)), 3)
+    (2.0, 2.895)
+    """
+    d = np.asarray(dof, dtype=np.float64)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        factor = np.where(np.isinf(d), c, np.sqrt(d * np.expm1(c * c / d)))
+    return np.asarray(sigma * factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Response(FrequencyResponse):
+    """The frequency response of a machine at one moment, at Lines. Immutable.
+
+    Shapes are (lines,). `value` is only meaningful together with its bounds and `valid`.
+
+    Attributes
+    ----------
+    lines
+        Where it was measured.
+    value
+        Complex response, `unit`; NaN where it could not be computed.
+    sigma
+        Standard deviation, E|value − truth|² = sigma², unit of `value`; NaN where not yet known.
+    dof
+        Complex degrees of freedom behind `sigma`, one number for all lines; bounds widen by it (`bound`).
+    coherence
+        γ² of eq. (18) between 0 and 1; NaN where not yet known.
+    valid
+        False where the window contains a start, a gap, a non-finite or excluded sample, or no excitation.
+    first, sample
+        Numbers of the oldest and the newest sample of the window.
+    time_s
+        Effective time: the centre of its window (weighted mean of the centres where periods are averaged), in the
+        source's clock. It is half a window older than `sample`.
+    schedule
+        The scheduling signal (such as position) at that time; NaN without one.
+    quantity, unit
+        Quantity of the response: plant G, open loop L, closed loop T or sensitivity S.
+    input_coherence
+        γ² between excitation and input, where `coherence` is that between excitation and output; NaN where not known.
+    weight
+        Weight of this response in a mean, so that the mean is a ratio of averages: plant input over excitation in the
+        window, U/W, or |U|² for the direct estimator; NaN where not known.
+    distortion
+        Error of the value from effects that repeat with the excitation but are not linear (friction, backlash, encoder
+        steps), unit of `value`. `sigma` includes it; NaN where it cannot be measured, infinite at a line that is
+        invalid because of such an effect (distortion, mains hum, sensor steps).
+
+    Examples
+    --------
+    >>> import livebode
+    >>> response = livebode.example_responses()[-1]
+    >>> response
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
+    >>> response.magnitude_db[:3].round(1), response.phase_deg[:3].round()
+    (array([  2.6,  -2.9, -13.3]), array([-90., -88., -71.]))
+    >>> response.bound(2).shape, round(float(response.coherence.min()), 2)
+    ((13,), 1.0)
+    """
+
+    lines: Lines
+    value: NDArray[np.complex128]
+    sigma: Floats
+    dof: float
+    coherence: Floats
+    valid: NDArray[np.bool_]
+    first: int
+    sample: int
+    time_s: float
+    schedule: float = float("nan")
+    quantity: Quantity = "plant"
+    unit: str = ""
+    input_coherence: Floats = None  # type: ignore[assignment]
+    weight: NDArray[np.complex128] = None  # type: ignore[assignment]
+    distortion: Floats = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        _fill_unknown(self)
+
+    def bound(self, c: float = 2.0) -> Floats:
+        """Radius that covers the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
+        return widened(self.sigma, self.dof, c)
+
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        """The measured values at lines of this Response, so that it is a Model; as calling it."""
+        return np.asarray(self(frequency_hz))
+
+    def _batch(self) -> Responses:
+        return Responses.of(self)
+
+    def to_xarray(self) -> Dataset:
+        return super().to_xarray().isel(time_s=0)
+
+    def to_pandas(self) -> DataFrame:
+        return super().to_pandas().droplevel("time_s")
+
+    def to_frd(self) -> Any:
+        """python-control's FrequencyResponseData of the valid lines, in rad/s, without bounds (extra `control`).
+
+        It is the response of the sampled plant; it is not interpolated (`smooth` is off).
+
+        Raises
+        ------
+        ExtraError
+            If python-control is not installed.
+
+        Examples
+        --------
+        >>> from livebode import example_responses
+        >>> frd = example_responses()[-1].to_frd()
+        >>> (frd.omega[:3] / (2 * np.pi)).round(9).tolist()
+        [20.0, 30.0, 40.0]
+        """
+        return _conversion.frd(self)
+
+    def __repr__(self) -> str:
+        return _description.of_response(self)
+
+    def _repr_html_(self) -> str:
+        return _description.table_of_response(self)
+
+
+PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule")
+"""Attributes with one value for the response."""
+
+_PER_ROW = PER_LINE + PER_RESPONSE
+
+
+def _fill_unknown(of: Response | Responses) -> None:
+    """NaN in the shape of the value, for an attribute that the source of the responses does not supply."""
+    for name in ("input_coherence", "weight", "distortion"):
+        if getattr(of, name) is None:
+            kind = np.complex128 if name == "weight" else np.float64
+            object.__setattr__(of, name, np.full(np.shape(of.value), np.nan, dtype=kind))
+
+
+@dataclass(frozen=True, eq=False)
+class Responses(FrequencyResponse, Sequence[Response]):
+    """Consecutive responses, one for each hop, as arrays: (rows, lines) for attributes of a line, (rows,) for the rest.
+
+    Indexing gives a Response; a slice, or an array of numbers or of truth values, gives Responses. The attributes are
+    those of Response.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> responses = livebode.example_responses()
+    >>> responses.magnitude_db.shape, len(responses[10:20])
+    ((40, 13), 10)
+    >>> for response in responses[-2:]:
+    ...     print(response)
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.92 s>
+    <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
+    """
+
+    lines: Lines
+    value: NDArray[np.complex128]
+    sigma: Floats
+    dof: Floats
+    coherence: Floats
+    valid: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    sample: NDArray[np.int64]
+    time_s: Floats
+    schedule: Floats
+    quantity: Quantity = "plant"
+    unit: str = ""
+    input_coherence: Floats = None  # type: ignore[assignment]
+    weight: NDArray[np.complex128] = None  # type: ignore[assignment]
+    distortion: Floats = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        _fill_unknown(self)
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    @overload
+    def __getitem__(self, at: int) -> Response: ...
+    @overload
+    def __getitem__(self, at: slice | NDArray[Any]) -> Responses: ...
+    def __getitem__(self, at: int | slice | NDArray[Any]) -> Response | Responses:
+        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
+        if isinstance(at, slice | np.ndarray):
+            return replace(self, **rows)
+        for name in PER_RESPONSE:
+            rows[name] = rows[name].item()
+        return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
+
+    def between(self, from_s: float, to_s: float) -> Responses:
+        """Those whose effective time is in a range, ends included."""
+        return self[np.flatnonzero((self.time_s >= from_s) & (self.time_s <= to_s))]
+
+    def __iter__(self) -> Iterator[Response]:
+        return (self[i] for i in range(len(self)))
+
+    def bound(self, c: float = 2.0) -> Floats:
+        """Radius that covers the truth with probability 1 − exp(−c²), shape (rows, lines)."""
+        return widened(self.sigma, self.dof[:, np.newaxis], c)
+
+    def newest(self) -> Response | None:
+        """The last one with a valid line; None if there is none."""
+        rows = np.flatnonzero(self.valid.any(axis=1))
+        return self[int(rows[-1])] if rows.size else None
+
+    def sel(self, *, frequency_hz: slice | ArrayLike = slice(None), time_s: slice = slice(None)) -> Responses:
+        """The part at some lines and times: slices with both ends included, or a list of measured lines.
+
+        Names and rules are those of xarray and of the dimensions in `to_xarray`. Brackets count rows:
+        ``responses[20:80]`` are 60 responses, not the lines from 20 to 80 Hz.
+
+        Raises
+        ------
+        GridError
+            If no line is within the slice, or a frequency of the list is not a measured line.
+
+        Examples
+        --------
+        >>> from livebode import example_responses
+        >>> responses = example_responses()
+        >>> responses.sel(frequency_hz=slice(40, 100), time_s=slice(0.2, 0.3)).value.shape
+        (4, 7)
+        """
+        part = super().sel(frequency_hz=frequency_hz)
+        return part if time_s == slice(None) else part.between(*ends(time_s, "time_s"))
+
+    def _batch(self) -> Responses:
+        return self
+
+    def __repr__(self) -> str:
+        return _description.of_responses(self)
+
+    def _repr_html_(self) -> str:
+        return _description.table_of_responses(self)
+
+    @classmethod
+    def of(cls, response: Response) -> Responses:
+        """One Response as a batch of one."""
+        rows: dict[str, Any] = {name: np.array([getattr(response, name)]) for name in _PER_ROW}
+        return cls(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
+
+    @classmethod
+    def join(cls, parts: Sequence[Responses]) -> Responses:
+        """Join parts of one run, in order; GridError where their lines differ."""
+        if any((p.lines, p.quantity, p.unit) != (parts[0].lines, parts[0].quantity, parts[0].unit) for p in parts):
+            raise GridError(
+                "not-alike",
+                "responses on different lines or of different quantities cannot be joined",
+                "join responses of one run",
+            )
+        rows = joined(parts, _PER_ROW, "responses")
+        return replace(parts[0], **rows)

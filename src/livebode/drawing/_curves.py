@@ -1,0 +1,97 @@
+"""Complex values and their bounds as the numbers of a picture: decibels, unwrapped degrees, quantiles, circles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+SPAN = (0.05, 0.95)
+FLOOR_DB = -1000.0
+"""Lower end of a bound that reaches zero: the response cannot be distinguished from zero."""
+# The middle of an unwrapped phase curve is between −225° and 135°: the cut is as far as possible from the usual angles
+# of machines (multiples of 90°, with a small delay), so that noise does not shift a curve by a whole turn.
+_TURN_FROM_DEG = -225.0
+
+
+def decibels(value: Complex | Floats) -> Floats:
+    """20·log10|value|, −inf for zero, NaN for NaN, without warnings."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(20 * np.log10(np.abs(value)))
+
+
+def bound_db(value: Complex, radius: Floats) -> tuple[Floats, Floats]:
+    """Lower and upper end in dB of a circle around each value; `FLOOR_DB` where it contains zero.
+
+    >>> [float(end[0].round(2)) for end in bound_db(np.array([1j]), np.array([0.5]))]
+    [-6.02, 3.52]
+    """
+    size = np.abs(value)
+    with np.errstate(all="ignore"):
+        return np.maximum(decibels(np.maximum(size - radius, 0.0)), FLOOR_DB), decibels(size + radius)
+
+
+def bound_deg(value: Complex, radius: Floats) -> Floats:
+    """Half of the angle under which the origin sees the circle, degrees; 180 where the circle contains the origin.
+
+    >>> bound_deg(np.array([2.0 + 0j, 2.0 + 0j]), np.array([1.0, 3.0])).round(6)
+    array([ 30., 180.])
+    """
+    with np.errstate(all="ignore"):
+        ratio = radius / np.abs(value)
+        return np.where(ratio >= 1, 180.0, np.degrees(np.arcsin(np.minimum(ratio, 1.0))))
+
+
+def quantiles(values: Floats) -> Floats:
+    """5 %, 50 % and 95 % of each column without its NaN, interpolated, shape (3, columns); NaN for an empty column.
+
+    >>> quantiles(np.array([[1.0], [np.nan], [3.0]])).T
+    array([[1.1, 2. , 2.9]])
+    """
+    if not values.shape[0]:
+        return np.full((3, values.shape[1]), np.nan)
+    ordered = np.sort(np.ascontiguousarray(values.T), axis=1)
+    count = np.count_nonzero(np.isfinite(ordered), axis=1)
+    every = np.arange(len(ordered))
+    found = []
+    for q in (SPAN[0], 0.5, SPAN[1]):
+        position = q * np.maximum(count - 1, 0)
+        below = position.astype(np.intp)
+        above = np.minimum(below + 1, np.maximum(count - 1, 0))
+        low, high = ordered[every, below], ordered[every, above]
+        found.append(low + (high - low) * (position - below))
+    return np.array(found)
+
+
+def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
+    """Phase along frequency without jumps of whole turns; shape (lines,), degrees.
+
+    Lines with an unknown phase (`weak`: the bound is larger than the response) follow the others, so that noise cannot
+    add turns to the curve.
+    """
+    known = np.isfinite(phase_deg)
+    lead = known & ~weak if np.any(known & ~weak) else known
+    if not np.any(lead):
+        return phase_deg.copy()
+    at = np.arange(len(phase_deg))
+    led = np.unwrap(phase_deg[lead], period=360.0)
+    middle = (led.min() + led.max()) / 2
+    led -= 360.0 * np.floor((middle - _TURN_FROM_DEG) / 360.0)
+    return near(phase_deg, np.interp(at, at[lead], led))
+
+
+def near(phase_deg: Floats, reference_deg: Floats) -> Floats:
+    """The same angles on the branch within half a turn of the reference."""
+    return np.asarray(phase_deg - 360.0 * np.rint((phase_deg - reference_deg) / 360.0))
+
+
+def circular(value: Complex) -> tuple[Floats, Floats]:
+    """Median angle of each column (columns,), and quantiles of the deviation from the mean direction (3, columns)."""
+    with np.errstate(all="ignore"):
+        turned = value / np.abs(value)
+        direction = np.nansum(turned, axis=0)
+        direction = np.where(np.abs(direction) > 0, direction, 1.0)
+        deviation_deg = quantiles(np.degrees(np.angle(turned * direction.conj())))
+    return np.degrees(np.angle(direction)) + deviation_deg[1], deviation_deg

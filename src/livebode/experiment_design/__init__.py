@@ -1,0 +1,38 @@
+"""Experiments: an excitation for a machine, within its limits, with the predicted accuracy."""
+
+from livebode.experiment_design.accuracy import Accuracy, accuracy_of
+from livebode.experiment_design.axis_file import axis_text
+from livebode.experiment_design.belt import belt_machine
+from livebode.experiment_design.choose import Design, choose
+from livebode.experiment_design.explain import Choice
+from livebode.experiment_design.files import FORMATS, write
+from livebode.experiment_design.limits import Bearable
+from livebode.experiment_design.machine import QUANTITIES, UNITS, Machine, Place
+from livebode.experiment_design.measured import MeasuredResponse, measured_machine
+from livebode.experiment_design.peaks import Peak, peaks, worst
+from livebode.experiment_design.waveform import Waveform
+from livebode.experiment_design.wish import Wish
+
+__all__ = [
+    "FORMATS",
+    "QUANTITIES",
+    "UNITS",
+    "Accuracy",
+    "Bearable",
+    "Choice",
+    "Design",
+    "Machine",
+    "MeasuredResponse",
+    "Peak",
+    "Place",
+    "Waveform",
+    "Wish",
+    "accuracy_of",
+    "axis_text",
+    "belt_machine",
+    "choose",
+    "measured_machine",
+    "peaks",
+    "worst",
+    "write",
+]

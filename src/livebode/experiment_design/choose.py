@@ -1,0 +1,229 @@
+"""From a specification, a machine and its limits to an experiment, with the reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, inf
+from typing import Any
+
+import numpy as np
+
+from livebode.core import DesignError, rounded_down
+from livebode.estimation.settings import default_hop
+from livebode.experiment_design.accuracy import Accuracy, Floats, accuracy_of
+from livebode.experiment_design.encoder import encoder_counts
+from livebode.experiment_design.explain import Choice, explained
+from livebode.experiment_design.grid import grid
+from livebode.experiment_design.limits import Bearable, beyond, check_known, room
+from livebode.experiment_design.machine import UNITS, Machine
+from livebode.experiment_design.make import REACHED, unit_waveform
+from livebode.experiment_design.peaks import Peak, peaks, worst
+from livebode.experiment_design.waveform import Waveform
+from livebode.experiment_design.wish import Wish
+
+# Of the room that the limits leave: reserve for errors of the prediction.
+_RESERVE = 0.1
+_WITHOUT_NOISE = 0.1  # of the room, where the required amplitude is not known
+# From rest the position drifts further than in the periodic state; with this ramp, by 3 % (studies/design.py).
+_RAMP_S = 0.5
+_STROKES_MIN = 2  # forward and return
+_LONG_S = 3600.0
+_TRIES = 100  # to find an amplitude that passes when rounded to the drive's steps
+_WINDOWS_MIN = 10  # sigma is estimated from the scatter between periods, which needs several
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """An experiment: the excitation, its effect on the machine, and the predicted accuracy.
+
+    Attributes
+    ----------
+    waveform
+        The excitation as the drive plays it.
+    amplitude_n_m
+        Of each line, chirp, step or bit; of shaped lines their rms, of listed ones the list.
+    limits, peaks
+        Limits of the machine, and the predicted peaks at each place.
+    accuracy, windows
+        Accuracy of one window, and the number of windows that brings every line's 95 % bound within `wish.accuracy`.
+    recording_s
+        Recording time for that.
+    hop
+        Samples between responses.
+    choices
+        All of it as rows of a table.
+    """
+
+    wish: Wish
+    machine: Machine
+    waveform: Waveform
+    amplitude_n_m: float | list[float]
+    limits: Bearable
+    peaks: tuple[Peak, ...]
+    accuracy: Accuracy
+    windows: int
+    recording_s: float
+    hop: int
+    choices: tuple[Choice, ...]
+
+    def __repr__(self) -> str:
+        shown = (choice for choice in self.choices if choice.what in ("lines", "window", "amplitude", "recording"))
+        return f"<Design: {'; '.join(f'{choice.what} {choice.value}' for choice in shown)}>"
+
+    @property
+    def ramp_s(self) -> float:
+        """Duration of the ramp of the excitation, whole periods: the peaks are those of the periodic state."""
+        return self.waveform.ramp_periods * self.waveform.lines.window / self.waveform.lines.rate_hz
+
+    @property
+    def encoder_counts(self) -> Floats | None:
+        """Amplitude of each line at the motor's encoder, counts, shape (lines,); None where its step is not known."""
+        return encoder_counts(self.waveform, self.machine)
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        counts = self.encoder_counts
+        lines = self.waveform.lines
+        low_high = {name: {"low": p.low, "high": p.high, "unit": UNITS[name], "place": p.place, "motion_alone": p.own}
+                    for name, p in worst(self.peaks).items()}  # fmt: skip
+        return {
+            "excitation": dict(self.waveform.about),
+            "rate_hz": lines.rate_hz,
+            "window": lines.window,
+            "frequency_hz": lines.frequency_hz.tolist(),
+            "amplitude_n_m": self.waveform.amplitude.tolist(),
+            "peak_n_m": self.waveform.peak,
+            "rms_n_m": self.waveform.rms,
+            "crest_factor": self.waveform.crest_factor,
+            "predicted": low_high,
+            "sigma": self.accuracy.sigma.tolist(),
+            "sigma_relative": self.accuracy.relative.tolist(),
+            "bound_95_relative": self.accuracy.reached(self.windows).tolist(),
+            "encoder_counts": None if counts is None else counts.tolist(),
+            "windows": self.windows,
+            "recording_s": self.recording_s,
+            "hop": self.hop,
+            "ramp_s": self.ramp_s,
+            "choices": [vars(choice) for choice in self.choices],
+            "notes": list(self.machine.notes),
+        }
+
+
+def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Design:
+    """The experiment for a specification: lines and window by the resolution, amplitude by accuracy and limits.
+
+    Raises
+    ------
+    LivebodeError
+        If a limit would be exceeded (with the largest amplitude that passes), the grid has no such lines, a crest
+        factor is not reached, or the excitation vanishes in the drive's steps.
+    """
+    limits = limits or Bearable()
+    check_known(machine, limits)
+    found = grid(wish, machine.rate_hz)
+    unit = unit_waveform(wish, found, machine)
+    of_unit = peaks(unit, machine)  # rejected where it has power outside of the known band of the machine
+    factor, why = _factor(wish, unit, of_unit, machine, limits)
+    waveform = _played(wish, unit, factor)
+    predicted = peaks(waveform, machine)
+    share, first = room(predicted, limits)
+    if share < 1 and first is not None:
+        passing = _passing(wish, unit, factor, share, machine, limits)
+        raise beyond(first, limits, share, None if wish.listed else factor, passing)
+    accuracy = accuracy_of(waveform, machine)
+    windows = accuracy.windows(wish.accuracy)
+    ramp_s = ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz
+    waveform = replace(waveform, about={**waveform.about, "ramp_s": ramp_s})
+    recording_s, recording_why = _recording(waveform, machine, windows)
+    if recording_s > _LONG_S and windows > 1:
+        in_time = max(1, int(windows * _LONG_S / recording_s))
+        recording_why += f"; an hour is enough for {100 * accuracy.reached(in_time).max():.2g} %"
+    design = Design(
+        wish=wish,
+        machine=machine,
+        waveform=waveform,
+        amplitude_n_m=wish.listed or factor,
+        limits=limits,
+        peaks=predicted,
+        accuracy=accuracy,
+        windows=windows,
+        recording_s=recording_s,
+        hop=default_hop(waveform.lines.window),
+        choices=(),
+    )
+    return replace(design, choices=explained(design, found, why, recording_why))
+
+
+def _played(wish: Wish, unit: Waveform, factor: float) -> Waveform:
+    """The waveform as the drive plays it."""
+    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": wish.listed or factor})
+    if wish.resolution_n_m is None:
+        return waveform
+    waveform = waveform.quantised(wish.resolution_n_m)
+    if wish.crest_factor_max is not None and waveform.crest_factor > wish.crest_factor_max * (1 + REACHED):
+        raise DesignError(
+            "crest-factor-not-reached",
+            f"rounding to steps of {wish.resolution_n_m:g} N m gives a crest factor "
+            f"of {waveform.crest_factor:.4f}, above {wish.crest_factor_max:g}",
+            f"allow {waveform.crest_factor + 5e-4:.3f}, or take finer steps",
+            crest_factor=waveform.crest_factor,
+            crest_factor_max=wish.crest_factor_max,
+        )
+    return waveform
+
+
+def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: Machine, limits: Bearable) -> float:
+    """A factor near the largest whose excitation is within the limits, in four digits; 0 where there is none.
+
+    `share` is the room at the factor that is not. Rounding to the drive's steps is not linear: a factor predicted from
+    the peaks at another one may fail.
+    """
+    for _ in range(_TRIES):
+        if share <= 0:
+            break
+        factor = rounded_down(factor * min(share, 1 - 1e-3))
+        try:
+            share, _ = room(peaks(_played(wish, unit, factor), machine), limits)
+        except DesignError:  # too small for the steps
+            break
+        if share >= 1:
+            return factor
+    return 0.0
+
+
+def _factor(
+    wish: Wish, unit: Waveform, of_unit: tuple[Peak, ...], machine: Machine, limits: Bearable
+) -> tuple[float, str]:
+    """Factor of the unit waveform, and the reason."""
+    if wish.amplitude_n_m is not None:
+        return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
+    largest, first = room(of_unit, limits)
+    if first is not None and largest <= 0:
+        raise beyond(first, limits, largest, None, 0.0)
+    needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
+    allowed = largest * (1 - _RESERVE)
+    if needed == 0:
+        if largest == inf:
+            raise DesignError(
+                "amplitude-undetermined",
+                "neither noise nor limits are known, so no amplitude can be chosen",
+                "specify the amplitude, the noise, or a limit",
+                argument="amplitude_n_m",
+            )
+        return largest * _WITHOUT_NOISE, "a tenth of the room within the limits, because the noise is not known"
+    if needed <= allowed:
+        rounded = "" if wish.resolution_n_m is None else ", before rounding"
+        return needed, f"the smallest for {100 * wish.accuracy:g} % at every line in one window{rounded}"
+    assert first is not None
+    return allowed, f"the largest within the {first.quantity} limit, less {100 * _RESERVE:g} %"
+
+
+def _recording(waveform: Waveform, machine: Machine, windows: int) -> tuple[float, str]:
+    """Recording time, and the reason."""
+    if machine.stroke_s is not None:
+        strokes = max(windows, _STROKES_MIN)
+        return strokes * machine.stroke_s, f"{strokes} strokes: each passes every place once"
+    many = max(windows, _WINDOWS_MIN)
+    why = "averaged" if windows > _WINDOWS_MIN else "to estimate sigma"
+    seconds = (many + 1) * waveform.lines.window / waveform.lines.rate_hz
+    return seconds, f"{many} windows, {why}, and one before the first is whole"

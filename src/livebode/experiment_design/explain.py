@@ -1,0 +1,104 @@
+"""The table that explains a design: chosen values and reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from livebode.core import counted
+from livebode.experiment_design.encoder import encoder_words
+from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.limits import Bearable
+from livebode.experiment_design.machine import UNITS, Quantity
+from livebode.experiment_design.mains import mains_words
+from livebode.experiment_design.peaks import Peak, worst
+
+_LISTED_MAX = 4  # amplitudes
+_LONG_S = 3600.0
+
+if TYPE_CHECKING:
+    from livebode.experiment_design.choose import Design
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One row of the table that explains a design."""
+
+    what: str
+    value: str
+    why: str
+
+
+def explained(design: Design, found: Grid, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
+    """The table: chosen values and reasons."""
+    waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
+    f, window_s = lines.frequency_hz, lines.window / lines.rate_hz
+    spacing = f"{np.diff(f).min():g} Hz apart or more" if len(f) > 1 else "alone"
+    if len(f) > 1 and np.ptp(np.diff(lines.bins)) == 0:
+        spacing = f"{f[1] - f[0]:g} Hz apart"
+    bound = design.accuracy.reached(design.windows)
+    weakest = int(np.argmax(bound))
+    rows = [
+        Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
+        Choice("mains", _listed_hz(design.wish.mains_hz), mains_words(lines, design.wish.mains_hz, found.mains)),
+        Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
+        Choice("amplitude", _amplitude(design), amplitude_why),
+        Choice(
+            "peak, rms", f"{waveform.peak:.4g}, {waveform.rms:.4g} N m", f"crest factor {waveform.crest_factor:.3f}"
+        ),
+    ]
+    rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
+    if machine.noise > 0:
+        told = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
+        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
+    if (counts := design.encoder_counts) is not None:
+        rows.append(Choice("encoder", *encoder_words(counts, f, moves=machine.stroke_s is not None)))
+    rows.append(Choice("recording", _duration(design.recording_s), recording_why))
+    rows.append(Choice("ramp up", f"over {design.ramp_s:.4g} s", "the peaks above are those of the periodic state"))
+    even = lines.window % design.hop == 0
+    hop_why = "a divisor of the window near a twentieth" if even else "a twentieth; no divisor of the window is near it"
+    rows.append(Choice("hop", f"{design.hop} samples", hop_why))
+    return tuple(rows)
+
+
+def _listed_hz(frequencies: Sequence[float]) -> str:
+    return ", ".join(f"{f:g}" for f in frequencies) + " Hz" if frequencies else "not avoided"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < _LONG_S:
+        return f"{seconds:.4g} s"
+    days = seconds / 86400
+    return f"{seconds:.4g} s, {f'{days:.3g} days' if days >= 1 else f'{seconds / 3600:.3g} h'}"
+
+
+def _amplitude(design: Design) -> str:
+    amplitude = design.amplitude_n_m
+    if isinstance(amplitude, list):
+        few = len(amplitude) <= _LISTED_MAX
+        told = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
+        return f"{told} N m"
+    return f"{amplitude:.4g} N m" + ", rms of the lines" * (design.waveform.about.get("shape") == "equal snr")
+
+
+def _limit_row(peak: Peak, limits: Bearable) -> Choice:
+    """The peak with its limit, and the peak of the motion alone."""
+    low, high = limits.of(peak.quantity)
+    borne = "no limit"
+    if limits.limited(peak.quantity):
+        borne = f"limits {low:g} … {high:g}" if peak.quantity == "travel" else f"limit {high:g}"
+    if peak.own is None:
+        why = f"of the excitation; {borne}; the peak of the motion alone is not specified"
+    else:
+        why = f"{borne}; the motion alone {_size(peak.quantity, *peak.own)}"
+    where = f", {peak.place}" if peak.place else ""
+    return Choice(
+        f"peak {peak.quantity}", f"{_size(peak.quantity, peak.low, peak.high)} {UNITS[peak.quantity]}", why + where
+    )
+
+
+def _size(quantity: Quantity, low: float, high: float) -> str:
+    return f"{low:.4g} … {high:.4g}" if quantity == "travel" else f"{max(high, -low):.3g}"

@@ -1,0 +1,273 @@
+"""Run: a run directory for a Python session."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import pyarrow as pa
+
+from livebode.analysis.averaged import Averaged, averaged
+from livebode.analysis.fits import fit_averaged
+from livebode.analysis.loop_report import loop_report
+from livebode.configuration.axis import Axis, FitSection, LoopSection
+from livebode.configuration.recorded import recorded_configuration
+from livebode.core import Event, Lines, LivebodeError, Loop, PlotKind, Response, Responses, counted, plot_responses
+from livebode.core.clock import RunClock, moment, moments_by
+from livebode.fitting import Fit
+from livebode.margins import Margins
+from livebode.records import PARAMETERS
+from livebode.records import Run as RunRecord
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+class Run:
+    """A run that `livebode run` recorded: its responses, fits and events, and what can be computed from them.
+
+    Only run.json is read at first; everything else is read when it is first used, once. Of a run that is still being
+    written, this is what was written by then; open it again for more.
+
+    Parameters
+    ----------
+    path
+        The run directory.
+
+    Attributes
+    ----------
+    path
+        Its directory.
+    summary
+        run.json: configuration, versions, counts (docs/run-directory.md).
+    lines
+        The measured lines.
+    finished
+        Whether the source ended and everything is written.
+
+    Raises
+    ------
+    RecordError
+        If the directory is not of a run, or run.json cannot be read. A damaged part of the tables is skipped with a
+        `DamageWarning`.
+
+    Examples
+    --------
+    >>> import livebode, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run = livebode.example_run(f"{folder}/monday")
+    ...     print(livebode.Run(f"{folder}/monday"))
+    ...     run.average.frequency_hz[:3], round(run.fit()["resonance"], 1)
+    <Run 'monday': velocity from u, excited by w; 13 lines, 20 … 140 Hz; 40 responses in 1 s; 1 event>
+    (array([20., 30., 40.]), 59.4)
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.path = Path(path)
+        self._record = RunRecord.open(self.path)
+        self.summary: Mapping[str, Any] = self._record.summary
+        self.lines: Lines = self._record.lines
+        self.finished = self._record.finished
+
+    @cached_property
+    def responses(self) -> Responses:
+        """All responses, as written, in memory: 100 bytes for each value; `batches` reads a long run in parts."""
+        return self._record.responses()
+
+    def batches(self, from_s: float | None = None, to_s: float | None = None) -> Iterator[Responses]:
+        """The responses in parts of bounded size; with times, those whose effective time is between them, inclusive."""
+        if from_s is None and to_s is None:
+            return self._record.batches()
+        low, high = (-float("inf") if from_s is None else from_s), (float("inf") if to_s is None else to_s)
+        return self._record.between(low, high)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """Gaps, spikes, lines that became invalid, alarms, and damage of the record itself, in order."""
+        return self._record.events()
+
+    @cached_property
+    def parameters(self) -> pa.Table:
+        """Parameters and margins that were fitted during the run, a row for each time and name; empty without [fit].
+
+        A pyarrow Table with the columns ``time_s``, ``schedule``, ``model``, ``name``, ``value``, ``sigma``, ``unit``,
+        ``status`` and others; ``run.parameters.to_pandas()`` is a DataFrame.
+        """
+        return pa.concat_tables([PARAMETERS.schema.empty_table(), *self._record.tables("parameters")])
+
+    @cached_property
+    def _averaged(self) -> Averaged:
+        return averaged(self._record)
+
+    @property
+    def average(self) -> Response:
+        """The mean of all valid responses (docs/export.md); for a run with tracking.average the newest valid one.
+
+        Raises
+        ------
+        SignalError
+            If no line is ever valid.
+        """
+        return self._averaged.response
+
+    def plot(
+        self,
+        kind: PlotKind = "bode",
+        *,
+        axes: Any = None,
+        bounds: bool = True,
+        c: float = 2.0,
+        label: str | None = None,
+        color: Any = None,
+    ) -> Any:
+        """Draw the average with its bound, and behind it the responses of the whole run; see `Responses.plot`.
+
+        Examples
+        --------
+        >>> import livebode, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     axes = livebode.example_run(f"{folder}/monday").plot("nyquist")
+        >>> axes.get_legend_handles_labels()[1]
+        ['average', 'bound: 98.2 % (2σ)']
+        """
+        found = self._averaged
+        words = label or "average"
+        bound = c if bounds else None
+        return plot_responses(found.overview, kind, axes=axes, c=bound, label=words, color=color, front=found.response)
+
+    def fit(
+        self,
+        model: str | None = None,
+        *,
+        output: Literal["velocity", "position"] | None = None,
+        side: Literal["motor", "load"] | None = None,
+        radius_m: float | None = None,
+        inertia_ratio: float | None = None,
+        fixed: Mapping[str, float] | None = None,
+        free: Sequence[str] | None = None,
+        band_hz: tuple[float, float] | None = None,
+        hold: Literal["zero-order", "none"] | None = None,
+    ) -> Fit:
+        """Fit a model to the average. Defaults are the [fit] of the run; those of `livebode fit` without one.
+
+        Parameters
+        ----------
+        model
+            ``"rigid"``, ``"two-mass"``, ``"three-mass"``, ``"two-mass-gain"`` or ``"auto"``.
+        output
+            Quantity of y; default: by its unit, without one the better fit.
+        side
+            Where y is measured.
+        radius_m
+            Of the pulley, for a load in linear motion.
+        inertia_ratio
+            Of the load to the motor, if known.
+        fixed, free
+            Parameters to fix at a value, and to fit although they are fixed by default.
+        band_hz
+            Lowest and highest frequency to use.
+        hold
+            Whether the input is constant between samples.
+
+        Returns
+        -------
+        Fit
+            Its `status` is "ok", or the reason why there are no numbers.
+
+        Raises
+        ------
+        ConfigError, UsageError, FitError
+            If an argument is invalid; the message names it.
+        """
+        given = {
+            "model": model,
+            "output": output,
+            "side": side,
+            "radius_m": radius_m,
+            "inertia_ratio": inertia_ratio,
+            "fixed": None if fixed is None else dict(fixed),
+            "free": None if free is None else list(free),
+            "band_hz": None if band_hz is None else list(band_hz),
+            "hold": hold,
+        }
+        return fit_averaged(self._averaged, self._section(given))[0]
+
+    def margins(self, fit: Fit | None = None, *, loop: Loop | None = None) -> Margins:
+        """Stability margins of the loop around a fit, with bounds; `livebode margins` also proposes a filter.
+
+        Parameters
+        ----------
+        fit
+            The plant; default: that of `fit()`.
+        loop
+            Controllers; default: the [loop] of the run.
+
+        Returns
+        -------
+        Margins
+            One row.
+
+        Raises
+        ------
+        UsageError
+            If the loop's feedback is not described.
+        FitError
+            If no model could be fitted.
+
+        Examples
+        --------
+        >>> import livebode, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     margins = livebode.example_run(f"{folder}/monday").margins()
+        >>> margins.of("phase_margin").round(), margins.frequency_hz.shape
+        (array([82.]), (1, 6))
+        """
+        responses = Responses.join(list(self._record.steady_batches()))
+        if loop is None:
+            section = LoopSection.model_validate(recorded_configuration(self._record.summary).get("loop", {}))
+            loop = section.build(self.lines.rate_hz)
+        return loop_report(fit or self.fit(), self._averaged.words, responses, loop).margins
+
+    def _section(self, given: Mapping[str, Any]) -> FitSection:
+        data = {"source": {"log": str(self.path)}, "signals": {"output": "y"}}
+        own = recorded_configuration(self._record.summary).get("fit", {})
+        named = {key: value for key, value in given.items() if value is not None}
+        section = Axis.of(data | {"fit": own | named}, "the arguments").fit
+        assert section is not None
+        return section
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+    def __repr__(self) -> str:
+        return f"<Run {self.path.name!r}: {'; '.join(self._facts())}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<li>{escape(fact)}</li>" for fact in self._facts())
+        return f"<div>Run <b>{escape(self.path.name)}</b><ul>{rows}</ul></div>"
+
+    def _facts(self) -> list[str]:
+        signals = self.summary.get("configuration", {}).get("signals") or {}
+        names = f"{signals.get('output', 'response')}"
+        names += f" from {signals['input']}" if signals.get("input") else ""
+        names += f", excited by {signals['excitation']}" if signals.get("excitation") else ""
+        f: np.ndarray = self.lines.frequency_hz
+        facts = [names, f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz", self._extent()]
+        try:
+            return [*facts, counted(len(self.events), "event")]
+        except LivebodeError as error:  # a description never raises, whatever happened to the directory
+            return [*facts, f"events unreadable ({error.code})"]
+
+    def _extent(self) -> str:
+        """Number of responses, duration and, if the run has a clock, its start."""
+        clock = RunClock.of(self._record.summary)
+        with moments_by(clock):
+            start = f" from {moment(0.0)}" if clock.pieces else ""
+        if "counts" not in self.summary:
+            return f"not finished{start}"
+        duration_s = self.summary["counts"]["samples"] / self.lines.rate_hz
+        return f"{counted(self.summary['counts']['responses'])} in {duration_s:.4g} s{start}"

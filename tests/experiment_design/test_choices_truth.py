@@ -1,0 +1,111 @@
+"""What a design chooses: windows that a hop divides, no more lines than tell something, listed amplitudes as listed."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from livebode.core import DesignError, GridError
+from livebode.estimation.settings import default_hop
+from livebode.experiment_design import Bearable, Wish, belt_machine, choose
+from livebode.experiment_design.grid import grid
+from livebode.simulation import BeltAxis, Sensor, Strokes
+from tests.support.errors import refused
+
+MACHINE = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.05)))
+MOVING = belt_machine(BeltAxis(motion=Strokes()))
+RATE_HZ = 4000.0
+
+
+@settings(max_examples=150, deadline=None)
+@given(resolution_hz=st.floats(0.5, 400), kind=st.sampled_from(["multisine", "chirp"]))
+def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divides_it(resolution_hz, kind):
+    lines = grid(Wish(band_hz=(1, 1999), resolution_hz=resolution_hz, kind=kind), RATE_HZ).lines
+    apart_hz = lines.resolution_hz * (2 if kind == "multisine" else 1)
+    assert resolution_hz / 1.06 - RATE_HZ / lines.window**2 * 2 <= apart_hz <= resolution_hz * (1 + 1e-9)
+    if lines.window >= 100:  # of shorter ones none within 5 % need have a divisor near a twentieth
+        assert lines.window % default_hop(lines.window) == 0
+        assert 0.8 <= 20 * default_hop(lines.window) / lines.window <= 1.25
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    resolution_hz=st.floats(1e-3, 0.39),
+    low=st.floats(1, 100),
+    width=st.floats(10, 1800),
+    kind=st.sampled_from(["multisine", "odd", "chirp", "prbs"]),
+)
+def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
+    def lines(apart_hz):
+        wish = Wish(band_hz=(low, low + width), resolution_hz=apart_hz, kind=kind)
+        return len(grid(wish, RATE_HZ).lines)
+
+    try:
+        assert lines(resolution_hz) <= 5000
+    except GridError as error:
+        finest_hz = error.resolution_hz_min
+        assert finest_hz > resolution_hz
+        if error.code == "grid.window-too-long":  # no register is that long; with the longest there are too many lines
+            return
+        assert lines(finest_hz) <= 5000
+
+
+@pytest.mark.parametrize("order", [14, 17, 20])
+def test_a_prbs_with_too_many_useful_lines_is_refused_with_an_order_that_passes(order):
+    with pytest.raises(GridError) as caught:
+        grid(Wish(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
+    assert (caught.value.code, caught.value.lines_max) == ("grid.too-many-lines", 5000)
+    named = caught.value.order_max
+    assert len(grid(Wish(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
+
+
+def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_that_passes():
+    listed = [1.0, 2.0, 3.0, 2.0, 1.0, 0.5, 0.5]
+    wish = {"lines": "20:140:20", "window": 400, "phases": "schroeder"}
+    design = choose(Wish(**wish, amplitude_n_m=listed), MACHINE)
+    assert design.plain()["excitation"]["amplitude_n_m"] == listed
+    np.testing.assert_allclose(design.waveform.amplitude, listed, rtol=1e-12)
+    (row,) = [choice for choice in design.choices if choice.what == "amplitude"]
+    assert row.value == "0.5 … 3 N m"
+    limits = Bearable(torque_n_m_max=4.0)
+    with pytest.raises(DesignError, match="the amplitudes as listed give a torque") as caught:
+        choose(Wish(**wish, amplitude_n_m=listed), MOVING, limits)
+    share = caught.value.passing
+    choose(Wish(**wish, amplitude_n_m=[share * a for a in listed]), MOVING, limits)
+    with refused(DesignError, "limit-exceeded", quantity="torque"):
+        choose(Wish(**wish, amplitude_n_m=[1.01 * share * a for a in listed]), MOVING, limits)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    step=st.floats(0.01, 0.5), limit=st.floats(2.5, 5.0), kind=st.sampled_from(["multisine", "chirp", "prbs", "odd"]),
+)  # fmt: skip
+def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step, limit, kind):
+    wish = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
+    wish |= {"phases": "schroeder"} if kind == "multisine" else {}
+    with pytest.raises(DesignError) as caught:
+        choose(Wish(**wish, amplitude_n_m=20.0), MACHINE, Bearable(torque_n_m_max=limit))
+    assert caught.value.code == "design.limit-exceeded"
+    if caught.value.passing <= 0:
+        assert "finer steps of the drive" in caught.value.remedy
+        return
+    choose(Wish(**wish, amplitude_n_m=caught.value.passing), MACHINE, Bearable(torque_n_m_max=limit))
+
+
+def test_the_worst_line_has_the_specified_accuracy():
+    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.3, accuracy=0.02)
+    told = choose(wish, MACHINE).plain()
+    bounds = np.sqrt(np.log(20) / told["windows"]) * np.array(told["sigma_relative"])
+    np.testing.assert_allclose(told["bound_95_relative"], bounds, rtol=1e-12)
+    assert 0.02 * np.sqrt(1 - 1 / told["windows"]) < bounds.max() <= 0.02
+
+
+def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():
+    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05, accuracy=1e-4)
+    design = choose(wish, MACHINE)
+    (row,) = [choice for choice in design.choices if choice.what == "recording"]
+    reached = float(re.search(r"an hour is enough for (\S+) %", row.why).group(1)) / 100
+    assert choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05,
+                       accuracy=1.05 * reached), MACHINE).recording_s <= 3600  # fmt: skip
