@@ -9,7 +9,14 @@ from livebode.core.errors.base import LivebodeError
 
 
 class StateError(LivebodeError):
-    """The state of a stage cannot be restored; the stage is then unchanged."""
+    """The state of a stage cannot be restored; the stage is then unchanged.
+
+    Examples
+    --------
+    >>> import livebode
+    >>> livebode.StateError.codes["newer-version"]
+    'The state was written by a newer version of livebode.'
+    """
 
     area: ClassVar[str] = "state"
     codes: ClassVar[Mapping[str, str]] = {
