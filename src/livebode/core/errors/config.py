@@ -18,7 +18,7 @@ class ConfigError(LivebodeError):
     ...     livebode.design("missing.toml")
     ... except livebode.ConfigError as error:
     ...     print(error.code)
-    config.file-missing
+    config.file-unreadable
     """
 
     area: ClassVar[str] = "config"
