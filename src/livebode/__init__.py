@@ -82,6 +82,7 @@ if TYPE_CHECKING:
         SignalError,
         SimulationError,
         SourceError,
+        StateError,
         UsageError,
     )
     from livebode.estimation import Settings, Tracker, welch
@@ -131,6 +132,7 @@ _HOME = {
     "motion": ("MotionCorrection",),
     "core": (
         "UsageError",
+        "StateError",
         "SourceError",
         "SimulationError",
         "SignalError",
@@ -205,6 +207,7 @@ __all__ = [
     "SimulationError",
     "SlidingDFT",
     "SourceError",
+    "StateError",
     "Strokes",
     "Tracker",
     "UsageError",

@@ -18,6 +18,7 @@ from livebode.export import FORMATS, at
 from livebode.fitting import mean_response
 from livebode.records import Run
 from tests.support.command import livebode, signals, write_parquet
+from tests.support.runs import describe
 
 PARAMETERS = {
     "time_s": [0.1, 0.1, 0.2, 0.2],
@@ -81,11 +82,11 @@ def test_parameters_of_a_run_are_exported_and_a_run_without_fits_is_refused(run:
     assert "no model was fitted" in livebode("export", run, "--to", "csv", "--parameters").err
     fitted = tmp_path / "fitted"
     fitted.mkdir()
-    (fitted / "run.json").write_bytes((run / "run.json").read_bytes())
     # As one that writes it may: text as a dictionary, one more column.
     table = pa.table(PARAMETERS | {"more": range(4)})
     table = table.set_column(2, "name", table["name"].dictionary_encode())
     pq.write_table(table, fitted / "parameters.parquet")
+    describe(fitted, run)
     for to in ("csv", "mat"):
         done = livebode("export", fitted, "--to", to, "--parameters")
         assert (done.code, done.err) == (0, "")

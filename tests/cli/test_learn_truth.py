@@ -189,7 +189,8 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
     for text, code, facts in (
         ("{", "not-a-baseline", {}),
         ("[]", "not-a-baseline", {}),
-        ('{"format": "livebode baseline", "version": 99}', "version", {"version": 99}),
+        ('{"format": "livebode baseline", "version": 99}', "newer-version", {"found": 99, "readable": 4}),
+        ('{"format": "livebode baseline", "version": 3}', "version", {"version": 3}),
         ('{"format": "livebode baseline", "version": 4}', "damaged", {"key": "lines"}),
     ):
         path.write_text(text, encoding="utf-8")

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import Block, Event, Lines, Responses, UsageError
+from livebode.core import Block, Event, Lines, Responses
 from livebode.estimation import RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
-from tests.support.errors import refused
 from tests.support.responses import assert_same
 
 WINDOW, RATE_HZ, SAMPLES = 60, 1000.0, 700
@@ -99,18 +98,3 @@ def test_single_samples_give_the_same_as_one_block() -> None:
     tracker = new({})
     parts = [tracker.process(block.cut(i, i + 1)) for i in range(len(block))]
     assert_same(Responses.join(parts), new({}).process(block))
-
-
-@settings(max_examples=200, deadline=None)
-@given(data=st.data())
-def test_a_damaged_snapshot_is_refused_and_changes_nothing(data: st.DataObject) -> None:
-    block = record(1)
-    tracker = new({})
-    tracker.process(block.cut(0, 400))
-    good = tracker.snapshot()
-    size = data.draw(st.integers(0, len(good) - 1))
-    with refused(UsageError, "unreadable"):
-        tracker.restore(good[:size])
-    with refused(UsageError, "conflict"):
-        tracker.restore(new({"hop": 30}).snapshot())
-    assert tracker.snapshot() == good

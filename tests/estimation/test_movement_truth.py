@@ -71,7 +71,7 @@ def test_an_axis_that_moves_is_seen_wherever_it_is(name: str, offset: float, uni
 @pytest.mark.parametrize("hop", [800, 200, 40])
 def test_a_run_records_whether_the_axis_moved(hop: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     for i, (x, moved) in enumerate([(STILL["sensor noise"], False), (50 + MOVING["strokes"], True)]):
-        tracker, responses = tracked(x, hop)
+        tracker, responses, _ = tracked(x, hop)
         found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}
         run = write_run(tmp_path_factory.mktemp(f"{i}") / "run", responses, found=found)
         assert averaged(Run.open(run)).moved == moved
@@ -88,7 +88,7 @@ def test_any_cut_gives_the_same_and_so_does_a_restored_one(places: int, at: list
     found, movement = [], Movement(places)
     for start, stop in pairwise(sorted({0, 400, *at})):
         again = Movement(places)
-        again.load(movement.state())
+        again.restore(movement.snapshot())
         movement = again
         found.append(movement.process(start % places, x[start:stop]))
     np.testing.assert_array_equal(np.concatenate(found), whole)

@@ -23,7 +23,6 @@ from livebode.core import (
     SignalError,
     Spectra,
     SpectraLayout,
-    UsageError,
 )
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
@@ -266,6 +265,3 @@ def test_samples_and_other_layouts_are_refused(record: Block) -> None:
     for wrong in (record, next(sent(record, layout(quiet=())))):
         with refused(SignalError, "layout-differs"):
             tracker.process(wrong)
-    other = SpectraTracker(described(20), layout(quiet=()))
-    with refused(UsageError, "conflict"):
-        other.restore(tracker.snapshot())

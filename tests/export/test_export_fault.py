@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import resource
 import signal
@@ -22,6 +21,7 @@ from livebode.fitting import mean_response
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.errors import refused
 from tests.support.responses import made
+from tests.support.runs import describe
 
 LINES = Lines.parse("20:140:20", 4000, 400)
 
@@ -69,19 +69,18 @@ def test_a_missing_run_and_an_unusable_output_path_are_reported(run: Path, tmp_p
 def test_a_damaged_table_leaves_nothing(run: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     broken.mkdir()
-    summary = json.loads((run / "run.json").read_text())
-    del summary["files"], summary["crc32"]
-    (broken / "run.json").write_text(json.dumps(summary))
     table = pq.read_table(run / "responses.parquet")
     pq.write_table(table.slice(0, table.num_rows - 1), broken / "responses.parquet")
+    describe(broken, run)
     for to in ("csv", "mat", "netcdf", "uff"):
         done = livebode("export", broken, "--to", to)
         assert done.code == 2
         assert "ends within a response" in done.err
     pq.write_table(pa.table({"time_s": [1.0]}), broken / "parameters.parquet")
+    describe(broken, run)
     assert "have no column 'schedule'" in livebode("export", broken, "--to", "csv", "--parameters").err
     (broken / "parameters.parquet").write_bytes(b"PAR1")
-    assert "parameters' cannot be read" in livebode("export", broken, "--to", "csv", "--parameters").err
+    assert "parameters.parquet is damaged" in livebode("export", broken, "--to", "csv", "--parameters").err
     assert list(tmp_path.iterdir()) == [broken]
 
 

@@ -222,9 +222,9 @@ def test_cut_and_restored_anywhere_the_events_are_the_same() -> None:
     monitor, events = MachineMonitor(without_sensor(), LINES, NAMES, DEFAULT_INTERVAL_S), []
     for piece in pieces:
         events += monitor.process(piece)
-        state = monitor.state()
+        snapshot = monitor.snapshot()
         monitor = MachineMonitor(without_sensor(), LINES, NAMES, DEFAULT_INTERVAL_S)
-        monitor.load(state)
+        monitor.restore(snapshot)
     events += monitor.finish()
     assert changes(events) == ["stiffness"]
     assert events == judged(without_sensor(), blocks)

@@ -119,21 +119,6 @@ def test_memory_is_that_of_a_chunk_whatever_the_blocks() -> None:
     assert max(sizes) < most
 
 
-def test_a_damaged_or_foreign_snapshot_is_refused_and_changes_nothing() -> None:
-    correction = new()
-    correction.process(record().cut(0, 6000))
-    good = correction.snapshot()
-    for size in (0, 1, len(good) // 2, len(good) - 1):
-        with pytest.raises(LivebodeError, match="snapshot"):
-            correction.restore(good[:size])
-    for other in (new(radius_m=0.02), new(chunk_samples=CHUNK + 1), new(stiffness_splines=6)):
-        with pytest.raises(LivebodeError, match="other settings"):
-            correction.restore(other.snapshot())
-    with pytest.raises(LivebodeError, match="other settings"):
-        correction.restore(Tracker(SETTINGS).snapshot())
-    assert correction.snapshot() == good
-
-
 def test_samples_that_come_twice_are_refused_and_change_nothing() -> None:
     correction = new()
     correction.process(record().cut(0, 6000))

@@ -202,7 +202,7 @@ def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
     run = tmp_path / "run"
     shutil.copytree(runs["segments"], run)
     lines = [json.loads(line) for line in (run / "manifest.jsonl").read_text().splitlines()[::2]]
-    segment = next(s for s in lines[0]["segments"] if s["table"] == "samples")
+    segment = next(s for s in lines[1]["segments"] if s["table"] == "samples")
     n = 1 << 18
     monkeypatch.setattr("livebode.records.segments.segment_file._VALUES_MAX", 1 << 20)
     zeros = pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, np.int8)), pa.array([0.0]))

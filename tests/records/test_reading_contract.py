@@ -231,7 +231,7 @@ def test_other_tools_read_the_segments(tmp_path: Path) -> None:
     responses = Run.open(tmp_path / "run").responses()
     rows = duckdb.sql(f"SELECT re FROM '{tmp_path}/run/responses/*.parquet' ORDER BY sample, frequency_hz").fetchall()
     assert np.array_equal(np.array(rows)[:, 0], responses.value.real.ravel(), equal_nan=True)
-    assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/run/manifest.jsonl'").fetchall() == [(8,)]
+    assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/run/manifest.jsonl'").fetchall() == [(10,)]
     kinds = [kind for (kind,) in duckdb.sql(f"SELECT kind FROM '{tmp_path}/run/events.jsonl'").fetchall()]
     assert kinds == ["noise-from-detection-lines", "non-finite", "spike"]
     table = pq.read_table(tmp_path / "run" / "samples")

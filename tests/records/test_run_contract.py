@@ -11,6 +11,7 @@ import pytest
 from livebode.core import Block, DamageWarning, Lines, RecordError
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
+from livebode.records.summary_file import to_document
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
 
@@ -57,6 +58,9 @@ def test_an_incomplete_run_is_read_with_a_warning_or_refused(run: Path, tmp_path
     with refused(RecordError, "damaged", path=str(run / "run.json"), reason="it has no checksum"):
         Run.open(run)
     (run / "run-copy.json").unlink()
-    (run / "run.json").write_text("{}")
+    (run / "run.json").write_bytes(to_document({}))
     with refused(RecordError, "unexpected-content", path=str(run / "run.json"), reason="found: Field required"):
+        Run.open(run)
+    (run / "run.json").write_bytes(to_document({"format": "another", "found": {}}))
+    with refused(RecordError, "not-a-run", path=str(run)):
         Run.open(run)

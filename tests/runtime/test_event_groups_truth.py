@@ -64,7 +64,7 @@ def test_a_run_that_is_continued_reports_the_same(steps: list[tuple[str, int]], 
     events = events_of(steps)
     first, second = EventGroups(), EventGroups()
     found = [one for event in events[:at] for one in first.take(event)]
-    second.load(json.loads(json.dumps(first.state())))
+    second.restore(first.snapshot())
     assert found + reported(second, events[at:]) == reported(EventGroups(), events)
 
 

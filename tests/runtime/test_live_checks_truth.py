@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -14,6 +13,7 @@ import pytest
 
 from livebode.analysis.averaged import averaged
 from livebode.core import Block, Channel, Event, Lines
+from livebode.core.state import Stage, decode
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.records import Run
@@ -183,7 +183,8 @@ def test_a_run_that_is_continued_before_it_was_judged_is_judged_then(tmp_path: P
         assert (kinds.count("roles-doubtful"), kinds.count("transient")) == (judged, 0)
         now = committed()
         assert now is not None
-        assert json.loads(now.states["counts"])["judged"] is judged  # and not again when it is continued
+        state = decode(Stage("run-counts", 1), now.states["counts"])
+        assert state["judged"] is judged  # and not again when it is continued
 
 
 def test_a_live_run_records_shows_and_leaves_out_what_it_found(tmp_path: Path, recorded: np.ndarray) -> None:

@@ -92,7 +92,8 @@ class Attacked:
     def closings(self) -> list[str]:
         """The segments that are closed."""
         path = self.folder / "run" / "manifest.jsonl"
-        return path.read_text().splitlines() if path.exists() else []
+        lines = path.read_text().splitlines() if path.exists() else []
+        return [line for line in lines if line.startswith('{"closed"')]
 
     def open_descriptors(self) -> int:
         return len(list(Path(f"/proc/{self._process.pid}/fd").iterdir()))

@@ -1,4 +1,4 @@
-"""Runs without pictures."""
+"""Runs without pictures, and a directory with the tables of another program."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ import numpy as np
 from livebode.configuration import Axis
 from livebode.configuration.axis import RecordSection
 from livebode.preparation.follower import Follower
+from livebode.records import Run
+from livebode.records.piece import parts_of
+from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.fits import Fits
@@ -26,6 +29,12 @@ def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[
         "signals": {"output": "y", "input": "u", "excitation": "w"},
     }
     return run(Axis.of(given | sections, "test"), Destination(folder / "run", lambda *_: None)).directory
+
+
+def describe(folder: Path, like: Path) -> None:
+    """Write the run.json of a run for the tables in a directory."""
+    files = {path.name: parts_of(path) for path in sorted(folder.glob("*.parquet"))}
+    (folder / RUN).write_bytes(to_document(Run.open(like).summary | {"files": files}))
 
 
 def record(

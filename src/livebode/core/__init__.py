@@ -25,11 +25,13 @@ from livebode.core.errors import (
     SignalError,
     SimulationError,
     SourceError,
+    StateError,
     UsageError,
 )
 from livebode.core.lines import Lines
 from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
+from livebode.core.state import Stage, Stateful, StatefulBase
 
 __all__ = [
     "NOT_WHOLE",
@@ -69,6 +71,10 @@ __all__ = [
     "SourceError",
     "Spectra",
     "SpectraLayout",
+    "Stage",
+    "StateError",
+    "Stateful",
+    "StatefulBase",
     "UsageError",
     "as_model",
     "counted",

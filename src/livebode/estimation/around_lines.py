@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Emit, Event, Responses, ignore
-from livebode.estimation import snapshots
+from livebode.core import Emit, Event, Responses, StatefulBase, ignore
 from livebode.estimation.counted import Counted
 from livebode.estimation.line_stage import LineStage
 
@@ -17,27 +16,14 @@ Floats = NDArray[np.float64]
 W = TypeVar("W", bound=Counted)
 
 
-class Part(Protocol):
-    """Something with a state of its own."""
-
-    def state(self) -> dict[str, NDArray[np.generic]]: ...
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None: ...
-
-
-class AroundLines(Generic[W]):
+class AroundLines(StatefulBase, Generic[W]):
     """Base of the classes that feed a LineStage. A subclass sets these parts and returns `_nothing` if it has none."""
 
     _lines: LineStage
     _watch: W
-    _parts: Mapping[str, Part]
+    _parts: Mapping[str, StatefulBase]
     _events: list[Event]
     _nothing: Responses | None = None
-
-    @property
-    def _identity(self) -> str:
-        """Identity that a snapshot must have to be restored."""
-        raise NotImplementedError
 
     @property
     def counts(self) -> dict[str, int]:
@@ -66,17 +52,9 @@ class AroundLines(Generic[W]):
             emit(event)
         self._events.clear()
 
-    def snapshot(self) -> bytes:
-        """Everything that the next result depends on, exact; see `restore`."""
-        return snapshots.pack({name: part.state() for name, part in self._parts.items()}, self._identity)
+    def _state(self) -> dict[str, Any]:
+        return dict(self._parts)
 
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a tracker with the same settings.
-
-        Raises
-        ------
-        SignalError
-            If the snapshot is damaged or belongs to other settings; the state is then unchanged.
-        """
-        for name, state in snapshots.unpack(snapshot, self._identity).items():
-            self._parts[name].load(state)
+    def _load(self, state: dict[str, Any]) -> None:
+        for name, part in self._parts.items():
+            part.restore(state[name])

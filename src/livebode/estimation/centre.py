@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 
-class Centre:
+class Centre(StatefulBase):
     """Scheduling signal at the centre of each window, (N − 1)/2 samples before its newest sample.
 
     For an even N the centre is between two samples, and the result is their mean.
     """
+
+    _stage = Stage("centre", 1)
+    _STATE = ("_past",)
 
     def __init__(self, window: int) -> None:
         self._early, self._late = window // 2, (window - 1) // 2
@@ -20,12 +25,6 @@ class Centre:
 
     def restart(self) -> None:
         self._past[:] = np.nan
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"past": self._past.copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._past[:] = state["past"]
 
     def at(self, schedule: Floats, position: NDArray[np.int64]) -> Floats:
         """Schedule at the centres of the windows that end at these positions of the next stretch, `schedule`."""

@@ -5,30 +5,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 # Against a sample this much larger, 16 digits leave 8 for everything else until the kernel renews its sums.
 _FACTOR = 1e8
 
 
-class PlausibleRange:
+class PlausibleRange(StatefulBase):
     """Finds samples more than 1e8 times larger than any sample of the same signal in the whole period before."""
+
+    _stage = Stage("plausible-range", 1)
+    _STATE = ("_largest", "_limit", "_at")
 
     def __init__(self, signals: int, window: int) -> None:
         self._window = window
         self._largest = np.zeros(signals)
         self._limit = np.full(signals, np.inf)
         self._at = 0
-
-    _STATE = ("_largest", "_limit")
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {name: getattr(self, name).copy() for name in self._STATE} | {"at": np.array([self._at])}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[...] = state[name]
-        self._at = int(state["at"][0])
 
     def process(self, data: Floats) -> NDArray[np.intp]:
         """Positions in `data` (channels, samples), all finite, of samples that are too large in any channel."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, Event, Responses
+from livebode.core import Channel, Event, Responses, Stage, StatefulBase
 from livebode.estimation.bounds import between_periods, contained, power, unbiased
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.estimators import Role
@@ -40,7 +40,7 @@ class Estimate:
     weight: Complex
 
 
-class LineStage:
+class LineStage(StatefulBase):
     """Responses from spectra that were computed by the kernel here or in the drive.
 
     Spectra are sorted by their place in the period, so that each hop has its own history of whole periods; spectra
@@ -53,6 +53,9 @@ class LineStage:
     sent
         The available bins; None where all are available.
     """
+
+    _stage = Stage("line-stage", 1)
+    _STATE = ("_moments", "_movement", "_moving", "_largest")
 
     def __init__(
         self, settings: Settings, sent: Collection[int] | None = None, *, events: list[Event] | None = None
@@ -78,15 +81,6 @@ class LineStage:
         lines = self._settings.lines
         bins = self._hann.bins if self._hann else np.asarray(lines.bins)
         return np.concatenate([bins, self._detection.bins]).astype(np.int64) if self._detection else bins
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        own = {"largest": np.array([self._largest]), "moving": np.array([self._moving])}
-        return self._moments.state() | self._movement.state() | own
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._moments.load(state)
-        self._movement.load(state)
-        self._largest, self._moving = float(state["largest"][0]), int(state["moving"][0])
 
     def found(self) -> dict[str, Any]:
         """The basis of the responses as plain data for a record: rate, window, lines, hop, the noise's origin."""

@@ -9,6 +9,8 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -117,7 +119,7 @@ class Moments:
         return np.asarray(np.maximum(total, 0.0))  # rounding can make it negative
 
 
-class PeriodMoments:
+class PeriodMoments(StatefulBase):
     """Running Moments: windows one period apart are one series, so that every hop has its own history.
 
     Means and centred second moments are updated by deviations (West 1979), since sums of squares would lose the
@@ -136,6 +138,9 @@ class PeriodMoments:
         its bound: an outlier would widen its own bound.
     """
 
+    _stage = Stage("period-moments", 1)
+    _STATE = ("_count", "_means", "_scatter", "_moment")
+
     def __init__(self, places: int, lines: int, forgetting: float, *, own: bool) -> None:
         self._own = own
         self._weights = Weights(forgetting)
@@ -143,15 +148,6 @@ class PeriodMoments:
         self._means = np.zeros((_MEANS, places, lines))
         self._scatter = np.zeros((_SCATTER, places, lines))
         self._moment = np.zeros((3, places))
-
-    _STATE = ("_count", "_means", "_scatter", "_moment")
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {name: getattr(self, name).copy() for name in self._STATE}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[...] = state[name]
 
     @property
     def now(self) -> Moments:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -16,7 +18,7 @@ _JITTER = 3.0  # times the largest second difference: what noise and a flickerin
 _FEW = 8  # places: with fewer, second differences miss vibration, so that twice as many times their size count
 
 
-class Movement:
+class Movement(StatefulBase):
     """Compares the schedule with the nine previous periods, at the same place in the period.
 
     So the motion due to the excitation itself, which is the same in every period, has no effect. The machine moves
@@ -33,22 +35,14 @@ class Movement:
         Windows in one period; of many at most twenty are looked at, and what is found counts until the next.
     """
 
+    _stage = Stage("movement", 1)
+    _STATE = ("_past", "_next", "_moves")
+
     def __init__(self, places: int) -> None:
         self._places, self._stride = places, -(-places // PLACES)
         self._past = np.full((_BEFORE + 1, -(-places // self._stride)), np.nan)  # newest last, perhaps in part
         self._next, self._moves = 0, False
         self._times = _JITTER if places >= _FEW else 2 * _JITTER
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"movement": np.append(self._past, [self._next, self._moves])}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        past, (following, moves) = state["movement"][:-2], state["movement"][-2:].tolist()
-        self._past, self._next, self._moves = (
-            past.reshape(self._past.shape).astype(np.float64),
-            int(following),
-            bool(moves),
-        )
 
     def process(self, place: int, schedule: Floats) -> Flags:
         """Which of these moments, at consecutive places from `place` on, belong to a machine that moves."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Event
+from livebode.core import Block, Channel, Event, Stage, StatefulBase
 from livebode.estimation.bounds import power
 from livebode.estimation.distortion import Distortion, reached
 from livebode.estimation.mains import Mains
@@ -42,7 +42,7 @@ class Repeating:
     dof: float
 
 
-class RepeatingErrors:
+class RepeatingErrors(StatefulBase):
     """Detects in whole periods of the signals what repeats with the excitation but is not a linear response.
 
     One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out, and periods in
@@ -55,6 +55,12 @@ class RepeatingErrors:
     settings
         Lines, signals and estimator.
     """
+
+    _stage = Stage("repeating-errors", 1)
+    _STATE = (
+        "_samples", "_position", "_output", "_told", "_at", "_whole", "_largest", "_step", "_periods", "_moments",
+        "_movement", "_silence",
+    )  # fmt: skip
 
     def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
         self._settings, lines = settings, settings.lines
@@ -84,26 +90,12 @@ class RepeatingErrors:
         self._output = np.zeros(self._mains.bins.size, dtype=np.complex128)
         self._periods = 0
 
-    _STATE = ("_samples", "_position", "_output", "_told")
-    _NUMBERS = ("_at", "_whole", "_largest", "_step", "_periods")
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {"distortion": self._now[0], "invalid": self._now[1]}
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        parts = {f"moments.{name}": array for name, array in self._moments.state().items()}
-        parts |= self._movement.state() | self._silence.state()
-        arrays = {name: getattr(self, name).copy() for name in self._STATE}
-        numbers = np.array([float(getattr(self, name)) for name in self._NUMBERS])
-        return arrays | parts | {"numbers": numbers, "distortion": self._now[0].copy(), "invalid": self._now[1].copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[...] = state[name]
-        for name, value in zip(self._NUMBERS, state["numbers"].tolist()):
-            setattr(self, name, value)
-        self._at, self._periods, self._whole = int(self._at), int(self._periods), bool(self._whole)
-        self._moments.load({name.removeprefix("moments."): a for name, a in state.items() if name.startswith("mom")})
-        self._movement.load(state)
-        self._silence.load(state)
-        self._now = state["distortion"].astype(np.float64), state["invalid"].astype(np.bool_)
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._now = state["distortion"], state["invalid"]
 
     def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""

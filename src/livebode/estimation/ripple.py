@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Lines, UsageError
+from livebode.core import Lines, Stage, StatefulBase, UsageError
 
 Floats = NDArray[np.float64]
 
@@ -73,8 +73,11 @@ def ripple_power(orders: tuple[RippleOrder, ...], lines: Lines, rate_per_s: Floa
     return total
 
 
-class RippleSpeed:
+class RippleSpeed(StatefulBase):
     """Speed of the schedule over the first and the second half of each window."""
+
+    _stage = Stage("ripple-speed", 1)
+    _STATE = ("_past",)
 
     def __init__(self, lines: Lines) -> None:
         self._window, self._rate_hz = lines.window, lines.rate_hz
@@ -82,12 +85,6 @@ class RippleSpeed:
 
     def restart(self) -> None:
         self._past[:] = np.nan
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"past": self._past.copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._past[:] = state["past"]
 
     def at(self, schedule: Floats, position: NDArray[np.int64]) -> Floats:
         """Speeds of the windows that end at these positions of the next stretch, per second, (2, rows)."""
@@ -99,18 +96,15 @@ class RippleSpeed:
         return np.stack([(middle - first) / max(early, 1), (known[last] - middle) / late]) * self._rate_hz
 
 
-class HopSpeed:
+class HopSpeed(StatefulBase):
     """Speed of the schedule from one spectrum to the next, where only its value at the windows' centres is sent."""
+
+    _stage = Stage("hop-speed", 1)
+    _STATE = ("_last",)
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._last = np.full(2, np.nan)
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"last": self._last.copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._last[:] = state["last"]
 
     def at(self, schedule: Floats, sample: NDArray[np.int64]) -> Floats:
         """Speeds per second at these samples, the same at a window's beginning and end, (2, rows)."""

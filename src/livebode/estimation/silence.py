@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 _PERIODS = 9
@@ -19,7 +21,7 @@ _GONE = 0.25  # of the previous power of the hum: below this, and without a tone
 _GONE_PERIODS = 2  # in a row
 
 
-class SilentHum:
+class SilentHum(StatefulBase):
     """Which lines show a steady tone in periods without excitation.
 
     After the excitation a weakly damped mode rings near its own frequency, and looks like a tone. So a tone counts
@@ -32,20 +34,14 @@ class SilentHum:
         Number of lines.
     """
 
+    _stage = Stage("silent-hum", 1)
+    _STATE = ("_power", "_found", "_low", "_counts")
+
     def __init__(self, lines: int) -> None:
         self._power = np.full((_PERIODS, lines), np.nan)  # of the newest periods of this silence, newest last
         self._found = np.zeros(lines)  # the hum's power, 0 where there is none
         self._low = np.zeros(lines)  # consecutive periods without it
         self._counts = np.zeros(2)  # periods of this silence, and of excitation before it
-
-    _STATE = ("_power", "_found", "_low", "_counts")
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {f"silence{name}": getattr(self, name).copy() for name in self._STATE}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[...] = state[f"silence{name}"]
 
     @property
     def lines(self) -> NDArray[np.bool_]:

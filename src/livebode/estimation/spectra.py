@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from math import gcd
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import UsageError
+from livebode.core import Stage, StatefulBase, UsageError
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.spikes import SpikeGate
 from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
@@ -41,7 +41,7 @@ class Rows:
     spikes: NDArray[np.intp]
 
 
-class LineSpectra:
+class LineSpectra(StatefulBase):
     """Sliding DFT of several signals that records gaps, non-finite samples and spikes of each window.
 
     Hops count within the period: rows are at the multiples of `hop` in each period, so that every row has one
@@ -62,6 +62,9 @@ class LineSpectra:
     dtype
         Of the samples and of the DFT; what is done to a signal before and after it is in float64.
     """
+
+    _stage = Stage("line-spectra", 1)
+    _STATE = ("_range", "_spikes", "_next", "_last_bad", "_before", "_started")
 
     def __init__(
         self,
@@ -102,22 +105,12 @@ class LineSpectra:
         if self._spikes is not None:
             self._spikes.restart(sample)
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        parts = {"range": self._range.state(), "spikes": self._spikes.state() if self._spikes else {}}
-        return {f"{part}.{name}": array for part, state in parts.items() for name, array in state.items()} | {
-            "dft": np.frombuffer(self._dft.snapshot(), dtype=np.uint8),
-            "number": np.array([self._next, *self._last_bad, self._started]),
-            "before": self._before.copy(),
-        }
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {"dft": self._dft.snapshot()}
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._dft.restore(state["dft"].tobytes())
-        self._next, *self._last_bad, started = (int(n) for n in state["number"])
-        self._started = bool(started)
-        self._before[:] = state["before"]
-        for name, part in (("range.", self._range), ("spikes.", self._spikes)):
-            if part is not None:
-                part.load({key.removeprefix(name): array for key, array in state.items() if key.startswith(name)})
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._dft.restore(state["dft"])
 
     def process(self, data: Floats) -> Rows:
         """Rows of the next samples, `data` (channels, samples); samples that are not finite make rows not whole."""

@@ -18,6 +18,7 @@ from livebode.core import (
     SignalError,
     Spectra,
     SpectraLayout,
+    Stage,
     UsageError,
     ignore,
 )
@@ -58,6 +59,8 @@ class SpectraTracker(AroundLines[SpectraWatch]):
     LivebodeError
         If a signal, a bin or the schedule that the settings need is not sent, or they need samples.
     """
+
+    _stage = Stage("spectra-tracker", 1)
 
     def __init__(self, settings: Settings, layout: SpectraLayout) -> None:
         _check(settings, layout)

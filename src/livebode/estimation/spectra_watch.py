@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, SignalError, Spectra
+from livebode.core import Event, SignalError, Spectra, Stage
 from livebode.estimation.counted import Counted
 
 _KINDS = {
@@ -17,6 +17,8 @@ _KINDS = {
 
 class SpectraWatch(Counted):
     """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
+
+    _stage = Stage("spectra-counts", 1)
 
     def __init__(self, events: list[Event], window: int) -> None:
         super().__init__(events, _KINDS, -(1 << 62), also=("spectra",))

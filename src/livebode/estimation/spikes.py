@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 _COMPARED = 3  # the smallest number of periods whose median one spike cannot move
@@ -13,7 +15,7 @@ _FACTOR = 2.0  # a Gaussian sample of a window of 100 passes it once in 1e6 wind
 _ROUNDING = 1e-9  # of the signal's size: smaller differences are rounding
 
 
-class SpikeGate:
+class SpikeGate(StatefulBase):
     """Finds spikes in periodic signals sample by sample, without look-ahead.
 
     A sample is a spike when it differs from the median of the last three periods at its place by more than twice what
@@ -29,6 +31,9 @@ class SpikeGate:
         Period, samples.
     """
 
+    _stage = Stage("spike-gate", 1)
+    _STATE = ("_past", "_largest", "_difference", "_size", "_limit", "_periods", "_at", "_whole")
+
     def __init__(self, watched: NDArray[np.bool_], window: int) -> None:
         self._watched = watched
         signals = int(watched.sum())
@@ -40,18 +45,6 @@ class SpikeGate:
         self._periods = 0
         self._at = 0
         self._whole = True
-
-    _STATE = ("_past", "_largest", "_difference", "_size", "_limit")
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        arrays = {name: getattr(self, name).copy() for name in self._STATE}
-        return arrays | {"count": np.array([self._periods, self._at, self._whole])}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[...] = state[name]
-        self._periods, self._at, whole = (int(n) for n in state["count"])
-        self._whole = bool(whole)
 
     def restart(self, sample: int) -> None:
         """The next sample has this number; the previous periods remain the reference."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, Responses, SignalError, ignore
+from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, ignore
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
@@ -47,6 +47,8 @@ class Tracker(AroundLines[Watch]):
     >>> len(responses), responses.magnitude_db[-1].round(3)
     (80, array([6.021]))
     """
+
+    _stage = Stage("tracker", 1)
 
     def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
         self.settings = settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Block, Event, SignalError
+from livebode.core import Block, Event, SignalError, Stage
 from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
 
@@ -17,6 +17,8 @@ _KINDS = {
 
 class Watch(Counted):
     """Counts and Events of a stream of Blocks."""
+
+    _stage = Stage("sample-counts", 1)
 
     def __init__(self, events: list[Event], window: int) -> None:
         super().__init__(events, _KINDS, -window)

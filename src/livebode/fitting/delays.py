@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
 from livebode.core.parameters import OK
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import Measured, Problem
@@ -24,12 +25,14 @@ _EVERY = 16  # groups between two decisions
 _TRIED_TICKS = (0.0, 1.0, 2.0, 4.0, 8.0)
 
 
-class DelayChoice:
+class DelayChoice(StatefulBase):
     """A model with a fixed delay and the same with a free one, and the choice between them for the rows.
 
     Rows of the first group choose one by one; those of a later group use the joint result of the previous groups, and
     every sixteenth group decides again. If the user frees or fixes the delay, there is no choice.
     """
+
+    _stage = Stage("delay-choice", 1)
 
     def __init__(self) -> None:
         self._freed: Problem | None = None
@@ -71,13 +74,13 @@ class DelayChoice:
             self.taken = bool(np.median(self.gains) > (_GONE if self.taken else SHOWN))
             self.gains = []
 
-    def plain(self) -> dict[str, Any]:
-        """For a snapshot; see `restore`."""
+    def _state(self) -> dict[str, Any]:
         return {"taken": self.taken, "gains": self.gains}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from `plain`."""
-        self.taken, self.gains = state["taken"], state["gains"]
+    def _load(self, state: dict[str, Any]) -> None:
+        if state["taken"] not in (None, False, True):
+            raise ValueError(f"taken is {state['taken']!r}")
+        self.taken, self.gains = state["taken"], [float(gain) for gain in state["gains"]]
 
     def _possible(self, freed: Fitted) -> NDArray[np.bool_]:
         late_s = freed.ended[:, self.held.model.names.index(DELAY)]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from livebode.core import (
     Parameters,
     Responses,
     SignalError,
-    UsageError,
+    Stage,
+    StatefulBase,
     ignore,
 )
 from livebode.core.parameters import OK
@@ -35,7 +36,7 @@ _MEMORY = 64  # rows that ε is taken from
 _KNOWN = 4  # rows that ε is taken from at least
 
 
-class Fitter:
+class Fitter(StatefulBase):
     """Fits a model to each Response on arrival, starting from the last valid fits.
 
     Rows are processed in groups of sixteen: a row starts from the last valid fit of the previous groups, and uses the ε
@@ -74,6 +75,8 @@ class Fitter:
     >>> fitter.names[:4]
     ('Js', 'mL', 'Keff', 'bs')
     """
+
+    _stage = Stage("fitter", 1)
 
     def __init__(
         self,
@@ -176,51 +179,18 @@ class Fitter:
             raise RuntimeError("the fitter has processed no responses, so its lines are not known; process some first")
         return self._delay.problem.grid
 
-    def snapshot(self) -> bytes:
-        """Everything that the next row's result depends on; see `restore`."""
-        state = {
-            "owner": self._identity(), "seen": self._seen, "word": self._word, "epsilon": self._epsilon,
-            "start": None if self._start is None else self._start.tolist(),
-            "next": None if self._next is None else self._next.tolist(),
-            "rows": [[part.tolist() for part in row] for row in self._rows],
-            "delay": self._delay.plain(),
-        }  # fmt: skip
-        return json.dumps(state).encode()
+    def _state(self) -> dict[str, Any]:
+        rows = {f"rows {i}": np.array(part) for i, part in enumerate(zip(*self._rows))}
+        arrays = {"start": self._start, "next": self._next} | rows
+        return {"seen": self._seen, "word": self._word, "epsilon": self._epsilon, "delay": self._delay} | arrays
 
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a Fitter with the same settings.
+    def _load(self, state: dict[str, Any]) -> None:
+        self._delay.restore(state["delay"])
+        self._seen, self._word, self._epsilon = int(state["seen"]), str(state["word"]), state["epsilon"]
+        self._start, self._next = state["start"], state["next"]
+        self._rows = list(zip(state["rows 0"], state["rows 1"], state["rows 2"])) if "rows 0" in state else []
 
-        Raises
-        ------
-        UsageError
-            If the snapshot is damaged or belongs to other settings; the Fitter is then unchanged.
-        """
-        try:
-            state = json.loads(snapshot)
-            owner, seen = state["owner"], int(state["seen"])
-            rows = [(np.array(a), np.array(b), np.array(c)) for a, b, c in state["rows"]]
-            start, after = (None if state[k] is None else np.array(state[k], dtype=float) for k in ("start", "next"))
-            word, epsilon, delay = str(state["word"]), state["epsilon"], state["delay"]
-            delay = {"taken": delay["taken"], "gains": [float(x) for x in delay["gains"]]}
-        except (ValueError, KeyError, TypeError) as error:
-            raise UsageError(
-                "unreadable",
-                f"the snapshot of {len(snapshot)} bytes is damaged ({error})",
-                "start without it",
-                argument="snapshot",
-                reason=str(error),
-            ) from None
-        if owner != self._identity():
-            raise UsageError(
-                "conflict",
-                "the snapshot belongs to a fitter with other settings",
-                "restore it into one with the same settings",
-                argument="snapshot",
-            )
-        self._seen, self._rows, self._start, self._next = seen, rows, start, after
-        self._word, self._epsilon = word, epsilon
-        self._delay.restore(delay)
-
+    @property
     def _identity(self) -> str:
         parts = (self.model, sorted(self._fixed.items()), self._free, self._band, self._hold)
         return f"{type(self.model).__qualname__} {parts!r}"

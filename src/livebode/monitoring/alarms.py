@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
 from livebode.monitoring.naming import Change, Segment
 from livebode.monitoring.offset import Offset, Place
 
@@ -94,8 +95,10 @@ def _change(numbers: NDArray[Any]) -> Change | None:
 
 
 @dataclass
-class Recent:
+class Recent(StatefulBase):
     """The newest windows, as many as an alarm may look back over; scores are of changes from the baseline."""
+
+    _stage = Stage("recent-windows", 1)
 
     rows: int
     score: list[Floats] = field(default_factory=list)
@@ -115,13 +118,9 @@ class Recent:
         information = np.array(self.information[first:])
         return Segment(np.array(self.score[first:]) - information @ offset.logarithms, information, position_m)
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        return {
-            "score": np.array(self.score),
-            "information": np.array(self.information),
-            "moment": np.array(self.moment),
-        }
+    def _state(self) -> dict[str, Any]:
+        return {name: np.array(getattr(self, name)) for name in ("score", "information", "moment")}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
+    def _load(self, state: dict[str, Any]) -> None:
         self.score, self.information = list(state["score"]), list(state["information"])
         self.moment = [(float(a), float(b), float(c)) for a, b, c in state["moment"]]

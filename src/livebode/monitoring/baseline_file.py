@@ -75,13 +75,23 @@ def load(path: Path) -> Baseline:
         ) from None
     if not isinstance(data, dict) or data.get("format") != _FORMAT:
         raise BaselineError("not-a-baseline", f"{str(path)!r} is not a baseline", _LEARN, path=str(path))
-    if data.get("version") != _VERSION:
+    found = data.get("version")
+    if type(found) is int and found > _VERSION:
+        raise BaselineError(
+            "newer-version",
+            f"{str(path)!r} has version {found} of its format, and this livebode reads version {_VERSION}",
+            "update livebode",
+            path=str(path),
+            found=found,
+            readable=_VERSION,
+        )
+    if found != _VERSION:
         raise BaselineError(
             "version",
-            f"{str(path)!r} is a baseline of version {data.get('version')}, and this livebode reads version {_VERSION}",
+            f"{str(path)!r} is a baseline of version {found}, and this livebode reads version {_VERSION}",
             "learn it again",
             path=str(path),
-            version=data.get("version"),
+            version=found,
         )
     return _baseline(Part(str(path), "", data))
 

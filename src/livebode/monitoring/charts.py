@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 UP, DOWN = 0, 1
 
 
-class Charts:
+class Charts(StatefulBase):
     """Page's CUSUM of log-likelihood ratios, one up and one down for each component.
 
     A step gives for a component the score s and the information I of its change δ: for small δ the log-likelihood of
@@ -39,6 +41,9 @@ class Charts:
            [ 0.]])
     """
 
+    _stage = Stage("charts", 1)
+    _STATE = ("sums", "since")
+
     def __init__(self, smallest: Floats, allowed: Floats, threshold: float) -> None:
         self.threshold = threshold
         self.sums = np.zeros((2, smallest.size))
@@ -66,10 +71,3 @@ class Charts:
 
     def reset(self) -> None:
         self.sums[:] = 0.0
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"sums": self.sums.copy(), "since": self.since.copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self.sums = np.array(state["sums"], dtype=np.float64)
-        self.since = np.array(state["since"], dtype=np.int64)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import Event
+from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring import evidence as word
 from livebode.monitoring.alarms import Alarm, Recent
 from livebode.monitoring.charts import Charts
@@ -37,7 +36,7 @@ Moment = tuple[float, float, float]
 """Position, newest sample and time of a window."""
 
 
-class MachineDetector:
+class MachineDetector(StatefulBase):
     """Evidence in, Events out: what changed, by how much, since when, where.
 
     Every direction has a CUSUM up and one down, with all others fixed at the baseline, which detects a change soonest;
@@ -55,6 +54,12 @@ class MachineDetector:
     threshold
         See `false_alarms.threshold`, for `CHARTS` charts.
     """
+
+    _stage = Stage("machine-detector", 1)
+    _STATE = (
+        "_first", "_further", "_cells", "standing", "_own", "_recent", "_pending", "_taken", "judged", "_far",
+        "_passed",
+    )  # fmt: skip
 
     def __init__(self, machine: Machine, threshold: float) -> None:
         held, free, size = machine.held, machine.free, len(machine.windows)
@@ -223,17 +228,11 @@ class MachineDetector:
         since = np.concatenate([self._first.since[self._first.sums > 0], self._cells.since[visited]])
         return int(since.min(initial=self._taken))
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        parts = {f"{name}.{key}": array for name, part in self._parts().items() for key, array in part.state().items()}
-        numbers = np.array([self._pending, self._taken, self.judged, self._far])
-        unknown = np.array(sorted(self._unknown), dtype="U16")
-        return parts | {"numbers": numbers, "passed": self._passed.copy(), "unknown": unknown}
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {"unknown": sorted(self._unknown)}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
-        for name, part in self._parts().items():
-            part.load({k.removeprefix(f"{name}."): v for k, v in state.items() if k.startswith(f"{name}.")})
-        self._pending, self._taken, self.judged, far = (int(n) for n in state["numbers"])
-        self._far, self._passed = bool(far), np.array(state["passed"])
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
         self._unknown = {str(name) for name in state["unknown"]}
 
     def _parts(self) -> dict[str, Any]:

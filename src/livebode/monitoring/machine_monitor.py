@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from livebode.core import Block, Event, Lines
+from livebode.core import Block, Event, Lines, Stage, StatefulBase
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.false_alarms import threshold
@@ -21,12 +18,15 @@ from livebode.monitoring.stretches import Stretch, Stretches
 Look = Callable[[Evidence], object]
 
 
-class MachineMonitor:
+class MachineMonitor(StatefulBase):
     """Judges every steady window of a recording by a learned Machine.
 
     Delay: an Event is given at the latest with the first sample of the twelfth window after the one that it refers to.
     The Events do not depend on how the samples are cut into Blocks.
     """
+
+    _stage = Stage("machine-monitor", 1)
+    _STATE = ("_stretches", "detector")
 
     def __init__(self, machine: Machine, lines: Lines, names: tuple[str, str, str], mean_s: float) -> None:
         self._stretches = Stretches((*names, *machine.covariates.names), lines.window, lines.rate_hz)
@@ -73,12 +73,9 @@ class MachineMonitor:
             events += self.detector.process(seen)
         return events
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        stretches = {f"stretches.{k}": v for k, v in self._stretches.state().items()}
-        detector = {f"detector.{k}": v for k, v in self.detector.state().items()}
-        return stretches | detector | {"level": np.array(self._evidence.level)}
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {"level": self._evidence.level}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
-        for name, part in (("stretches.", self._stretches), ("detector.", self.detector)):
-            part.load({k.removeprefix(name): v for k, v in state.items() if k.startswith(name)})
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
         self._evidence.level = float(state["level"])

@@ -5,11 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from livebode.core import Block, Event, Parameters, Responses, UsageError
-from livebode.estimation import Settings, snapshots
+from livebode.core import Block, Event, Parameters, Responses, Stage, StatefulBase, UsageError
+from livebode.estimation import Settings
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_monitor import MachineMonitor
@@ -17,7 +14,7 @@ from livebode.monitoring.rows import Apart, places
 from livebode.monitoring.table_monitor import TableMonitor
 
 
-class Monitor:
+class Monitor(StatefulBase):
     """Events of changes, from the samples of a run and the responses of its Tracker.
 
     If the Baseline has a model of the moving machine, that model is used; else its tables of lines and, where
@@ -53,6 +50,8 @@ class Monitor:
     >>> monitor.summary()["message"]
     'No change against the baseline (1.8 s of the run judged).'
     """
+
+    _stage = Stage("monitor", 1)
 
     def __init__(
         self,
@@ -142,26 +141,21 @@ class Monitor:
         together = self._machine.together() if self._machine else ""
         return summary | {"message": _message(summary, together)}
 
-    def snapshot(self) -> bytes:
-        """Everything that the next Event depends on, exact; see `restore`."""
-        parts: dict[str, dict[str, NDArray[Any]]] = {"counts": {k: np.array(v) for k, v in self._counts.items()}}
-        if self._machine is not None:
-            parts["machine"] = self._machine.state()
-        for name in self._tables:
-            parts[name], parts[f"{name} apart"] = self._tables[name].state(), self._apart[name].state()
-        return snapshots.pack(parts, self._owner())
+    def _stages(self) -> dict[str, StatefulBase]:
+        stages: dict[str, StatefulBase] = {} if self._machine is None else {"machine": self._machine}
+        apart = {f"{name} apart": rows for name, rows in self._apart.items()}
+        return stages | self._tables | apart
 
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a Monitor of the same baseline and settings; LivebodeError if it is not."""
-        parts = snapshots.unpack(snapshot, self._owner())
-        self._counts = {name: int(count) for name, count in parts["counts"].items()}
-        if self._machine is not None:
-            self._machine.load(parts["machine"])
-        for name in self._tables:
-            self._tables[name].load(parts[name])
-            self._apart[name].load(parts[f"{name} apart"])
+    def _state(self) -> dict[str, Any]:
+        return {"counts": self._counts} | self._stages()
 
-    def _owner(self) -> str:
+    def _load(self, state: dict[str, Any]) -> None:
+        for name, stage in self._stages().items():
+            stage.restore(state[name])
+        self._counts = {name: int(state["counts"][name]) for name in self._counts}
+
+    @property
+    def _identity(self) -> str:
         judges = "machine" if self._machine else ", ".join(self._tables)
         return f"{self._settings.identity} {self.false_alarm_interval_s!r} {judges}"
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
+
 Floats = NDArray[np.float64]
 
 _ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
@@ -12,7 +14,7 @@ _MEDIAN = 0.4549364  # of chi square with one degree of freedom
 _BELIEVED = 3.0  # times the excess of the differences over the learned noise
 
 
-class NoiseLevel:
+class NoiseLevel(StatefulBase):
     """Limits the rows' own noise estimates by the differences of neighbouring rows.
 
     A response's sigma is from the scatter of periods. For some periods after a step of the machine it contains the
@@ -27,6 +29,9 @@ class NoiseLevel:
     together
         Components of one line: 2, or 1 for a parameter.
     """
+
+    _stage = Stage("noise-level", 1)
+    _STATE = ("_before", "_squares")
 
     def __init__(self, components: int, together: int) -> None:
         self._together = together
@@ -46,13 +51,6 @@ class NoiseLevel:
         level = _median(newest.reshape(len(own), -1, self._together * _ROWS)) / _MEDIAN
         shown = np.repeat(np.maximum(level - 1.0, 0.0), self._together, axis=1)
         return np.asarray(own + np.minimum(more, np.nan_to_num(_BELIEVED * shown * known)))
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"level before": self._before.copy(), "level squares": self._squares.copy()}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._before = np.array(state["level before"], dtype=np.float64)
-        self._squares = np.array(state["level squares"], dtype=np.float64)
 
 
 def _median(values: Floats) -> Floats:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Parameters, Responses
+from livebode.core import Parameters, Responses, Stage, StatefulBase
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def places(window: int, hop: int) -> tuple[int, ...]:
     return tuple(step * hop % window for step in range(count, 0, -max(1, count // PLACES))) if hop < window else (0,)
 
 
-class Apart:
+class Apart(StatefulBase):
     """Selects rows whose windows do not overlap from a stream of responses or parameters.
 
     Parameters
@@ -70,6 +70,9 @@ class Apart:
     place
         One of `places`.
     """
+
+    _stage = Stage("non-overlapping", 1)
+    _STATE = ("_sample", "_schedule")
 
     def __init__(self, apart: int, place: int) -> None:
         self._apart, self._place = apart, place
@@ -107,9 +110,3 @@ class Apart:
         step = np.diff(before)
         known = (follows & np.isfinite(step)) | ~np.isfinite(schedule)
         return Rows(value, variance, schedule, np.where(follows, step, np.nan), time_s, sample, ok & known)
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"sample": np.array(self._sample), "schedule": np.array(self._schedule)}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._sample, self._schedule = int(state["sample"]), float(state["schedule"])

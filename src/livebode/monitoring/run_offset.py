@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
 from livebode.monitoring.accuracy import Accuracy
 from livebode.monitoring.between_runs import KNOWN, BetweenRuns
 from livebode.monitoring.charts import Charts
@@ -19,7 +20,7 @@ _FULL = 0.8  # of the memory: a larger share takes minutes to fill
 _PAUSE_S = 60.0  # without judged motion, after which the machine may be at another temperature
 
 
-class RunOffset:
+class RunOffset(StatefulBase):
     """Follows this run's offset, so that only changes within the run, or in another direction, remain.
 
     The model follows the offset, as with a covariate. Until it is known to a tenth of the smallest change, evidence is
@@ -36,6 +37,9 @@ class RunOffset:
     held, threshold
         Of the charts.
     """
+
+    _stage = Stage("run-offset", 1)
+    _STATE = ("chart", "_sums", "_fixed", "_last_s", "replayed")
 
     def __init__(self, between: BetweenRuns | None, held: Accuracy, threshold: float) -> None:
         self._between, self._held = between, held
@@ -125,13 +129,9 @@ class RunOffset:
         if self._between is not None:
             self.replayed = self._between.direction * self._sums[0] / (self._sums[1] + self._between.spread**-2)
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        chart = {f"chart.{name}": array for name, array in self.chart.state().items()}
-        numbers = np.array([*self._sums, self._fixed, self._last_s])
-        return chart | {"queue": self._queue, "numbers": numbers, "replayed": self.replayed}
+    def _state(self) -> dict[str, Any]:
+        return super()._state() | {"queue": self._queue}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
-        self.chart.load({name.removeprefix("chart."): v for name, v in state.items() if name.startswith("chart.")})
-        self._queue, self.replayed = np.array(state["queue"]), np.array(state["replayed"])
-        self._sums, self._fixed = np.array(state["numbers"][:3]), bool(state["numbers"][3])
-        self._last_s = float(state["numbers"][4])
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._queue = state["queue"]

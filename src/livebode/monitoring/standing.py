@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
 from livebode.monitoring.alarms import Alarm
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.naming import Change, Segment, bound
@@ -22,12 +23,15 @@ _MOVING = 0.005  # of the offset, from one stretch to the next: the others wait 
 _MOST = 0.7  # of a logarithm: a factor of two
 
 
-class Standing:
+class Standing(StatefulBase):
     """Alarms, with the resulting Offset of the model.
 
     The model follows the active changes, stretch by stretch, so that evidence remains small and a large change does
     not appear as an additional one (Gauss–Newton). Changes of directions are estimated together.
     """
+
+    _stage = Stage("active-alarms", 1)
+    _STATE = ("_score", "_information", "_moving")
 
     def __init__(self, machine: Machine, threshold: float) -> None:
         self._machine, self._threshold = machine, threshold
@@ -168,22 +172,15 @@ class Standing:
         """Amount of every direction if none were fixed at the baseline, by the model at its present offset."""
         return np.asarray(np.linalg.lstsq(self._information, self._score, rcond=None)[0])
 
-    def state(self) -> dict[str, NDArray[Any]]:
+    def _state(self) -> dict[str, Any]:
         places = [[p.centre_m, p.width_m, p.amount] for p in self.offset.places]
-        return {
-            "alarms": np.array([a.row() for a in self.alarms]),
-            "logarithms": self.offset.logarithms,
-            "places": np.array(places),
-            "score": self._score,
-            "information": self._information,
-            "moving": np.array(self._moving),
-        }
+        own = {"logarithms": self.offset.logarithms, "places": places}
+        return super()._state() | own | {"alarms": np.array([alarm.row() for alarm in self.alarms])}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
         self.alarms = [Alarm.of(row) for row in state["alarms"]]
-        self.offset = Offset(np.array(state["logarithms"]), tuple(Place(*map(float, row)) for row in state["places"]))
-        self._score, self._information = np.array(state["score"]), np.array(state["information"])
-        self._moving = bool(state["moving"])
+        self.offset = Offset(state["logarithms"], tuple(Place(*map(float, row)) for row in state["places"]))
 
 
 def _neglected(step: Floats) -> float:

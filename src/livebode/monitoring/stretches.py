@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block
+from livebode.core import Block, Stage, StatefulBase
 
 Floats = NDArray[np.float64]
 
@@ -32,8 +32,11 @@ class Stretch:
     origin_s: float
 
 
-class Stretches:
+class Stretches(StatefulBase):
     """Cuts Blocks at places that depend on sample numbers alone; a gap ends a stretch."""
+
+    _stage = Stage("stretches", 1)
+    _STATE = ("_start", "_stop", "_next", "_settled", "_origin_s")
 
     def __init__(self, names: tuple[str, ...], window: int, rate_hz: float) -> None:
         self._names, self._window = names, window
@@ -76,12 +79,10 @@ class Stretches:
         self._parts, self._start = [data[:, keep - self._start :].copy()], keep
         return stretch
 
-    def state(self) -> dict[str, NDArray[Any]]:
+    def _state(self) -> dict[str, Any]:
         data = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((len(self._names), 0))
-        numbers = [self._start, self._stop, self._next, self._settled]
-        return {"data": data, "numbers": np.array(numbers), "origin_s": np.array(self._origin_s)}
+        return super()._state() | {"data": data}
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
-        self._parts = [np.array(state["data"])] if state["data"].size else []
-        self._start, self._stop, self._next, self._settled = (int(n) for n in state["numbers"])
-        self._origin_s = float(state["origin_s"])
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._parts = [state["data"]] if state["data"].size else []

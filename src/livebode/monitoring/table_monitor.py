@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event
+from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.noise_level import NoiseLevel
@@ -23,7 +23,7 @@ _CONFIDENCE = 1.96
 _TOLD = 3.0  # standard deviations, from which on a component counts among what changed
 
 
-class TableMonitor:
+class TableMonitor(StatefulBase):
     """Every component of a Table has a CUSUM up and one down; one that reaches the threshold raises an alarm for all.
 
     The alarm names each component that differs by three standard deviations and half of the smallest change, with
@@ -38,6 +38,9 @@ class TableMonitor:
     mean_s, step_s
         Mean time between false alarms, and between rows, s.
     """
+
+    _stage = Stage("table-monitor", 1)
+    _STATE = ("_charts", "_noise", "_standing", "_seen_in", "judged", "_found", "_told_unknown")
 
     def __init__(self, table: Table, mean_s: float, step_s: float) -> None:
         self._table = table
@@ -133,28 +136,13 @@ class TableMonitor:
         self._forget()
         return [event]
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        return (
-            self._charts.state()
-            | self._noise.state()
-            | {
-                "score": self._score,
-                "information": self._information,
-                "moment": self._moment,
-                "standing": self._standing.copy(),
-                "seen_in": self._seen_in.copy(),
-                "numbers": np.array([self.judged, self._found, self._told_unknown]),
-            }
-        )
+    def _state(self) -> dict[str, Any]:
+        rows = {"score": self._score, "information": self._information, "moment": self._moment}
+        return super()._state() | rows
 
-    def load(self, state: dict[str, NDArray[Any]]) -> None:
-        self._charts.load(state)
-        self._noise.load(state)
-        self._score, self._information = np.array(state["score"]), np.array(state["information"])
-        self._moment, self._standing = np.array(state["moment"]), np.array(state["standing"])
-        self._seen_in = np.array(state["seen_in"])
-        self.judged, self._found, told = (int(n) for n in state["numbers"])
-        self._told_unknown = bool(told)
+    def _load(self, state: dict[str, Any]) -> None:
+        super()._load(state)
+        self._score, self._information, self._moment = state["score"], state["information"], state["moment"]
 
 
 def _began(score: Floats, information: Floats, raised: NDArray[np.bool_]) -> int:

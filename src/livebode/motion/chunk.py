@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Lines
+from livebode.core import Block, Lines, Stage, StatefulBase
 from livebode.estimation.implausible import PlausibleRange
 
 Floats = NDArray[np.float64]
@@ -48,8 +49,10 @@ class Chunk:
         return np.lib.stride_tricks.sliding_window_view(signal, window)[sample - self.start - window + 1]
 
 
-class Recorded:
+class Recorded(StatefulBase):
     """The newest samples of w, u, y, x, as many as the next chunk needs."""
+
+    _stage = Stage("recorded-samples", 1)
 
     def __init__(self, names: list[str], lines: Lines) -> None:
         self._names, self._rate_hz = names, lines.rate_hz
@@ -96,18 +99,16 @@ class Recorded:
             self._parts = [np.concatenate(self._parts, axis=1)]
         return self._parts[0]
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        data = self._whole() if self else np.zeros((4, 0))
-        return {f"range.{name}": array for name, array in self._range.state().items()} | {
-            "data": data,
-            "start": np.array([self.start]),
-        }
+    def _state(self) -> dict[str, Any]:
+        data = self._whole() if self else np.zeros((len(self._names), 0))
+        return {"range": self._range, "data": data, "start": self.start}
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
+    def _load(self, state: dict[str, Any]) -> None:
+        data = state["data"]
+        if len(data) != len(self._names):
+            raise ValueError(f"samples of {len(data)} channels")
         self.forget()
-        self._range.load({k.removeprefix("range."): v for k, v in state.items() if k.startswith("range.")})
-        data = np.array(state["data"], dtype=np.float64)
-        if data.size:
-            self._parts = [data]
-        self.start = int(state["start"][0])
+        self._range.restore(state["range"])
+        self._parts = [data] if data.size else []
+        self.start = int(state["start"])
         self.stop = self.start + data.shape[1]

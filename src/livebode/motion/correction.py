@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, ignore
-from livebode.estimation import Settings, Tracker, snapshots
+from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, ignore
+from livebode.estimation import Settings, Tracker
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
 from livebode.motion.drive import drive_of
@@ -27,7 +27,7 @@ Complex = NDArray[np.complex128]
 _LEAD_S = 0.5  # before a chunk, for the model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 
 
-class MotionCorrection:
+class MotionCorrection(StatefulBase):
     """A Tracker whose Responses are those of the machine at a fixed position, each window's centre.
 
     The machine changes within a window, and its resonance still rings from earlier positions: in motion a response
@@ -98,6 +98,8 @@ class MotionCorrection:
     (600, 0.0028, 500000.0)
     """
 
+    _stage = Stage("motion-correction", 1)
+
     def __init__(
         self,
         settings: Settings,
@@ -118,7 +120,9 @@ class MotionCorrection:
         self._drive = drive_of(settings.loop, lines.rate_hz) if driven_by == "excitation" else None
         self._quotient = quotient
         self._lead = max(round(_LEAD_S * lines.rate_hz), 2 * lines.window)
-        self._identity = repr((settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines))
+        self._settings_of_state = repr(
+            (settings.identity, radius_m, self._chunk, self._drive, quotient, passes, splines)
+        )
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
         # Sigma is from the residual of the model, which does not contain the motion.
@@ -131,7 +135,8 @@ class MotionCorrection:
         self._standstill = Standstill(settings, self._events)
         self._ripple = RippleWatch(settings)
         self._from = 0
-        self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill | RippleWatch] = {
+        self._parts: dict[str, StatefulBase] = {
+            "tracker": self._tracker,
             "recorded": self._recorded,
             "waiting": self._waiting,
             "learner": self._learner,
@@ -215,27 +220,17 @@ class MotionCorrection:
         self._recorded.forget()
         return last
 
-    def snapshot(self) -> bytes:
-        """Everything that the next sample's result depends on, exact; see `restore`."""
-        own: dict[str, NDArray[np.generic]] = {
-            "tracker": np.frombuffer(self._tracker.snapshot(), dtype=np.uint8),
-            "from": np.array([self._from]),
-        }
-        return snapshots.pack({name: part.state() for name, part in self._parts.items()} | {"own": own}, self._identity)
+    @property
+    def _identity(self) -> str:
+        return self._settings_of_state
 
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a MotionCorrection with the same settings.
+    def _state(self) -> dict[str, Any]:
+        return self._parts | {"from": self._from}
 
-        Raises
-        ------
-        LivebodeError
-            If the snapshot is damaged or belongs to other settings; the correction is then unchanged.
-        """
-        parts = snapshots.unpack(snapshot, self._identity)
-        self._tracker.restore(parts["own"]["tracker"].tobytes())
-        self._from = int(parts["own"]["from"][0])
+    def _load(self, state: dict[str, Any]) -> None:
         for name, part in self._parts.items():
-            part.load(parts.get(name, {}))
+            part.restore(state[name])
+        self._from = int(state["from"])
 
     def _corrected(self, stop: int) -> Responses:
         """Responses up to the sample before `stop`, and their fit; drops what no later chunk needs."""

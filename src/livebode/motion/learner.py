@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Responses
+from livebode.core import Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
 from livebode.motion.fit import Fit, Rows, sampled
@@ -40,11 +41,13 @@ _CHECKED = 50  # positions
 _WORSE = 1.5  # misfit relative to the previous one from which a start from the previous model is rejected
 
 
-class Learner:
+class Learner(StatefulBase):
     """Fits a MovingModel to each chunk, the first from a scan, the next ones from the previous model.
 
     A chunk without travel has no information on the curves: after one with travel, the model is unchanged.
     """
+
+    _stage = Stage("motion-learner", 1)
 
     def __init__(self, settings: Settings, radius_m: float, splines: tuple[int, int], passes: int) -> None:
         self._settings, self._radius_m, self._splines, self._passes = settings, radius_m, splines, passes
@@ -166,23 +169,20 @@ class Learner:
         lines = self._settings.lines
         return Fit(lines.z, lines.rate_hz, self._radius_m, stiffness_splines, damping_splines, delayed=True)
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        head = {"count": np.array([self.chunks]), "misfit": np.array([self._misfit])}
-        if self.model is None:
-            return head
+    def _state(self) -> dict[str, Any]:
         m = self.model
-        return head | {
-            "constants": np.array([m.inertia_kg_m2, m.load_kg, m.low_m, m.high_m, m.delay_s]),
+        model = {} if m is None else {
+            "constants": [m.inertia_kg_m2, m.load_kg, m.low_m, m.high_m, m.delay_s],
             "stiffness": m.log_stiffness.weights,
             "damping": m.log_damping.weights,
-        }
+        }  # fmt: skip
+        return {"chunks": self.chunks, "misfit": self._misfit} | model
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self.chunks, self._misfit = int(state["count"][0]), float(state["misfit"][0])
-        self.model = None
+    def _load(self, state: dict[str, Any]) -> None:
+        self.chunks, self._misfit, self.model = int(state["chunks"]), float(state["misfit"]), None
         if "constants" in state:
             inertia, load, low, high, delay_s = (float(n) for n in state["constants"])
-            stiffness, damping = (Curve(low, high, np.array(state[name])) for name in ("stiffness", "damping"))
+            stiffness, damping = (Curve(low, high, state[name]) for name in ("stiffness", "damping"))
             self.model = MovingModel(inertia, load, self._radius_m, stiffness, damping, delay_s)
 
 

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 from scipy.signal.windows import blackmanharris
 from scipy.stats import gamma
 
-from livebode.core import Lines
+from livebode.core import Lines, Stage, StatefulBase
 from livebode.motion.replay import without_drift
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ def shaft_position(position_m: Floats, velocity: Floats, window: int, rate_hz: f
     return without_drift(radius_m * angle, position_m, window)
 
 
-class OrderSpectrum:
+class OrderSpectrum(StatefulBase):
     """Power spectrum of a residual over the position, in cycles a metre, mean over steady strokes.
 
     Over time a ripple's frequency follows the speed; over the position it is constant. Each stroke is averaged onto an
@@ -70,6 +70,9 @@ class OrderSpectrum:
     slowest_m_per_s
         Speed of the slowest stroke.
     """
+
+    _stage = Stage("order-spectrum", 1)
+    _STATE = ("_sum", "_whole", "_torque", "_count")
 
     def __init__(self, lines: Lines, way_m: float, slowest_m_per_s: float) -> None:
         self._lines_hz = lines.frequency_hz
@@ -116,15 +119,6 @@ class OrderSpectrum:
         """Root mean square over the strokes of each order's amplitude, N m, (orders,)."""
         at = np.searchsorted(self.cycles_per_m, orders)
         return np.asarray(np.sqrt(self._torque[at] / np.maximum(self._count[at], 1)))
-
-    _STATE = ("_sum", "_whole", "_torque", "_count")
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {name: getattr(self, name).copy() for name in self._STATE}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        for name in self._STATE:
-            getattr(self, name)[:] = state[name]
 
     def found(self) -> Floats:
         """Orders in cycles a metre, the strongest first, at most eight."""

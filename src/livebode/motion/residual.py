@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Responses
+from livebode.core import Block, Channel, Responses, Stage, StatefulBase
 from livebode.estimation import Settings, Tracker
 from livebode.motion.chunk import Chunk
 from livebode.motion.model import MovingModel
@@ -32,12 +33,14 @@ def residual(model: MovingModel, chunk: Chunk, settings: Settings) -> Residual:
     return Residual(np.where(chunk.missing, np.nan, chunk.y - motor - slow), cart / model.radius_m + slow)
 
 
-class Scatter:
+class Scatter(StatefulBase):
     """A Tracker on the residual: R/U, and the noise from the scatter of R between periods, or from detection lines.
 
     The motion is also in the model, so the residual does not contain it. The memory continues from chunk to chunk;
     windows across a chunk's end are not used, because they would contain two models.
     """
+
+    _stage = Stage("residual-scatter", 1)
 
     def __init__(self, settings: Settings) -> None:
         self._settings = replace(settings, schedule=None, spikes=(), ripple=())
@@ -71,8 +74,10 @@ class Scatter:
         data = np.array([rows[name][at:] for name in names])
         return Block(data, tuple(map(Channel, names)), s.lines.rate_hz, start=chunk.start + at, gap=True)
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"memory": np.frombuffer(self._memory, dtype=np.uint8)}
+    def _state(self) -> dict[str, Any]:
+        return {"memory": self._memory}
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._memory = state["memory"].tobytes()
+    def _load(self, state: dict[str, Any]) -> None:
+        if state["memory"]:
+            Tracker(self._settings, repeating=False).restore(state["memory"])
+        self._memory = state["memory"]

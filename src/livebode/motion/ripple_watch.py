@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.core import Stage, StatefulBase
 from livebode.estimation import RippleOrder, RippleSpeed, Settings, ripple_power
 from livebode.motion.chunk import Chunk
 from livebode.motion.fit import sampled
@@ -20,12 +22,14 @@ _SLOWER = 0.5  # of the first stroke's speed: lowest speed of a later one
 _GRID = 64  # frequencies at which the model's gain is computed
 
 
-class RippleWatch:
+class RippleWatch(StatefulBase):
     """Orders of a ripple that the settings name, or that the previous strokes show (`OrderSpectrum`).
 
     Five strokes whose order does not meet a line are needed to find it. Delay: an order is used from the chunk on in
     which it is found. A ripple that meets a line in every stroke is not found; name it in the settings then.
     """
+
+    _stage = Stage("ripple-watch", 1)
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -73,16 +77,15 @@ class RippleWatch:
             cut = slice(int(begin[piece[0]]), int(begin[piece[-1]]) + window)
             yield residual[cut], shaft_m[cut]
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        orders = np.array([[order.cycles, order.amplitude] for order in self.orders]).reshape(-1, 2)
-        spectrum = {} if self._spectrum is None else self._spectrum.state()
-        return spectrum | {"orders": orders, "made for": self._made_for}
+    def _state(self) -> dict[str, Any]:
+        orders = [[order.cycles, order.amplitude] for order in self.orders]
+        return {"orders": orders, "made_for": self._made_for, "spectrum": self._spectrum}
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in state["orders"])
-        self._spectrum = None
-        if "_sum" in state:
-            self._make(np.array(state["made for"], dtype=np.float64)).load(state)
+    def _load(self, state: dict[str, Any]) -> None:
+        self.orders = tuple(RippleOrder(float(cycles), float(amplitude)) for cycles, amplitude in state["orders"])
+        self._spectrum, self._made_for = None, state["made_for"]
+        if state["spectrum"] is not None:
+            self._make(self._made_for).restore(state["spectrum"])
 
 
 class _Gain:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, Responses
+from livebode.core import Event, Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.motion.chunk import Chunk
 from livebode.motion.residual import Residual
@@ -30,7 +30,7 @@ class Stretch:
     unexplained: float
 
 
-class Standstill:
+class Standstill(StatefulBase):
     """Finds the stretches in which the axis does not respond as the model that was fitted to its motion.
 
     Coulomb friction is a constant torque while motor and cart do not change their direction, and does not affect a
@@ -39,6 +39,9 @@ class Standstill:
     noise): more than 3 % in amplitude is friction, if steady motion has shown a drag. A real change of the masses at
     standstill of an axis with drag has the same effect.
     """
+
+    _stage = Stage("standstill", 1)
+    _STATE = ("_noise", "_drag", "_until")
 
     def __init__(self, settings: Settings, events: list[Event]) -> None:
         self._settings = settings
@@ -109,13 +112,6 @@ class Standstill:
             "differs from the response in motion; responses are invalid until it has moved for two windows"
         )
         self._events.append(Event("held", stretch.first, time_s, message, {"unexplained": stretch.unexplained}))
-
-    def state(self) -> dict[str, NDArray[np.generic]]:
-        return {"noise": np.array([self._noise, self._drag]), "until": np.array([self._until])}
-
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        self._noise, self._drag = (float(n) for n in state["noise"])
-        self._until = int(state["until"][0])
 
 
 def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:

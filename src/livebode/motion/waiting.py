@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses
+from livebode.core import PER_LINE, PER_RESPONSE, Lines, Responses, Stage, StatefulBase
 
 _ARRAYS = PER_LINE + PER_RESPONSE
 
 
-class Waiting:
+class Waiting(StatefulBase):
     """The Tracker's responses from the newest chunk on."""
+
+    _stage = Stage("waiting-responses", 1)
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
@@ -30,12 +31,12 @@ class Waiting:
         self._parts = [Responses.join([whole[count:]])]
         return whole[:count]
 
-    def state(self) -> dict[str, NDArray[np.generic]]:
+    def _state(self) -> dict[str, Any]:
         if not self._parts:
-            return {}
+            return {"unit": None}
         whole = Responses.join(self._parts)
-        return {name: getattr(whole, name) for name in _ARRAYS} | {"unit": np.array([whole.unit])}
+        return {name: getattr(whole, name) for name in _ARRAYS} | {"unit": whole.unit}
 
-    def load(self, state: dict[str, NDArray[np.generic]]) -> None:
-        arrays: dict[str, Any] = {name: np.array(state[name]) for name in _ARRAYS if name in state}
-        self._parts = [Responses(lines=self._lines, unit=str(state["unit"][0]), **arrays)] if arrays else []
+    def _load(self, state: dict[str, Any]) -> None:
+        arrays = {name: array for name, array in state.items() if name != "unit"}
+        self._parts = [Responses(lines=self._lines, unit=state["unit"], **arrays)] if arrays else []

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, rms
+from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
 from livebode.estimation import Settings
 from livebode.preparation.follower import Follower
 
@@ -21,8 +19,11 @@ _ROUNDING = 1e-12
 PERIODS_COMPARED = 4
 
 
-class ChannelCheck:
+class ChannelCheck(StatefulBase):
     """Statistics over all blocks of a run: whether each signal varies and is finite, and the power of the reference."""
+
+    _stage = Stage("channel-check", 1)
+    _STATE = ("_unvaried", "_moments")
 
     def __init__(self, names: tuple[str, ...], reference: str) -> None:
         self._unvaried = dict.fromkeys(names, np.nan)
@@ -56,14 +57,6 @@ class ChannelCheck:
                 self._unvaried[signal.name] = 0.0
                 if np.any(level > 0):
                     del self._unvaried[signal.name]
-
-    def state(self) -> dict[str, Any]:
-        """State as plain data."""
-        return {"unvaried": self._unvaried, "moments": self._moments.tolist()}
-
-    def load(self, state: dict[str, Any]) -> None:
-        self._unvaried = dict(state["unvaried"])
-        self._moments = np.array(state["moments"])
 
     @property
     def variance(self) -> float:

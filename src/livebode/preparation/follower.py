@@ -7,11 +7,11 @@ from typing import Any, Protocol
 from numpy import float64
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Responses, ignore
+from livebode.core import Block, Emit, Responses, Stateful, ignore
 from livebode.estimation import Settings
 
 
-class Follower(Protocol):
+class Follower(Stateful, Protocol):
     """Turns the samples of a run into responses: a Tracker, or a MotionCorrection, which delays some of them.
 
     For a drive that sends spectra it is a SpectraTracker.
@@ -31,7 +31,3 @@ class Follower(Protocol):
     def excitation_power(self) -> NDArray[float64]: ...
 
     def repeatability(self) -> NDArray[float64]: ...
-
-    def snapshot(self) -> bytes: ...
-
-    def restore(self, snapshot: bytes) -> None: ...

@@ -43,7 +43,7 @@ def parts_of(path: Path) -> list[dict[str, Any]]:
 
 
 class Piece:
-    """A table in one file, with the entries of run.json on its parts; None without entries.
+    """A table in one file, with the entries of run.json on its parts.
 
     Raises
     ------
@@ -53,11 +53,9 @@ class Piece:
 
     def __init__(self, run: Path, name: str, parts: Any, tell: Callable[[Event], None]) -> None:
         self._run, self._name, self._tell = run, name, tell
-        self._parts: list[Part] | None = None
         try:
-            if parts is not None:
-                self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
-                self._parts[-1]
+            self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
+            self._parts[-1]
         except (TypeError, LookupError, ValueError):
             raise RecordError(
                 "unexpected-content",
@@ -67,8 +65,8 @@ class Piece:
                 key=f"files.{name}",
             ) from None
 
-    def groups(self) -> list[int] | None:
-        """The numbers of the intact row groups; None for all. Damaged ones are reported.
+    def groups(self) -> list[int]:
+        """The numbers of the intact row groups. Damaged ones are reported.
 
         Raises
         ------
@@ -76,8 +74,6 @@ class Piece:
             If the file cannot be opened.
         """
         with open_read(self._run, self._name) as file:
-            if self._parts is None:
-                return None
             whole = self._whole(file, self._parts)
         if not whole[-1]:
             self._tell_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))

@@ -32,9 +32,6 @@ SCHEMA = pa.schema(
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
 input, weight in a mean, distortion. NaN for missing values."""
 
-ADDED = SCHEMA.names[SCHEMA.get_field_index("valid") + 1 :]
-"""Columns that runs of earlier versions do not have."""
-
 RESPONSES = Table(SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
 

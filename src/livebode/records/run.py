@@ -18,7 +18,7 @@ from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, Lines, L
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
-from livebode.records.response_table import ADDED, SCHEMA
+from livebode.records.response_table import SCHEMA
 from livebode.records.segments import reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.manifest import Manifest, Segment
@@ -145,7 +145,7 @@ class Run:
         lines = self.lines
         rest: pa.Table | None = None
         for part in tables:
-            if part.schema.names not in (SCHEMA.names, [name for name in SCHEMA.names if name not in ADDED]):
+            if part.schema.names != SCHEMA.names:
                 raise RecordError(
                     "unexpected-content",
                     f"the responses in {str(self.path)!r} have unexpected columns",
@@ -258,9 +258,8 @@ class Run:
         value = np.empty(shape, dtype=np.complex128)
         value.real, value.imag = column["re"], column["im"]
         per_line = {name: column[name] for name in PER_LINE if name in column}
-        if ADDED[0] in column:
-            per_line["weight"] = np.empty(shape, dtype=np.complex128)
-            per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
+        per_line["weight"] = np.empty(shape, dtype=np.complex128)
+        per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
         per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
         named = {"quantity": self.found["quantity"], "unit": self.found["unit"]}
         return Responses(lines=lines, value=value, **per_line, **per_row, **named)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import zlib
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from livebode.core import RecordError
 from livebode.records.inside import read_bytes
 from livebode.records.plain_json import to_json
+from livebode.records.versions import check_version, format_of
 
 RUN, COPY = "run.json", "run-copy.json"
 _SIZE_BYTES_MAX = 64 << 20
@@ -23,21 +23,23 @@ def to_document(summary: dict[str, Any]) -> bytes:
 
     >>> print(to_document({"found": {}}).decode(), end="")
     {
+      "format": "livebode run",
+      "version": 1,
       "found": {},
-      "crc32": "a68c2252"
+      "crc32": "d477367d"
     }
     """
-    text = to_json(summary, indent=2)
+    text = to_json(format_of("run") | summary, indent=2)
     return f'{text[:-2]},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()
 
 
-def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
-    """The summary without its checksum; ValueError if it is not as it was written.
+def from_document(data: bytes) -> dict[str, Any]:
+    """The summary with its format, without its checksum; ValueError if it is not as it was written.
 
-    Without `checked`, a summary without a checksum is accepted. Null values are treated as missing.
+    Null values are treated as missing.
 
     >>> from_document(to_document({"found": {"rate_hz": 1000}}))
-    {'found': {'rate_hz': 1000}}
+    {'format': 'livebode run', 'version': 1, 'found': {'rate_hz': 1000}}
     >>> from_document(to_document({"found": {"rate_hz": 1000}}).replace(b"1000", b"1001"))
     Traceback (most recent call last):
     ValueError: its checksum is wrong
@@ -45,12 +47,11 @@ def from_document(data: bytes, *, checked: bool = True) -> dict[str, Any]:
     try:
         text = data.decode("utf-8")
         end = _CHECKSUM.search(text)
-        if end is None and checked:
+        if end is None:
             raise ValueError("it has no checksum")
-        if end is not None:
-            text = text[: end.start()] + "\n}"
-            if f"{zlib.crc32(text.encode()):08x}" != end[1]:
-                raise ValueError("its checksum is wrong")
+        text = text[: end.start()] + "\n}"
+        if f"{zlib.crc32(text.encode()):08x}" != end[1]:
+            raise ValueError("its checksum is wrong")
         found = json.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
@@ -65,11 +66,10 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     Raises
     ------
     RecordError
-        If neither can be read, or this is not the directory of a run.
+        If neither can be read, this is not the directory of a run, or a newer livebode wrote it.
     """
     try:
-        # An earlier livebode wrote neither a checksum nor a copy.
-        return _read(run, RUN, checked=os.path.lexists(run / COPY)), ""
+        return _read(run, RUN), ""
     except (FileNotFoundError, NotADirectoryError):
         raise RecordError(
             "not-a-run",
@@ -85,17 +85,26 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
             "unreadable", f"{path!r} cannot be read: {error}", "check its permissions", path=path, reason=str(error)
         )
     try:
-        return _read(run, COPY, checked=True), f"{first.message}; its copy {COPY} is read instead"
+        return _read(run, COPY), f"{first.message}; its copy {COPY} is read instead"
     except (OSError, RecordError):
         raise first from None
 
 
-def _read(run: Path, name: str, *, checked: bool) -> dict[str, Any]:
+def _read(run: Path, name: str) -> dict[str, Any]:
     data = read_bytes(run, name, _SIZE_BYTES_MAX)
     try:
-        return from_document(data, checked=checked)
+        found = from_document(data)
     except ValueError as error:
         path = str(run / name)
         raise RecordError(
             "damaged", f"{path!r} is damaged: {error}", "restore it from a backup", path=path, reason=str(error)
         ) from None
+    if found.pop("format", None) != format_of("run")["format"]:
+        raise RecordError(
+            "not-a-run",
+            f"{str(run / name)!r} does not describe a run of livebode",
+            "give the directory of a run",
+            path=str(run),
+        )
+    check_version(run / name, "run", found.pop("version", None))
+    return found

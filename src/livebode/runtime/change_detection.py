@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from livebode.configuration.axis import Axis, MonitoringSection
 from livebode.core import Block, Event, Parameters, RecordError, Responses
+from livebode.core.state import Stage, decode, encode
 from livebode.estimation import Settings
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no 
 _NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples, but the drive sends spectra."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
 _ALARMS_MAX = 100  # sentences in run.json; events.jsonl has all
+
+_STAGE = Stage("change-detection", 1)
 
 
 class ChangeDetection:
@@ -53,25 +55,21 @@ class ChangeDetection:
 
     def snapshot(self) -> bytes:
         """Its messages, and the state that the next event depends on; see `restore`."""
-        alarms = json.dumps(self._alarms).encode()
-        return (
-            len(alarms).to_bytes(4, "little")
-            + alarms
-            + (self._monitor.snapshot() if self._monitor is not None else b"")
-        )
+        monitor = {} if self._monitor is None else {"monitor": self._monitor}
+        return encode(_STAGE, {"alarms": self._alarms} | monitor)
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot with the same baseline; RecordError if it belongs to another one."""
-        rest = 4 + int.from_bytes(snapshot[:4], "little")
-        if (self._monitor is None) != (len(snapshot) == rest):
+        state = decode(_STAGE, snapshot)
+        if (self._monitor is None) != ("monitor" not in state):
             raise RecordError(
                 "baseline-differs",
                 "the run was started with another baseline or none",
                 "continue with that one, or choose another directory",
             )
         if self._monitor is not None:
-            self._monitor.restore(snapshot[rest:])
-        self._alarms = json.loads(snapshot[4:rest])
+            self._monitor.restore(state["monitor"])
+        self._alarms = state["alarms"]
 
     def _listed(self, events: list[Event]) -> list[Event]:
         self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_ALARMS_MAX]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from livebode.core import Block, RecordError
+from livebode.core.state import Stage, decode, encode
 from livebode.sources.live import LiveBlock, Position
 from livebode.sources.live.computer_clock import ClockReading
 
 SOURCE = "source"
 """Name of a live source's position in the state of a run."""
+
+_STAGE = Stage("stream-position", 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,8 @@ class StreamPosition:
         """Where the record to be continued ended; None for a new one, or one without samples."""
         if not self._state:
             return None
-        said = json.loads(self._state)
-        return Position(**said | {"arrived": ClockReading(**said["arrived"])})
+        place = decode(_STAGE, self._state)["left_at"]
+        return None if place is None else Position(**place | {"arrived": ClockReading(**place["arrived"])})
 
     def take(self, block: Block) -> None:
         """The next sample is the one after this block."""
@@ -60,15 +62,16 @@ class StreamPosition:
         """State as bytes; see `restore`."""
         block = self._newest
         if block is None or block.origin is None:
-            return self._state
+            return self._state or encode(_STAGE, {"left_at": None})
         origin = block.origin
         arrived = ClockReading.at(block.arrived_s)
         place = Position(block.stop, origin.epoch, block.stop + origin.offset, block.rate_hz, arrived, origin.mark)
-        return json.dumps(asdict(place)).encode()
+        return encode(_STAGE, {"left_at": asdict(place)})
 
     def restore(self, snapshot: bytes) -> None:
         """Check that the source continues where the record ends."""
-        if snapshot != self._state:
+        decode(_STAGE, snapshot)
+        if snapshot != (self._state or encode(_STAGE, {"left_at": None})):
             raise RecordError(
                 "changed-meanwhile", "the record changed while its source was opened", "run the same command again"
             )

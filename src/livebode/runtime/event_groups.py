@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from copy import deepcopy
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from livebode.core import Event
+from livebode.core.state import Stage, decode, encode
 
 QUIET_S = 60.0
 """A cause without events for this time has ended; its next event begins another group."""
@@ -38,6 +39,8 @@ CAUSES = {
 """The cause of each kind of event that may repeat. All other kinds are reported one by one."""
 _STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", "layout-changed", "unit-changed"}
 """Changes of state; they are reported soon, because the record shows the previous state until then."""
+
+_STAGE = Stage("event-groups", 1)
 
 
 @dataclass
@@ -180,17 +183,17 @@ class EventGroups:
         self._groups.clear()
         return found
 
-    def state(self) -> dict[str, Any]:
-        """State as plain data; see `load`."""
-        return {cause: asdict(group) for cause, group in self._groups.items()}
+    def snapshot(self) -> bytes:
+        """State as bytes; see `restore`."""
+        return encode(_STAGE, {"groups": {cause: asdict(group) for cause, group in self._groups.items()}})
 
-    def load(self, state: dict[str, Any]) -> None:
-        """Continue from a state."""
-        self._groups = {cause: _restored(group) for cause, group in state.items()}
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot; StateError, and nothing has changed, if that cannot be restored."""
+        groups = decode(_STAGE, snapshot)["groups"]
+        self._groups = {cause: _restored(group) for cause, group in groups.items()}
 
 
 def _restored(state: dict[str, Any]) -> _Group:
-    known = {one.name: state[one.name] for one in fields(_Group) if one.name in state}
     events = {"waiting": [Event(**event) for event in state["waiting"]]}
-    newest = state.get("newest")
-    return _Group(**known | events | {"newest": None if newest is None else Event(**newest)})
+    newest = None if state["newest"] is None else Event(**state["newest"])
+    return _Group(**state | events | {"newest": newest})

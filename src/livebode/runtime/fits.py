@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,12 @@ from livebode.analysis.fits import plain_fit
 from livebode.configuration.axis import FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.core import Event, Loop, Parameters, Responses
+from livebode.core.state import Stage, decode, encode
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 from livebode.margins import OpenLoop, against_lines, margins
 
-_ROWS = ("value", "covariance", "status", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
+_STAGE = Stage("fits", 1)
+_NUMBERS = ("value", "covariance", "epsilon", "chi2", "dof", "sample", "time_s", "schedule")
 _REMEMBERED = 256  # ε of the newest fits, for their median
 _UNUSUAL = 3.0
 _EPSILON_MIN = 0.003  # of |G|: an ε that no fit is rejected for
@@ -60,23 +61,28 @@ class Fits:
     def snapshot(self) -> bytes:
         """State that the next fit depends on, as bytes; see `restore`."""
         if self._fitter is None:
-            return b""
-        newest = None if self._newest is None else {name: getattr(self._newest, name).tolist() for name in _ROWS}
-        state = {"unit": self._unit, "counts": self._counts, "newest": newest, "epsilons": self._epsilons}
-        return json.dumps(state).encode() + b"\n" + self._fitter.snapshot()
+            return encode(_STAGE, {"unit": None})
+        own = {"unit": self._unit, "counts": self._counts, "epsilons": self._epsilons, "fitter": self._fitter}
+        if self._newest is None:
+            return encode(_STAGE, own | {"status": None})
+        numbers = {name: getattr(self._newest, name) for name in _NUMBERS}
+        return encode(_STAGE, own | {"status": self._newest.status.tolist()} | numbers)
 
     def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot."""
-        if not snapshot:
+        """Continue from a snapshot; StateError, and nothing has changed, if that cannot be restored."""
+        state = decode(_STAGE, snapshot)
+        if state["unit"] is None:
+            self._fitter = self._newest = self._newest_response = None
+            self._counts, self._epsilons = {}, []
             return
-        head, _, own = snapshot.partition(b"\n")
-        state = json.loads(head)
-        fitter = self._begin(state["unit"])
-        fitter.restore(own)
+        fitter = fitter_of(self.section, state["unit"])
+        fitter.restore(state["fitter"])
+        newest = None
+        if state["status"] is not None:
+            rows = {name: state[name] for name in _NUMBERS} | {"status": np.array(state["status"])}
+            newest = Parameters(fitter.model.name, fitter.names, fitter.model.units, **rows)
+        self._fitter, self._unit, self._newest, self._newest_response = fitter, state["unit"], newest, None
         self._counts, self._epsilons = state["counts"], state["epsilons"]
-        if state["newest"] is not None:
-            rows = {name: np.array(values) for name, values in state["newest"].items()}
-            self._newest = Parameters(fitter.model.name, fitter.names, fitter.model.units, **rows)
 
     def _begin(self, unit: str) -> Fitter:
         self._unit = unit

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from livebode.configuration.axis import Axis
-from livebode.core import LivebodeError, SignalError, nearest_name
+from livebode.core import LivebodeError, SignalError, Stateful, nearest_name
 from livebode.preparation.follower import Follower
 from livebode.preparation.plan import live_follower
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits
-from livebode.runtime.stateful import Stateful
 from livebode.sources.live import LiveSource
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 
 import numpy as np
 
 from livebode.core import Responses
+from livebode.core.state import Stage, decode, encode, restore_parts
 from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.continuing import PreviousRun
 from livebode.runtime.event_groups import EventGroups
+
+_STAGE = Stage("run-counts", 1)
 
 
 class RunCounts:
@@ -74,18 +76,16 @@ class RunCounts:
     def snapshot(self) -> bytes:
         """State as bytes; see `restore`."""
         numbers = {name: getattr(self, name) for name in self._STATE}
-        parts = {"before": self._before, "judged": self.judged, "left_out_samples": self.left_out_samples}
-        parts |= {"check": self.check.state(), "groups": self.groups.state()}
-        return json.dumps(numbers | {"run_s": self.run_s} | parts).encode()
+        own = {"before": self._before, "judged": self.judged, "left_out_samples": self.left_out_samples}
+        parts = {"check": self.check.snapshot(), "groups": self.groups.snapshot()}
+        return encode(_STAGE, numbers | {"run_s": self.run_s} | own | parts)
 
     def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot."""
-        state = json.loads(snapshot)
+        """Continue from a snapshot; StateError, and nothing has changed, if that cannot be restored."""
+        state = decode(_STAGE, snapshot)
+        restore_parts({"check": self.check, "groups": self.groups}, state)
         for name in self._STATE:
             setattr(self, name, state[name])
-        self._started -= state["run_s"]
-        self.judged = state.get("judged", True)  # an older record without this entry is not judged again
-        self._before = state["before"]
-        self.check.load(state["check"])
-        self.groups.load(state.get("groups", {}))  # an older record has no groups
-        self.left_out_samples = state.get("left_out_samples")
+        self._started += self.run_s - state["run_s"]
+        self.judged, self._before = state["judged"], state["before"]
+        self.left_out_samples = state["left_out_samples"]

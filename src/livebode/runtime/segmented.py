@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from livebode.configuration.axis import RecordSection
-from livebode.core import Block, Channel, Event, RecordError, Responses
+from livebode.core import Block, Channel, Event, RecordError, Responses, Stateful
 from livebode.core.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
@@ -25,7 +25,6 @@ from livebode.records.segments.store import Store
 from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
 from livebode.runtime.documents import Document, Fitted
 from livebode.runtime.run_control import StoppedError
-from livebode.runtime.stateful import Stateful
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples"
 _INTERVAL_S = 0.5

@@ -18,6 +18,7 @@ from livebode.core.errors.server import ServerError
 from livebode.core.errors.signal import SignalError
 from livebode.core.errors.simulation import SimulationError
 from livebode.core.errors.source import SourceError
+from livebode.core.errors.state import StateError
 from livebode.core.errors.usage import UsageError
 
 __all__ = [
@@ -36,5 +37,6 @@ __all__ = [
     "SignalError",
     "SimulationError",
     "SourceError",
+    "StateError",
     "UsageError",
 ]

@@ -29,6 +29,7 @@ class BaselineError(LivebodeError):
         "covariates-correlated": "Two covariates vary together, so their influences cannot be told apart.",
         "covariates-without-machine": "Covariates need a model of the moving machine, and the runs give none.",
         "damaged": "A value in the file of the baseline is missing or cannot be used.",
+        "newer-version": "The baseline was written by a newer version of livebode.",
         "no-runs": "There is no run to learn from.",
         "not-a-baseline": "The file is not a baseline.",
         "run-averaged": "A run's responses contain those before them, so that they are not independent.",
@@ -38,5 +39,5 @@ class BaselineError(LivebodeError):
         "settings-differ": "The baseline was learned with other settings than those of the run.",
         "too-few-windows": "The runs have too few windows to learn a baseline from.",
         "unreadable": "The system cannot read the file of the baseline.",
-        "version": "The baseline was written by another version of livebode, in another format.",
+        "version": "The baseline was written by an older version of livebode, in another format.",
     }

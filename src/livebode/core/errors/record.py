@@ -31,6 +31,7 @@ class RecordError(LivebodeError):
         "finished": "The run is finished and cannot be continued.",
         "foreign-files": "The directory has files that livebode did not write, so it is neither used nor replaced.",
         "locked": "Another process records in this directory.",
+        "newer-version": "A file of the run was written by a newer version of livebode.",
         "no-parameters": "The run has no fitted parameters.",
         "no-responses": "The run has no responses.",
         "not-a-run": "The path is not the directory of a run.",

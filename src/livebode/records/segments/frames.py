@@ -7,8 +7,8 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-ROWS, COMMIT, TABLE = 2, 3, 4
-"""Kinds: an Arrow record batch of a table; a commit; a table's name and Arrow schema."""
+FORMAT, ROWS, COMMIT, TABLE = 1, 2, 3, 4
+"""Kinds: the format and its version; an Arrow record batch of a table; a commit; a table's name and Arrow schema."""
 
 _HEADER = struct.Struct("<2sBBII")
 _CHECK = struct.Struct("<I")

@@ -18,9 +18,10 @@ from livebode.core import RecordError
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.disk import sync_directory
-from livebode.records.segments.frames import COMMIT, ROWS, TABLE, Frame, frames, to_frame
+from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.segments.plain_batch import check_schema, plain_batch
 from livebode.records.table import Table
+from livebode.records.versions import check_version, format_of
 
 FOLDER, ASIDE = "open", "damaged"
 _LENGTH = struct.Struct("<I")
@@ -71,10 +72,10 @@ class Commit:
         """The commit in this frame; ValueError, TypeError or KeyError if a run cannot have written it."""
         at = _LENGTH.size + _LENGTH.unpack_from(payload)[0]
         head = json.loads(bytes(payload[_LENGTH.size : at]))
-        whole = [head["sample"], head["events_bytes"], *head.get("rows", {}).values()]
+        whole = [head["sample"], head["events_bytes"], *head["rows"].values()]
         if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
             raise ValueError("the commit is invalid")
-        waiting = head.pop("waiting", [])
+        waiting = head.pop("waiting")
         if not isinstance(waiting, list):
             raise ValueError("the events are invalid")
         states = {}
@@ -126,13 +127,14 @@ class Journal:
         Raises
         ------
         RecordError
-            If its frames are intact, but their content is not from a run.
+            If its frames are intact, but their content is not from a run, or a newer livebode wrote it.
         OSError
             If it cannot be read.
         """
-        data = _whole(run, name_of(number))
+        found = list(frames(_whole(run, name_of(number))))
+        _check_version(run / name_of(number), found)
         try:
-            return cls()._over(frames(data), after)
+            return cls()._over(iter(found), after)
         except (ValueError, KeyError, TypeError, RecursionError, struct.error, pa.ArrowException):
             raise RecordError(
                 "unexpected-content",
@@ -231,12 +233,19 @@ def _whole(run: Path, name: str) -> bytes:
         return file.read(about.st_size)
 
 
+def _check_version(path: Path, found: list[Frame]) -> None:
+    for frame in found:
+        if frame.kind == FORMAT and frame.payload is not None:
+            with contextlib.suppress(json.JSONDecodeError, UnicodeDecodeError, AttributeError, RecursionError):
+                check_version(path, "journal", json.loads(bytes(frame.payload)).get("version"))
+
+
 def _count(batches: Mapping[str, list[pa.RecordBatch]]) -> dict[str, int]:
     return {name: sum(batch.num_rows for batch in of) for name, of in batches.items()}
 
 
 def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
-    """Beginning of a journal: the names and schemas of its tables, and the commit from which it continues.
+    """Beginning of a journal: its format, names and schemas of its tables, and the commit from which it continues.
 
     It is written twice, because nothing after a damaged schema could be read.
     """
@@ -244,7 +253,8 @@ def head(tables: Mapping[str, Table], commit: Commit) -> bytes:
         to_frame(TABLE, name.encode() + b"\0", table.schema.serialize().to_pybytes(), table=number)
         for number, (name, table) in enumerate(tables.items())
     ]
-    return b"".join([*schemas, commit.to_frame()] * 2)
+    begin = to_frame(FORMAT, json.dumps(format_of("journal")).encode())
+    return b"".join([begin, *schemas, commit.to_frame()] * 2)
 
 
 def read_sealed(run: Path, number: int) -> Journal:

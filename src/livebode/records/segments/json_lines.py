@@ -25,7 +25,7 @@ def to_line(value: dict[str, Any]) -> bytes:
 
 
 def from_line(line: bytes) -> dict[str, Any]:
-    """The object without its checksum; ValueError if it is damaged. A line without a checksum is accepted.
+    """The object without its checksum; ValueError if it is damaged or has no checksum.
 
     >>> from_line(b'{"kind": "gap", "crc32": "edb2896b"}')
     {'kind': 'gap'}
@@ -33,13 +33,10 @@ def from_line(line: bytes) -> dict[str, Any]:
     Traceback (most recent call last):
     ValueError: the checksum of '{"kind": "gab"}' is wrong
     """
-    text, key, rest = line.decode("utf-8").rstrip("\n").rpartition(_KEY)
-    if not key:
-        text = rest
-    else:
-        text += "}"
-        if rest != f'{_checksum(text)}"}}':
-            raise ValueError(f"the checksum of {text[:80]!r} is wrong")
+    text, _, rest = line.decode("utf-8").rstrip("\n").rpartition(_KEY)
+    text += "}"
+    if rest != f'{_checksum(text)}"}}':
+        raise ValueError(f"the checksum of {text[:80]!r} is wrong")
     try:
         value = json.loads(text)
     except RecursionError:

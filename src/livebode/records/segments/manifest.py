@@ -16,6 +16,7 @@ from livebode.records.segments import journal
 from livebode.records.segments.damage import Damage, event_of
 from livebode.records.segments.journal import Journal
 from livebode.records.segments.json_lines import in_line, to_line
+from livebode.records.versions import check_version, format_of
 
 NAME = "manifest.jsonl"
 TABLES = ("responses", "parameters", "samples")
@@ -99,10 +100,11 @@ class Manifest:
     torn: bytes = b""
     broken: list[int] = field(default_factory=list)
     _removed: set[str] = field(default_factory=set)
+    _version: int = 1
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
-        """All intact lines; OSError if there is no file."""
+        """All intact lines; OSError if there is no file, RecordError if a newer livebode wrote it."""
         data = read_bytes(run, NAME)
         length = data.rfind(b"\n") + 1
         found, before = cls(length=length, torn=data[length:]), b""
@@ -110,6 +112,7 @@ class Manifest:
             if line != before:  # each is written twice
                 found._take(line, number)
             before = line
+        check_version(run / NAME, "manifest", found._version)
         found.gone = [segment for segment in found.segments if segment.name in found._removed]
         found.segments = [segment for segment in found.segments if segment.name not in found._removed]
         return found
@@ -125,6 +128,9 @@ class Manifest:
                     self.broken.append(number)
 
     def _add(self, value: Mapping[str, Any]) -> None:
+        if "format" in value:
+            self._version = int(value["version"])
+            return
         if "removed" in value:
             self._removed |= set(value["removed"])
             return
@@ -162,6 +168,11 @@ class Manifest:
 def name_of(table: str, number: int) -> str:
     """Path of the file of a table's rows from a journal, in the run's directory."""
     return f"{table}/{number:06d}.parquet"
+
+
+def first_line() -> bytes:
+    """Line: the format of the file; written twice."""
+    return to_line(format_of("manifest")) * 2
 
 
 def closing_line(number: int, segments: Iterable[Segment], retained: Retained | None) -> bytes:

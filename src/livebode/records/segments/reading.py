@@ -139,6 +139,8 @@ def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Jour
     except FileNotFoundError:  # it was closed in the meantime
         return Journal()
     except RecordError as error:
+        if error.code == "record.newer-version":
+            raise
         tell(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
         return Journal()
 

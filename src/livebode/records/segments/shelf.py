@@ -49,6 +49,10 @@ class Shelf:
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
 
+    def begin(self) -> None:
+        """Begin the manifest of a new run."""
+        self._file.append_synced(manifest.first_line())
+
     @property
     def used_bytes(self) -> int:
         """The recorded segments and retained damaged journals of the manifest."""

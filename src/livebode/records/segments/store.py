@@ -95,6 +95,7 @@ class Store:
         with _refusing(self.path, "cannot be recorded in"):
             os.mkdir(self.path / journal.FOLDER)
             self._open_files(Manifest(), [], 0)
+            self._shelf.begin()
             self._open_journal(1, commit)
             self._files.callback(self._close_open_journal)
             self._write_summary(summary, finished=False)

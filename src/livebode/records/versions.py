@@ -1,0 +1,34 @@
+"""Versions of the formats of a record, and what is refused because a newer livebode wrote it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from livebode.core import RecordError
+
+VERSIONS = {"run": 1, "manifest": 1, "journal": 1}
+"""Newest readable version of the layout of a run directory, of manifest.jsonl and of a journal."""
+
+
+def format_of(name: str) -> dict[str, Any]:
+    """What a file of this format begins with.
+
+    >>> format_of("run")
+    {'format': 'livebode run', 'version': 1}
+    """
+    return {"format": f"livebode {name}", "version": VERSIONS[name]}
+
+
+def check_version(path: Path, name: str, found: Any) -> None:
+    """RecordError if this file is of a newer version than this livebode reads."""
+    if type(found) is int and found > VERSIONS[name]:
+        raise RecordError(
+            "newer-version",
+            f"{str(path)!r} has version {found} of its format, and this livebode reads up to version {VERSIONS[name]}",
+            "update livebode",
+            path=str(path),
+            format=name,
+            found=found,
+            readable=VERSIONS[name],
+        )

@@ -1,0 +1,110 @@
+"""Runs that were stored by every version of the formats are read with the same values by this one."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.core import Block, Lines, RecordError
+from livebode.estimation import Tracker
+from livebode.monitoring import Baseline, Monitor
+from livebode.records import Run
+from livebode.records.segments.frames import FORMAT, to_frame
+from livebode.records.segments.json_lines import to_line
+from livebode.records.segments.last_commit import last_commit
+from livebode.records.segments.recovery import recover
+from livebode.records.summary_file import COPY, RUN, read_summary, to_document
+from livebode.records.versions import format_of
+from tests.support import stored
+from tests.support.errors import refused
+from tests.support.recorded import NAMES
+from tests.support.stateful_cases import MONITORED
+
+STORED = sorted((Path(__file__).parent / "stored").glob("[0-9]*"))
+
+
+@pytest.fixture(params=STORED, ids=lambda path: path.name)
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A copy of one of them."""
+    return Path(shutil.copytree(request.param, tmp_path / "stored"))
+
+
+def test_an_unfinished_run_is_read_exactly(folder: Path) -> None:
+    run = Run.open(folder / "segments")
+    responses = run.responses()
+    assert (run.finished, run.lines) == (False, Lines((2, 5), 20, 400.0, run.lines.quiet))
+    assert (len(responses), responses.sample[-1], responses.unit) == (32, 639, "")
+    expected = json.loads((folder / "expected.json").read_text())
+    assert stored.content(responses) == expected["responses"]
+    tables = run.tables("samples")
+    samples = np.concatenate([np.array([table[name] for name in NAMES]) for table in tables], axis=1)
+    assert stored.digest(samples) == expected["samples"]
+    assert [(event.kind, event.sample) for event in run.events()] == [("non-finite", 300)]
+    assert [(segment.table, segment.rows) for segment in run.segments] == [("samples", 450), ("responses", 44)]
+    assert run.damages == []
+
+
+def test_its_state_continues_with_the_responses_of_a_run_without_end() -> None:
+    commit = last_commit(STORED[-1] / "segments")
+    assert commit is not None
+    assert (commit.sample, commit.events_bytes, commit.waiting) == (650, 263, ())
+    tracker = Tracker(stored.SETTINGS)
+    tracker.restore(commit.states["tracker"])
+    rest = tracker.process(Block(stored.data()[:, 650:], NAMES, stored.RATE_HZ, start=650))
+    whole = Tracker(stored.SETTINGS).process(Block(stored.data(), NAMES, stored.RATE_HZ))
+    for name in stored.ARRAYS:
+        np.testing.assert_allclose(getattr(rest, name), getattr(whole[whole.sample >= 650], name), rtol=1e-12)
+
+
+def test_a_finished_run_is_read_exactly(folder: Path) -> None:
+    run = Run.open(folder / "piece")
+    responses = run.responses()
+    assert (run.finished, len(responses), int(responses.valid.sum())) == (True, 30, 58)
+    assert responses.time_s[-1] == 1.47375
+    last = [-0.03821601125010516 - 0.09665834465355533j, -0.035937500000000004 - 0.03125j]
+    assert responses.value[-1].tolist() == last
+    rows = [row for table in run.tables("parameters") for row in table.to_pylist()]
+    assert len(rows) == 90
+    assert (rows[-3]["name"], rows[-3]["value"], rows[-3]["status"]) == ("J", 0.03837103485160787, "ok")
+    assert [event.kind for event in run.events()].count("fit-failed") == 3
+    assert (run.summary["counts"]["samples"], run.summary["configuration"]["lines"]["window"]) == (600, 20)
+    assert run.damages == []
+
+
+def test_a_baseline_is_read_exactly(folder: Path) -> None:
+    found = Baseline.load(folder / "baseline.json")
+    assert found.machine is not None
+    assert found.machine.model.inertia_kg_m2 == 0.0028
+    assert found.tables[0].names[0] == "20 Hz"
+    assert Monitor(found, MONITORED).summary()["judged_by"] == "model"
+
+
+@pytest.mark.parametrize("name", ["run", "manifest", "journal"])
+def test_a_run_of_a_newer_livebode_is_refused_in_one_sentence(name: str, tmp_path: Path) -> None:
+    run = Path(shutil.copytree(STORED[-1] / "segments", tmp_path / "run"))
+    newer(run, name)
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    with refused(RecordError, "newer-version", format=name, found=2, readable=1):
+        Run.open(run).responses()
+    with refused(RecordError, "newer-version", format=name):
+        recover(run)
+    assert before == {path: path.read_bytes() for path in before}
+
+
+def newer(run: Path, name: str) -> None:
+    """Give this part of the record the next version."""
+    newest = format_of(name) | {"version": 2}
+    if name == "run":
+        for file in (RUN, COPY):
+            (run / file).write_bytes(to_document(read_summary(run)[0] | newest))
+    elif name == "manifest":
+        file = run / "manifest.jsonl"
+        file.write_bytes(file.read_bytes().replace(to_line(format_of(name)), to_line(newest)))
+    else:
+        file = run / "open/000002.journal"
+        old, new = (to_frame(FORMAT, json.dumps(text).encode()) for text in (format_of(name), newest))
+        file.write_bytes(file.read_bytes().replace(old, new))

@@ -1,0 +1,239 @@
+"""Each class with a state as a run uses it: a small instance, and input that changes its state."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from livebode.configuration.axis import FitSection
+from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, SpectraLayout
+from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
+from livebode.excitation import multisine
+from livebode.fitting import Fitter, Grid, TwoMass
+from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
+from livebode.motion import MotionCorrection
+from livebode.preparation.checks import ChannelCheck
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.continuing import StreamPosition
+from livebode.runtime.fits import Fits
+from livebode.runtime.run_counts import RunCounts
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, TensionLoss
+from livebode.sources.live import LiveBlock
+from livebode.sources.live.kernel_drive import KernelDrive
+from livebode.sources.live.position import Origin
+from studies.monitoring_axis import LINES as AXIS_LINES
+from tests.fitting.test_fits_truth import LINES as FITTED
+from tests.fitting.test_fits_truth import TRUTH, noisy
+from tests.support.monitored import ideal, recorded
+from tests.support.stateful import Case
+
+BELT = TwoMass(radius_m=0.019)
+RATE_HZ, WINDOW = 1000.0, 50
+LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=WINDOW)
+RIPPLE = (RippleOrder(40.0, 0.1),)
+SETTINGS = Settings(
+    lines=LINES, excitation="w", input="u", output="y", schedule="x", hop=10, spikes=("y",), ripple=RIPPLE,
+    differenced=("y",),
+)  # fmt: skip
+MOVING = Settings(
+    lines=Lines.parse("20:140:20", rate_hz=4000.0, window=200), output="velocity", input="u", excitation="w",
+    schedule="x", hop=20,
+)  # fmt: skip
+MONITORED = Settings(lines=AXIS_LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet")
+LAYOUT = SpectraLayout(
+    (Channel("y"), Channel("u"), Channel("w")), (Channel("x"),), WINDOW, 10, LINES.bins, quiet=LINES.quiet
+)
+
+
+@cache
+def block() -> Block:
+    """Thirty periods with noise, a spike, a value that is not finite, and a position that moves."""
+    rng = np.random.default_rng(5)
+    w = np.tile(multisine(LINES), 30)
+    u, x = w + 0.01 * rng.standard_normal(w.size), np.linspace(0.0, 1.0, w.size)
+    y = 2 * np.roll(u, 1) + 0.01 * rng.standard_normal(w.size)
+    y[900] += 100.0
+    y[400] = np.nan
+    return Block(np.array([y, u, w, x]), ("y", "u", "w", "x"), RATE_HZ)
+
+
+def processed(parts: Sequence[Block | Responses]) -> list[Callable[[Any], object]]:
+    def step(part: Block | Responses) -> Callable[[Any], object]:
+        def run(stage: Any) -> object:
+            events: list[Event] = []
+            return stage.process(part, events.append), events
+
+        return run
+
+    return [step(part) for part in parts]
+
+
+def cut(whole: Block, *edges: int) -> list[Block]:
+    return [whole.cut(a, b) for a, b in zip((0, *edges), (*edges, len(whole)))]
+
+
+def tracker() -> Case:
+    def other() -> Tracker:
+        return Tracker(Settings(lines=LINES, excitation="w", input="u", output="y", hop=5))
+
+    def configured() -> Tracker:
+        return Tracker(SETTINGS)
+
+    return Case(configured, processed(cut(block(), 333, 777, 1100)), [other])
+
+
+def spectra() -> Iterator[Spectra]:
+    made = KernelDrive(LAYOUT, "float64").spectra(iter(cut(block(), 500, 1000)))
+    for batch in made:
+        yield batch.block(batch.first_sample, batch.first_sample, gap=False)
+
+
+def spectra_tracker() -> Case:
+    settings = Settings(lines=LINES, excitation="w", input="u", output="y", schedule="x", hop=10, ripple=RIPPLE)
+    other = Settings(lines=LINES, excitation="w", input="u", output="y", schedule="x", hop=10)
+    return Case(
+        lambda: SpectraTracker(settings, LAYOUT),
+        processed(list(spectra())),
+        [lambda: SpectraTracker(other, LAYOUT)],
+    )
+
+
+@cache
+def strokes() -> Block:
+    axis = BeltAxis(
+        motion=Strokes(start_m=0.4, end_m=1.2, speed_m_per_s=1.0),
+        excitation_n_m=multisine(MOVING.lines),
+        sensor=Sensor(noise_rad_per_s=0.1),
+        seconds=1.6,
+    )
+    return SimulatedAxis(axis).run()[0]
+
+
+def motion_correction() -> Case:
+    def new(**options: Any) -> MotionCorrection:
+        return MotionCorrection(MOVING, **{"radius_m": 0.019, "chunk_samples": 2400} | options)
+
+    return Case(new, processed(cut(strokes(), 2700, 5000)), [lambda: new(radius_m=0.02)])
+
+
+@cache
+def responses() -> Responses:
+    """Fifty of a belt axis with a wandering stiffness, four of them of nothing."""
+    values = np.repeat(TRUTH[np.newaxis], 50, axis=0)
+    values[:, 2] *= np.linspace(1.0, 1.2, 50)
+    found = noisy(BELT.at(values, Grid.of(FITTED)), FITTED, 0.01, 50)
+    value = found.value.copy()
+    value[30:34] = np.nan
+    return replace(found, value=value, valid=np.isfinite(value), unit="rad/s/(N m)")
+
+
+def rows() -> list[Responses]:
+    return [responses()[a:b] for a, b in ((0, 7), (7, 33), (33, 37), (37, 50))]
+
+
+def fitter() -> Case:
+    return Case(lambda: Fitter(BELT), processed(rows()), [lambda: Fitter(BELT, free=["delay"])])
+
+
+def baseline(by_model: bool) -> Baseline:
+    """Of an ideal machine, with a table from responses that scatter."""
+    lines, rng = MONITORED.lines, np.random.default_rng(9)
+    value = 1.0 + 0.01 * (rng.standard_normal((400, len(lines))) + 1j * rng.standard_normal((400, len(lines))))
+    found = Responses.join([plain_responses(value)])
+    at = places(lines.window, MONITORED.step)
+    parts = [Apart(lines.window, place).of_responses(found) for place in at]
+    table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], parts, len(at))
+    return Baseline(
+        lines, MONITORED.step, signals_of(MONITORED), "joint", "plant", (table,), ideal() if by_model else None
+    )
+
+
+def plain_responses(value: np.ndarray) -> Responses:
+    """A response a window."""
+    lines, count = MONITORED.lines, len(value)
+    newest = lines.window * np.arange(1, count + 1) - 1
+    return Responses(
+        lines=lines, value=value, sigma=np.full(value.shape, 0.01), dof=np.full(count, np.inf),
+        coherence=np.ones(value.shape), valid=np.ones(value.shape, dtype=bool), first=newest + 1 - lines.window,
+        sample=newest, time_s=newest / lines.rate_hz, schedule=np.full(count, np.nan),
+    )  # fmt: skip
+
+
+def monitor_by_model() -> Case:
+    learned = baseline(by_model=True)
+    whole = recorded((0.3, 0.3), TensionLoss(start_s=2.0, loss=0.05), seed=41)
+    steps = [lambda stage, part=part: stage.process_samples(part) for part in cut(whole, 4001, 9000, 14000)]
+    return Case(
+        lambda: Monitor(learned, MONITORED),
+        [*steps, lambda stage: stage.finish()],
+        [lambda: Monitor(learned, MONITORED, 9 * 86400.0)],
+    )
+
+
+def changing() -> list[Responses]:
+    """Responses that change at the fortieth."""
+    rng = np.random.default_rng(10)
+    value = (
+        1.0 + 0.01 * rng.standard_normal((90, len(MONITORED.lines))) + np.where(np.arange(90) > 40, 0.1, 0.0)[:, None]
+    )
+    found = plain_responses(value.astype(np.complex128))
+    return [found[a:b] for a, b in ((0, 30), (30, 44), (44, 90))]
+
+
+def monitor_by_tables() -> Case:
+    learned = baseline(by_model=False)
+    steps = [lambda stage, part=part: stage.process_responses(part) for part in changing()]
+    return Case(lambda: Monitor(learned, MONITORED), steps, [lambda: Monitor(baseline(True), MONITORED)])
+
+
+def change_detection() -> Case:
+    learned = baseline(by_model=False)
+    steps = [lambda stage, part=part: stage.take_responses(part, None) for part in changing()]
+    return Case(lambda: ChangeDetection(Monitor(learned, MONITORED), "baseline.json"), steps)
+
+
+def fits() -> Case:
+    section = FitSection(model="two-mass", output="velocity", radius_m=0.019)
+    return Case(lambda: Fits(section), [lambda stage, part=part: stage.process(part) for part in rows()])
+
+
+def run_counts() -> Case:
+    def step(part: Block, kind: str) -> Callable[[RunCounts], object]:
+        def run(stage: RunCounts) -> object:
+            stage.check.take(part)
+            stage.take(responses(), 0.25)
+            stage.stop, stage.left_out_samples = part.stop, part.start
+            event = Event(kind, part.stop, part.stop / RATE_HZ, f"{kind} at {part.stop}", {"count": 1})
+            return [stage.groups.take(event) for _ in range(30)], stage.counts({"samples": part.stop})
+
+        return run
+
+    steps = [step(part, kind) for part, kind in zip(cut(block(), 500, 1000), ("gap", "spike", "gap"))]
+    return Case(
+        lambda: RunCounts(ChannelCheck(("w", "u", "y"), "w"), time.perf_counter()), steps, volatile=frozenset({"run_s"})
+    )
+
+
+def stream_position() -> Case:
+    """It continues only where its own record ends, so a restored one is made from the snapshot."""
+    origin = Origin(epoch=3, offset=100, mark={"name": "a.csv", "offset": 17})
+    blocks = [
+        LiveBlock(np.ones((1, 5)), (Channel("y"),), RATE_HZ, start=5 * n, arrived_s=10.0, origin=origin)
+        for n in range(3)
+    ]
+    steps = [lambda stage, part=part: stage.take(part) for part in blocks]
+    return Case(StreamPosition, steps, volatile=frozenset({"arrived"}), continuing=StreamPosition)
+
+
+CASES = {
+    case.__name__: case
+    for case in (
+        tracker, spectra_tracker, motion_correction, fitter, monitor_by_model, monitor_by_tables, change_detection,
+        fits, run_counts, stream_position,
+    )
+}  # fmt: skip
