@@ -23,7 +23,7 @@ nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_merge_streams = True
 nb_execution_raise_on_error = True
-nb_execution_timeout = 60
+nb_execution_timeout = 600
 
 # Docstrings: a single backtick names a public object where there is one, otherwise it is code.
 default_role = "py:obj"

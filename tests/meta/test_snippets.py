@@ -74,8 +74,10 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for name in names:
                 pq.write_table(pa.table(table), f"{name}.parquet")
         roles = "--excitation w --input u --output velocity --schedule x --lines 20:140:20 --window 400"
+        loop = "[loop.velocity]\ngain = 0.2308\nintegral_time_s = 0.2\nrate_hz = 4000\n"
         for log, run in (("log", "monday"), ("today", "tuesday")):
-            app(shlex.split(f"run {log}.parquet {roles} --out runs/{run}"), standalone_mode=False)
+            Path(f"{run}.toml").write_text(f'[source]\nlog = "{log}.parquet"\n[signals]\noutput = "velocity"\n{loop}')
+            app(shlex.split(f"run {run}.toml {roles} --out runs/{run}"), standalone_mode=False)
         app(shlex.split("learn runs/monday runs/tuesday --out healthy.json"), standalone_mode=False)
     return folder
 
