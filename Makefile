@@ -3,9 +3,11 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
+NODE    = node_modules/.package-lock.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
+C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
 .PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages lock clean
 
@@ -21,17 +23,26 @@ $(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
+# Node.js is from PyPI; the lock file has the hashes of the packages.
+$(NODE): $(VENV)/.installed package.json package-lock.json
+	PATH="$(abspath $(BIN)):$$PATH" npm ci --ignore-scripts --no-audit --no-fund --loglevel=error \
+		|| { echo "npm could not install TypeScript and Biome: see Set up in CONTRIBUTING.md"; exit 1; }
+	touch $@
+
 demo: $(BUILT)   ## track a simulated machine, live
 	$(BIN)/livebode demo
 
 test: $(BUILT) lint  ## lint, types, import contract and every test
 	$(BIN)/python -m pytest -n auto
 
-lint: $(BUILT)   ## style, types and the import contract
+lint: $(BUILT) $(NODE)  ## style, types and the import contract
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/clang-format --dry-run -Werror $(C_SOURCES)
+	PATH="$(abspath $(BIN)):$$PATH" node_modules/.bin/biome check --error-on-warnings .
+	PATH="$(abspath $(BIN)):$$PATH" node_modules/.bin/tsc
 
 $(VENV)/.bench: $(BUILT) requirements-bench.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-bench.lock
@@ -48,19 +59,19 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.dashboard
 
-peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/peers.md)
+peers: $(VENV)/.bench  ## livebode and what others would take, on the same simulated recordings (docs/explanation/peers.md)
 	$(BIN)/python -m studies.peers
 
-studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/studies.md
+studies: $(BUILT) ## the paper's experiments: figures, numbers, verdicts, docs/explanation/studies.md
 	$(BIN)/python -m studies
 
 repeating: $(BUILT) ## coverage of the bounds under friction, backlash, encoder steps, hum and noise of many kinds
 	$(BIN)/python -m studies.repeating
 
-fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/fits.md)
+fit-bounds: $(BUILT) ## coverage and width of a fit's bounds where the model lacks something (docs/explanation/fits.md)
 	$(BIN)/python -m studies.fit_bounds
 
-monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/monitoring.md
+monitoring: $(BUILT) ## a thousand healthy strokes and a thousand of each fault against the targets of docs/how-to/monitoring.md
 	$(BIN)/python -m studies.monitoring
 
 temperature: $(BUILT) ## a belt that softens with temperature: alarms and detection with and without a sensor (10 min)
@@ -71,25 +82,25 @@ healthy: $(BUILT) ## false alarms in 1,000 healthy runs with ripple, eccentricit
 	$(BIN)/python -m studies.healthy --runs $(HEALTHY_RUNS) --processes 2
 
 fuzz: $(BUILT)   ## long campaigns against the readers, the parsers of live sources, the configuration and the dashboard
-	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/fault/test_readers_faults.py
-	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_configuration_fuzz.py
-	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/fault/test_live_parsers.py tests/fault/test_live_variants.py
-	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/contract/test_structured_text_settings.py
-	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/fault/test_dashboard_hostile.py
+	LIVEBODE_FUZZ_ROUNDS=4000 $(BIN)/python -m pytest -n auto tests/sources/test_readers_fault.py
+	LIVEBODE_CONFIGURATION_FUZZ=1000000 $(BIN)/python -m pytest tests/configuration/test_axes_fault.py
+	LIVEBODE_LIVE_FUZZ=1000000 $(BIN)/python -m pytest -n auto tests/sources/test_live_parsers_fault.py tests/sources/test_live_variants_fault.py
+	LIVEBODE_PLC_EXAMPLES=100 $(BIN)/python -m pytest -n auto tests/structured_text/test_settings_property.py
+	LIVEBODE_DASHBOARD_FUZZ=1000000 $(BIN)/python -m pytest tests/dashboard/test_requests_fault.py
 
 damage: $(BUILT) ## flip 1,000 bits in the files of runs, and open 1,000 hostile ones
-	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_bit_flips.py
-	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_hostile.py
+	LIVEBODE_DAMAGE_FLIPS=1000 $(BIN)/python -m pytest -s tests/records/test_bit_flips_fault.py
+	LIVEBODE_HOSTILE_RUNS=1000 $(BIN)/python -m pytest -s tests/records/test_hostile_run_fault.py
 
 crash: $(BUILT)  ## kill processes that record at 1,000 random moments, and as often with each kind of live source
-	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/fault/test_record_killed.py
-	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/fault/test_live_killed.py  # they mostly wait
+	LIVEBODE_CRASH_KILLS=1000 $(BIN)/python -m pytest -s tests/records/test_kills_fault.py
+	LIVEBODE_CRASH_KILLS_EACH=1000 $(BIN)/python -m pytest -n 9 -rP tests/records/test_live_kills_fault.py  # they mostly wait
 
 soak: $(BUILT)   ## a simulated day of four live axes with the page open: growth of memory, length of the stop, docs/images/soak.png
 	$(BIN)/python -m studies.soak
 
 attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what the owner and the record notice
-	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/fault/test_dashboard_attacks.py
+	LIVEBODE_ATTACK_S=45 $(BIN)/python -m pytest -n 0 -q -s tests/dashboard/test_attacks_fault.py
 
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
@@ -100,6 +111,7 @@ lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv lock --upgrade
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --all-extras --group dev -o requirements-dev.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
+	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest typescript@latest
 
 clean:           ## remove what was built
-	rm -rf build $(VENV)
+	rm -rf build node_modules $(VENV)

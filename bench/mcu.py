@@ -1,6 +1,7 @@
 """The kernel on microcontrollers, counted in QEMU: instructions per sample compared with RLS, RAM and flash.
 
-`python -m bench.mcu` prints the tables of docs/microcontroller.md. Counts are exact and the same on every machine.
+`python -m bench.mcu` prints the tables of docs/how-to/microcontroller.md. Counts are exact and the same
+on every machine.
 """
 
 from __future__ import annotations

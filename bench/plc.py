@@ -1,6 +1,6 @@
 """Cost of the generated function blocks on a PLC: LREAL operations per sample, counted at run time, and memory.
 
-`python -m bench.plc` prints the tables of docs/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
+`python -m bench.plc` prints the tables of docs/how-to/plc.md. An operation is +, -, *, /, ABS, a comparison or a sign
 change of LREAL numbers.
 """
 
@@ -16,8 +16,8 @@ from livebode.excitation import schroeder_phases
 from livebode.kernel import SlidingDFT
 from livebode.kernel.twin import TwinDFT
 from livebode.structured_text import multisine, sliding_dft
-from tests.structured_text import Instance, Machine
-from tests.structured_text.types import Array, Scalar
+from tests.support.structured_text import Instance, Machine
+from tests.support.structured_text.types import Array, Scalar
 
 WINDOW, RATE_HZ = 400, 4000.0
 

@@ -1,4 +1,4 @@
-"""A drive that runs the kernel in float32 and sends spectra: what its firmware does, in Python (docs/live.md)."""
+"""A drive that runs the kernel in float32 and sends spectra: its firmware, in Python (docs/how-to/live.md)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-/* The binary frame of livebode for senders in C99 (docs/live.md has it byte by byte): samples with lb_frame, or spectra
- * of a drive that runs the kernel with lb_frame_put_spectrum and lb_frame_spectra.
+/* The binary frame of livebode for senders in C99 (docs/how-to/live.md has it byte by byte): samples with lb_frame, or
+ * spectra of a drive that runs the kernel with lb_frame_put_spectrum and lb_frame_spectra.
  *
  * Little-endian machines only. No memory is taken: the caller gives a buffer of LB_FRAME_BYTES(payload). */
 #ifndef LIVEBODE_FRAME_H
@@ -19,7 +19,8 @@ enum { LB_FRAME_SAMPLES = 1, LB_FRAME_LAYOUT = 2, LB_FRAME_SPECTRA = 3, LB_FRAME
 enum { LB_FRAME_NOT_WHOLE = 1, LB_FRAME_SPIKE = 2 };
 
 /* CRC-32 of IEEE 802.3; begin with 0. */
-static inline uint32_t lb_frame_crc(uint32_t crc, const void *bytes, size_t size) {
+static inline uint32_t lb_frame_crc(uint32_t crc, const void *bytes, size_t size)
+{
     const uint8_t *p = (const uint8_t *)bytes;
     crc = ~crc;
     while (size--) {
@@ -37,8 +38,9 @@ static inline uint32_t lb_frame_crc(uint32_t crc, const void *bytes, size_t size
  * payload: that text, or float32 [samples][channels]; stamp_ns: nanoseconds since 1970 UTC, 0 without a clock.
  * The payload may already lie at frame + LB_FRAME_HEADER. */
 static inline size_t lb_frame(uint8_t *frame, uint8_t kind, uint32_t sequence, uint64_t epoch, uint64_t sample,
-                              int64_t stamp_ns, double rate_hz, uint32_t layout, uint16_t channels,
-                              uint16_t samples, const void *payload, uint32_t payload_bytes) {
+                              int64_t stamp_ns, double rate_hz, uint32_t layout, uint16_t channels, uint16_t samples,
+                              const void *payload, uint32_t payload_bytes)
+{
     const uint32_t length = (uint32_t)LB_FRAME_BYTES(payload_bytes);
     const uint8_t head[8] = {'L', 'B', 'O', 'D', 1, kind, 0, 0};
     memcpy(frame, head, 8);
@@ -62,8 +64,8 @@ static inline size_t lb_frame(uint8_t *frame, uint8_t kind, uint32_t sequence, u
  * values[values_count]: the plain values at the window's centre. sums[signals][bins][2]: as lb_sdft32_read gives them
  * with LB_PHASE_FIXED, bins in the order of the layout (the lines, then the quiet ones). */
 static inline void lb_frame_put_spectrum(uint8_t *frame, uint16_t index, uint32_t state, const float *values,
-                                         uint16_t values_count, const float *sums, uint16_t signals,
-                                         uint16_t bins) {
+                                         uint16_t values_count, const float *sums, uint16_t signals, uint16_t bins)
+{
     uint8_t *at = frame + LB_FRAME_HEADER + LB_FRAME_SPECTRA_PAYLOAD(signals, bins, values_count, index);
     memcpy(at, &state, 4);
     if (values_count) {
@@ -74,12 +76,13 @@ static inline void lb_frame_put_spectrum(uint8_t *frame, uint16_t index, uint32_
 
 /* Completes a frame into which `count` spectra were put, each a hop after the one before; returns its length.
  *
- * layout: lb_frame_crc(0, text, length) of the text that docs/live.md describes, itself sent with lb_frame as
+ * layout: lb_frame_crc(0, text, length) of the text that docs/how-to/live.md describes, itself sent with lb_frame as
  * LB_FRAME_SPECTRA_LAYOUT of signals + values_count channels and 0 samples. sample, stamp_ns: of the newest sample in
  * the first spectrum's window; sample + 1 is a multiple of the hop. */
 static inline size_t lb_frame_spectra(uint8_t *frame, uint32_t sequence, uint64_t epoch, uint64_t sample,
                                       int64_t stamp_ns, double rate_hz, uint32_t layout, uint16_t signals,
-                                      uint16_t bins, uint16_t values_count, uint16_t count) {
+                                      uint16_t bins, uint16_t values_count, uint16_t count)
+{
     return lb_frame(frame, LB_FRAME_SPECTRA, sequence, epoch, sample, stamp_ns, rate_hz, layout,
                     (uint16_t)(signals + values_count), count, frame + LB_FRAME_HEADER,
                     LB_FRAME_SPECTRA_PAYLOAD(signals, bins, values_count, count));

@@ -1,4 +1,4 @@
-"""A machine that sends: the simulated belt axis over UDP, for a first try without a drive (docs/live.md).
+"""A machine that sends: the simulated belt axis over UDP, for a first try without a drive (docs/how-to/live.md).
 
 python -m examples.sender 127.0.0.1:5000
 python -m examples.sender 127.0.0.1:5000 --spectra 20

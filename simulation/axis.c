@@ -11,15 +11,17 @@ typedef struct {
 } lb_play;
 
 /* viscous v + (coulomb + stribeck/(1 + (v/vs)^2)) v/sqrt(v^2 + w^2); `speed` is v in m/s at the belt. */
-static double friction(double coulomb, double stribeck, double vs, double w, double speed) {
+static double friction(double coulomb, double stribeck, double vs, double w, double speed)
+{
     if (coulomb == 0.0 && stribeck == 0.0) return 0.0;
     const double ratio = speed / vs;
     return (coulomb + stribeck / (1.0 + ratio * ratio)) * (speed / sqrt(speed * speed + w * w));
 }
 
-/* Dead zone of total width gap; within a twentieth of it around each corner a quartic joins the two straights, smooth up to
- * its second derivative. */
-static lb_play play(double gap, double elongation, double rate) {
+/* Dead zone of total width gap; within a twentieth of it around each corner a quartic joins the two straights, smooth
+ * up to its second derivative. */
+static lb_play play(double gap, double elongation, double rate)
+{
     if (gap == 0.0) return (lb_play){elongation, rate};
     const double round = 0.05 * gap, beyond = fabs(elongation) - 0.5 * gap, into = beyond + round;
     if (into <= 0.0) return (lb_play){0.0, 0.0};
@@ -29,20 +31,22 @@ static lb_play play(double gap, double elongation, double rate) {
     return (lb_play){copysign(square * into * (3.0 * round - beyond) / unit, elongation), rate * slope};
 }
 
-/* Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its arm, and the
- * belt's speed there. */
+/* Belt that the motor's pulley has moved, the angle at which a pulley without eccentricity moves as much, its arm, and
+ * the belt's speed there. */
 typedef struct {
     double travel, angle, arm, speed;
 } lb_pulley;
 
-static lb_pulley pulley(const lb_axis_config *c, double phi, double omega) {
+static lb_pulley pulley(const lb_axis_config *c, double phi, double omega)
+{
     const double r = c->radius_m, e = c->eccentricity;
     if (e == 0.0) return (lb_pulley){r * phi, phi, r, r * omega};
     const double arm = r * (1.0 + e * sin(phi)), angle = phi + e * (1.0 - cos(phi));
     return (lb_pulley){r * angle, angle, arm, arm * omega};
 }
 
-static double spots(const lb_axis_config *c, double at) {
+static double spots(const lb_axis_config *c, double at)
+{
     double factor = 1.0;
     for (int i = 0; i < c->spots; ++i) {
         const double u = (at - c->spot[i].position_m) / c->spot[i].width_m;
@@ -57,7 +61,8 @@ typedef struct {
     double k, b;
 } lb_belt;
 
-static lb_belt belt(const lb_axis_config *c, const double *now, double at) {
+static lb_belt belt(const lb_axis_config *c, const double *now, double at)
+{
     const double shape = 1.0 / at + 1.0 / (2.0 * c->pulley_distance_m - at);
     const double k = c->specific_stiffness_n * now[LB_AXIS_STIFFNESS] * spots(c, at);
     const double b = c->damping_shape * now[LB_AXIS_DAMPING];
@@ -65,7 +70,8 @@ static lb_belt belt(const lb_axis_config *c, const double *now, double at) {
 }
 
 static void two_masses(const lb_axis_config *c, const double *now, lb_belt whole, double torque, const double *s,
-                       double *d) {
+                       double *d)
+{
     const lb_pulley m = pulley(c, s[0], s[1]);
     const lb_play p = play(now[LB_AXIS_GAP], m.travel - s[2], m.speed - s[3]);
     const double force = whole.k * p.slack + whole.b * p.rate;
@@ -76,7 +82,8 @@ static void two_masses(const lb_axis_config *c, const double *now, lb_belt whole
 }
 
 static void three_masses(const lb_axis_config *c, const double *now, lb_belt span, double at, double torque,
-                         const double *s, double *d) {
+                         const double *s, double *d)
+{
     const double r = c->radius_m, l3 = c->pulley_distance_m, k = span.k, b = span.b;
     const lb_pulley m = pulley(c, s[0], s[1]);
     const double s1 = 1.0 / at, s2 = 1.0 / (l3 - at), s3 = 1.0 / l3;
@@ -99,7 +106,8 @@ static void three_masses(const lb_axis_config *c, const double *now, lb_belt spa
 
 /* Time derivative with the belt as it is at the cart, or, where the spans are frozen, as `frozen` has it. */
 static inline void derivative(const lb_axis_config *c, const double *now, const lb_belt *frozen, double torque,
-                              const double *s, double *d) {
+                              const double *s, double *d)
+{
     const double omega = s[1], v = s[c->states - 1], vs = c->stribeck_speed_m_per_s, w = c->smoothing_m_per_s;
     const double share = now[LB_AXIS_FRICTION], at = c->frozen ? c->frozen_position_m : s[c->states - 2];
     const lb_belt here = c->frozen ? *frozen : belt(c, now, at);
@@ -116,14 +124,16 @@ static inline void derivative(const lb_axis_config *c, const double *now, const 
     d[c->states - 1] = (d[c->states - 1] - resisting) / now[LB_AXIS_LOAD];
 }
 
-void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d) {
+void lb_axis_derivative(const lb_axis_config *c, const double *now, double torque, const double *s, double *d)
+{
     const lb_belt frozen = c->frozen ? belt(c, now, c->frozen_position_m) : (lb_belt){0.0, 0.0};
     derivative(c, now, &frozen, torque, s, d);
 }
 
 /* One step of order 8 under constant torque, of n states. */
 static inline void step_of(int n, const lb_axis_config *c, const double *now, double torque, double seconds,
-                           double *state) {
+                           double *state)
+{
     double slope[LB_STAGES][LB_AXIS_STATES], at[LB_AXIS_STATES];
     const lb_belt frozen = c->frozen ? belt(c, now, c->frozen_position_m) : (lb_belt){0.0, 0.0};
     memcpy(at, state, sizeof at);
@@ -139,14 +149,16 @@ static inline void step_of(int n, const lb_axis_config *c, const double *now, do
 }
 
 /* With the number of states constant the compiler unrolls and vectorises the sums: a fifth faster. */
-static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state) {
+static void step(const lb_axis_config *c, const double *now, double torque, double seconds, double *state)
+{
     if (c->states == 4)
         step_of(4, c, now, torque, seconds, state);
     else
         step_of(6, c, now, torque, seconds, state);
 }
 
-static int alive(const lb_axis_config *c, const lb_axis_state *state) {
+static int alive(const lb_axis_config *c, const lb_axis_state *state)
+{
     for (int i = 0; i < c->states; ++i)
         if (!isfinite(state->plant[i])) return 0;
     const double x = state->plant[c->states - 2];
@@ -154,20 +166,21 @@ static int alive(const lb_axis_config *c, const lb_axis_state *state) {
 }
 
 /* Readings of the drive: the angle in steps of the encoder, and the velocity with the steps' differences. */
-static double read_velocity(const lb_axis_config *c, lb_axis_state *state) {
+static double read_velocity(const lb_axis_config *c, lb_axis_state *state)
+{
     const double angle = state->plant[0], q = c->encoder_step_rad;
     const double reading = q > 0.0 ? floor(angle / q + 0.5) * q : angle;
-    const double velocity =
-        c->velocity_differenced
-            ? (reading - state->reading) * c->rate_hz
-            : state->plant[1] + ((reading - angle) - (state->reading - state->angle)) * c->rate_hz;
+    const double velocity = c->velocity_differenced
+                                ? (reading - state->reading) * c->rate_hz
+                                : state->plant[1] + ((reading - angle) - (state->reading - state->angle)) * c->rate_hz;
     state->reading = reading;
     state->angle = angle;
     return velocity;
 }
 
 /* Position and velocity loop (Nevaranta 2016, Fig. 7), then the delay, the excitation and the limit. */
-static double control(const lb_axis_config *c, lb_axis_state *state, const double *now, double velocity) {
+static double control(const lb_axis_config *c, lb_axis_state *state, const double *now, double velocity)
+{
     if (state->tick % (uint64_t)c->position_ticks == 0)
         state->held = c->position_gain_per_s * (now[LB_AXIS_POSITION_REFERENCE] - state->reading) +
                       c->velocity_feedforward * now[LB_AXIS_VELOCITY_REFERENCE];
@@ -187,19 +200,20 @@ static double control(const lb_axis_config *c, lb_axis_state *state, const doubl
     return state->limited ? copysign(c->torque_n_m_max, torque) : torque;
 }
 
-void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *state) {
+void lb_axis_rest(const lb_axis_config *c, double position_m, lb_axis_state *state)
+{
     memset(state, 0, sizeof *state);
     state->plant[0] = position_m / c->radius_m;
     const lb_pulley m = pulley(c, state->plant[0], 0.0);
     if (c->states == 6) state->plant[2] = m.angle; /* no span is elongated, not even by rounding */
     state->plant[c->states - 2] = m.travel;
     state->angle = state->plant[0];
-    state->reading =
-        c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad : state->angle;
+    state->reading = c->encoder_step_rad > 0.0 ? floor(state->angle / c->encoder_step_rad + 0.5) * c->encoder_step_rad
+                                               : state->angle;
 }
 
-size_t lb_axis_advance(const lb_axis_config *c, lb_axis_state *state, size_t ticks, const double *input,
-                       double *output) {
+size_t lb_axis_advance(const lb_axis_config *c, lb_axis_state *state, size_t ticks, const double *input, double *output)
+{
     const double seconds = 1.0 / (c->rate_hz * c->substeps);
     for (size_t n = 0; n < ticks; ++n) {
         if (!alive(c, state)) return n;

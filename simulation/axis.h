@@ -7,8 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define LB_AXIS_STATES 6      /* of three masses; two have 4 */
-#define LB_AXIS_DELAY_MAX 64  /* ticks */
+#define LB_AXIS_STATES 6     /* of three masses; two have 4 */
+#define LB_AXIS_DELAY_MAX 64 /* ticks */
 #define LB_AXIS_SPOTS_MAX 16
 #define LB_AXIS_INPUTS 10
 #define LB_AXIS_SIGNALS 3
@@ -35,7 +35,7 @@ typedef struct {
     double rate_hz;
     int substeps, velocity_ticks, position_ticks, delay_ticks;
     double velocity_gain_n_m_s, integral_step, position_gain_per_s, velocity_feedforward;
-    double torque_n_m_max;  /* infinite: none */
+    double torque_n_m_max;   /* infinite: none */
     double encoder_step_rad; /* 0: exact */
     int velocity_differenced;
     double position_m_min, position_m_max;

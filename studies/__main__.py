@@ -46,7 +46,7 @@ def main(names: list[str]) -> int:
         return 2
     for name in names or known:
         run(known[name])
-    write_page(STUDIES, IMAGES, ROOT / "docs" / "studies.md")
+    write_page(STUDIES, IMAGES, ROOT / "docs" / "explanation" / "studies.md")
     return 0
 
 

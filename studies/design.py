@@ -12,8 +12,8 @@ import numpy as np
 
 from livebode.design import Waveform, belt_machine, peaks, worst
 from livebode.simulation import BeltAxis, SimulatedAxis
-from tests.experiments import extremes
-from tests.truth.test_design_predictions import MOVING, STANDING
+from tests.design.test_predictions_truth import MOVING, STANDING
+from tests.support.experiments import extremes
 
 TARGET = 0.1
 ALIGNMENTS = 40

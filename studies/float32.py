@@ -123,7 +123,7 @@ def judged(found: dict[str, dict[float, list[Apart]]], offsets: list[Recording])
                 claim = f"{name}, {f'offset {by:g}' if by else 'no offset'}, difference in rms dB"
                 value = float(rms(np.concatenate([part.db for part in each[by]])))
                 verdicts.append(Verdict(claim, value, target, why="the window's rms is far above its lines"))
-    claim = "largest difference over the bound of the kernel (docs/kernel.md), all offsets"
+    claim = "largest difference over the bound of the kernel (docs/reference/kernel.md), all offsets"
     worst = max(promised(recording) for recording in offsets)
     return [*verdicts, Verdict(claim, worst, 1.0, why="the bound of the kernel is exceeded")]
 

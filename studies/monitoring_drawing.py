@@ -1,4 +1,4 @@
-"""The figure of docs/monitoring.md: what an alarm sees along a few strokes of four faults."""
+"""The figure of docs/how-to/monitoring.md: what an alarm sees along a few strokes of four faults."""
 
 from __future__ import annotations
 

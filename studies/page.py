@@ -1,4 +1,4 @@
-"""Writes docs/studies.md from the numbers of the studies: no number on that page is typed by hand."""
+"""Writes docs/explanation/studies.md from the numbers of the studies: no number on that page is typed by hand."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from studies.result import Study
 HEAD = """# The studies: the paper's experiments, measured
 
 `make studies` writes this page; `python -m studies NAME` runs one study. Figures and numbers (JSON) are in
-`docs/images/studies/`. The axis is that of [axis.md](axis.md), the estimates are those of
-[estimators.md](estimators.md), and the paper is Nevaranta et al. 2016, whose equations are cited as (1) … (28).
+`docs/images/studies/`. The axis is that of [the simulated axis](../reference/axis.md), the estimates are those of
+[estimators](estimators.md), and the paper is Nevaranta et al. 2016, whose equations are cited as (1) … (28).
 Each target is marked **met** or **missed**; a missed target has a reason.
 """
 
@@ -27,7 +27,7 @@ def write_page(studies: Sequence[Study], folder: Path, page: Path) -> None:
 
 
 def _section(study: Study, numbers: dict[str, Any]) -> str:
-    figure = f"![{study.title}](images/studies/{study.name}.png)"
+    figure = f"![{study.title}](../images/studies/{study.name}.png)"
     verdicts = [_wrapped(f"- {_verdict(v)}", "  ") for v in numbers["verdicts"]]
     tables = [_table(t) for t in numbers["tables"]]
     paper = _wrapped(f"**The paper:** {study.paper}")

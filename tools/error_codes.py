@@ -1,4 +1,4 @@
-"""`python -m tools.error_codes > docs/errors.md`: the page of error codes, from the classes."""
+"""`python -m tools.error_codes > docs/reference/errors.md`: the page of error codes, from the classes."""
 
 from __future__ import annotations
 

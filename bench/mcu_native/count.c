@@ -1,5 +1,6 @@
 /* Counts instructions on the target, in two windows of samples, and writes a table to the host's counted.txt: for
- * loops of known length turns and count; for each step the total and the worst; bytes of RAM in all and in delay lines. */
+ * loops of known length turns and count; for each step the total and the worst; bytes of RAM
+ * in all and in delay lines. */
 #include "count.h"
 #include "livebode/sdft.h"
 #include "rls.h"

@@ -10,8 +10,8 @@
 static const float subtracted[DRIVE_SIGNALS] = {0, DRIVE_VELOCITY_RAD_S};
 
 /* As lb_sdft32_size asks: table and delay lines, then what each line takes, then the object itself. */
-static unsigned char memory[EXCITATION_SAMPLES * (8 + 4 * DRIVE_SIGNALS) + EXCITATION_LINES * (12 + 16 * DRIVE_SIGNALS) +
-                            256];
+static unsigned char
+    memory[EXCITATION_SAMPLES * (8 + 4 * DRIVE_SIGNALS) + EXCITATION_LINES * (12 + 16 * DRIVE_SIGNALS) + 256];
 
 enum { RAMP = EXCITATION_RAMP_PERIODS * EXCITATION_SAMPLES };
 
@@ -19,9 +19,9 @@ static lb_sdft32 *dft;
 static uint64_t epoch, samples;
 static char layout[DRIVE_LAYOUT_TEXT];
 static uint32_t sequence, layout_bytes, layout_crc;
-static uint32_t place;       /* of the next sample in the excitation's period */
-static uint32_t level;       /* of the ramp, in samples */
-static int rising;           /* ramping in, or there */
+static uint32_t place; /* of the next sample in the excitation's period */
+static uint32_t level; /* of the ramp, in samples */
+static int rising;     /* ramping in, or there */
 static volatile int enabled;
 static uint32_t whole_after; /* samples until the window holds neither start nor ramp nor one that was not finite */
 static struct {
@@ -66,8 +66,13 @@ int drive_begin(uint64_t epoch_)
     for (int i = 0; i < EXCITATION_LINES; ++i) {
         bins[i] = excitation_bins[i];
     }
-    const lb_config config = {.window = EXCITATION_SAMPLES, .channels = DRIVE_SIGNALS, .bin_count = EXCITATION_LINES,
-                              .bins = bins, .table = LB_TABLE_COMPACT};
+    const lb_config config = {
+        .window = EXCITATION_SAMPLES,
+        .channels = DRIVE_SIGNALS,
+        .bin_count = EXCITATION_LINES,
+        .bins = bins,
+        .table = LB_TABLE_COMPACT,
+    };
     epoch = epoch_;
     whole_after = EXCITATION_SAMPLES;
     describe();

@@ -32,7 +32,8 @@ enum { DRIVE_SIGNALS = 2 };
 /* epoch: another number at each start. 0 when it is ready. */
 int drive_begin(uint64_t epoch);
 
-/* Whether to excite: taken over where a period begins, and followed over EXCITATION_RAMP_PERIODS of them. At first it does not. */
+/* Whether to excite: taken over where a period begins, and followed over EXCITATION_RAMP_PERIODS of them. At first it
+ * does not. */
 void drive_enable(int on);
 
 /* In the control interrupt: what to add to the torque reference in this cycle … */
@@ -45,7 +46,8 @@ void drive_tick(float torque_n_m, float velocity_rad_s);
 /* In the background: whether a spectrum waits. It must be fetched before the next hop, or it is lost. */
 int drive_ready(void);
 
-/* The frame with that spectrum; returns its length. frf: velocity over torque at each line, re and im, (rad/s)/(N m). */
+/* The frame with that spectrum; returns its length. frf: velocity over torque at each line, re and im,
+ * (rad/s)/(N m). */
 size_t drive_spectrum(uint8_t frame[DRIVE_FRAME_BYTES], float frf[EXCITATION_LINES][2]);
 
 /* The frame that says what spectra are of: to be sent first, and then once a second. */

@@ -52,11 +52,13 @@ static void send_samples(uint32_t batch, uint64_t epoch)
     static uint8_t frame[LB_FRAME_BYTES(sizeof batches[0])];
     const uint32_t crc = lb_frame_crc(0, layout, sizeof layout - 1);
     if (batch * BATCH % RATE_HZ == 0) {
-        send(SAMPLES, frame, lb_frame(frame, LB_FRAME_LAYOUT, batch, epoch, 0, 0, RATE_HZ, crc, DRIVE_SIGNALS, 0, layout,
-                                      sizeof layout - 1));
+        send(SAMPLES, frame,
+             lb_frame(frame, LB_FRAME_LAYOUT, batch, epoch, 0, 0, RATE_HZ, crc, DRIVE_SIGNALS, 0, layout,
+                      sizeof layout - 1));
     }
-    send(SAMPLES, frame, lb_frame(frame, LB_FRAME_SAMPLES, batch, epoch, (uint64_t)batch * BATCH, 0, RATE_HZ, crc,
-                                  DRIVE_SIGNALS, BATCH, batches[batch % 2], sizeof batches[0]));
+    send(SAMPLES, frame,
+         lb_frame(frame, LB_FRAME_SAMPLES, batch, epoch, (uint64_t)batch * BATCH, 0, RATE_HZ, crc, DRIVE_SIGNALS, BATCH,
+                  batches[batch % 2], sizeof batches[0]));
 }
 
 static void send_spectrum(uint32_t *until_layout)

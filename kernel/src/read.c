@@ -3,8 +3,8 @@
 
 /* a0, a1/2, a2/2 of w(n) = a0 − a1·cos(2πn/N) + a2·cos(4πn/N). */
 static const real window_taps[3][3] = {
-    {(real)0.5, (real)0.25, (real)0},      /* Hann */
-    {(real)0.54, (real)0.23, (real)0},     /* Hamming */
+    {(real)0.5, (real)0.25, (real)0},     /* Hann */
+    {(real)0.54, (real)0.23, (real)0},    /* Hamming */
     {(real)0.42, (real)0.25, (real)0.04}, /* Blackman */
 };
 

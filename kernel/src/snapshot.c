@@ -25,7 +25,8 @@ static uint32_t crc32(const unsigned char *data, size_t bytes)
 {
     static const uint32_t of_nibble[16] = {
         0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
-        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu};
+        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu,
+    };
     uint32_t crc = 0xFFFFFFFFu;
     for (size_t i = 0; i < bytes; ++i) {
         crc ^= data[i];
@@ -37,8 +38,18 @@ static uint32_t crc32(const unsigned char *data, size_t bytes)
 
 static header header_of(const LB_DFT *t)
 {
-    header h = {LB_SNAPSHOT_MAGIC, LB_SNAPSHOT_VERSION, LB_BITS, (uint32_t)t->variant, t->window, t->channels,
-                t->bin_count, 0u, t->count, t->damping};
+    header h = {
+        .magic = LB_SNAPSHOT_MAGIC,
+        .version = LB_SNAPSHOT_VERSION,
+        .bits = LB_BITS,
+        .variant = (uint32_t)t->variant,
+        .window = t->window,
+        .channels = t->channels,
+        .bin_count = t->bin_count,
+        .reserved = 0u,
+        .count = t->count,
+        .damping = t->damping,
+    };
     return h;
 }
 
@@ -101,8 +112,8 @@ static lb_status examine(const LB_DFT *t, const unsigned char *from, size_t byte
         return LB_ERROR_SNAPSHOT_CRC;
     }
     const header own = header_of(t);
-    if (h->bits != own.bits || h->variant != own.variant || h->window != own.window ||
-        h->channels != own.channels || h->bin_count != own.bin_count || h->damping != own.damping) {
+    if (h->bits != own.bits || h->variant != own.variant || h->window != own.window || h->channels != own.channels ||
+        h->bin_count != own.bin_count || h->damping != own.damping) {
         return LB_ERROR_SNAPSHOT_CONFIG;
     }
     if (bytes != length_of(t)) {

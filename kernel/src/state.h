@@ -36,22 +36,13 @@ static inline int lb_renews(lb_variant v) { return v != LB_PLAIN && v != LB_DAMP
 static inline int lb_is_windowed(lb_variant v) { return v > LB_DAMPED; }
 
 /* Neighbours on each side that a variant's taps need. */
-static inline uint32_t lb_reach(lb_variant v)
-{
-    return v == LB_BLACKMAN ? 2u : lb_is_windowed(v) ? 1u : 0u;
-}
+static inline uint32_t lb_reach(lb_variant v) { return v == LB_BLACKMAN ? 2u : lb_is_windowed(v) ? 1u : 0u; }
 
 /* Place of a bin's S_re among the channel's sums; S_im, F_re, F_im follow at LB_BLOCK each. */
-static inline size_t lb_sum_at(size_t bin)
-{
-    return bin / LB_BLOCK * 4 * LB_BLOCK + lb_slot(bin % LB_BLOCK);
-}
+static inline size_t lb_sum_at(size_t bin) { return bin / LB_BLOCK * 4 * LB_BLOCK + lb_slot(bin % LB_BLOCK); }
 
 /* Place of a bin's cos in a table row; sin follows at LB_BLOCK. */
-static inline size_t lb_cos_at(size_t bin)
-{
-    return bin / LB_BLOCK * 2 * LB_BLOCK + lb_slot(bin % LB_BLOCK);
-}
+static inline size_t lb_cos_at(size_t bin) { return bin / LB_BLOCK * 2 * LB_BLOCK + lb_slot(bin % LB_BLOCK); }
 
 void LB(fill_table)(LB_DFT *t);
 

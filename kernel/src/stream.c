@@ -25,8 +25,8 @@ static void read_rows(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
     LB(skip)(t, in, length);
 }
 
-lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, ptrdiff_t sample_stride,
-                      size_t length, size_t hop, lb_phase phase, real *out, size_t rows)
+lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, ptrdiff_t sample_stride, size_t length,
+                      size_t hop, lb_phase phase, real *out, size_t rows)
 {
     size_t expected;
     const lb_status status = LB(rows)(t, length, hop, &expected);

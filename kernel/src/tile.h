@@ -15,19 +15,19 @@
 
 typedef struct {
     size_t channels, blocks;
-    real *sums;          /* [channels][blocks][4][LB_BLOCK] */
-    const real *line;    /* channel 0's first sample of the tile; its image is `image` reals further, and they move */
-    ptrdiff_t image;     /* towards and away from each other */
-    size_t line_step;    /* reals from channel to channel */
-    int middle;          /* the first sample is its own image */
-    const real *row;     /* table row of the first sample */
-    ptrdiff_t row_step;  /* reals to the next sample's row; negative when reading backwards */
-    real *delta;         /* [channels][3][LB_TILE]: x(n) − x(n−N); room for the even and the odd part, */
-                         /* x_j + x_(N−j) and x_j − x_(N−j) */
-    size_t length;       /* 1 … LB_TILE, within one half of the period */
-    int backwards;       /* in the second half */
-    int swap;            /* the last sample ends the period: S = F after it */
-    size_t first;        /* offset of the first sample after which a row is due; ≥ length: none */
+    real *sums;         /* [channels][blocks][4][LB_BLOCK] */
+    const real *line;   /* channel 0's first sample of the tile; its image is `image` reals further, and they move */
+    ptrdiff_t image;    /* towards and away from each other */
+    size_t line_step;   /* reals from channel to channel */
+    int middle;         /* the first sample is its own image */
+    const real *row;    /* table row of the first sample */
+    ptrdiff_t row_step; /* reals to the next sample's row; negative when reading backwards */
+    real *delta;        /* [channels][3][LB_TILE]: x(n) − x(n−N); room for the even and the odd part, */
+                        /* x_j + x_(N−j) and x_j − x_(N−j) */
+    size_t length;      /* 1 … LB_TILE, within one half of the period */
+    int backwards;      /* in the second half */
+    int swap;           /* the last sample ends the period: S = F after it */
+    size_t first;       /* offset of the first sample after which a row is due; ≥ length: none */
     size_t hop;
     lb_phase phase;
     size_t bins;

@@ -19,8 +19,7 @@
 #endif
 
 typedef real vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_alias));
-typedef real loose_vec
-    __attribute__((vector_size(LB_LANES * sizeof(real)), may_alias, aligned(sizeof(real))));
+typedef real loose_vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_alias, aligned(sizeof(real))));
 
 LB_INLINE vec lb_load(const real *p) { return *(const vec *)(const void *)p; }
 LB_INLINE void lb_store(real *p, vec v) { *(vec *)(void *)p = v; }

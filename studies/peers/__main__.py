@@ -1,6 +1,6 @@
 """`python -m studies.peers`: livebode and other methods on the same simulated recordings.
 
-With --write the tables of docs/peers.md are updated.
+With --write the tables of docs/explanation/peers.md are updated.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from studies.peers.recording import CASES, Case, record
 from studies.peers.score import Score, score
 
 ROOT = Path(__file__).parents[2]
-PAGE, NUMBERS = ROOT / "docs" / "peers.md", ROOT / "build" / "studies" / "peers.json"
+PAGE, NUMBERS = ROOT / "docs" / "explanation" / "peers.md", ROOT / "build" / "studies" / "peers.json"
 BEGIN, END = "<!-- begin: python -m studies.peers --write -->", "<!-- end -->"
 
 
@@ -50,7 +50,7 @@ def page(results: dict[Case, dict[str, Score]], seeds: int) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m studies.peers", description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="recordings of each case")
-    parser.add_argument("--write", action="store_true", help="update the tables of docs/peers.md")
+    parser.add_argument("--write", action="store_true", help="update the tables of docs/explanation/peers.md")
     options = parser.parse_args()
     results = {case: judge(case, range(options.seeds)) for case in CASES}
     text = page(results, options.seeds)

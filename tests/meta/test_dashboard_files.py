@@ -1,12 +1,14 @@
-"""The page's files: what is not ours is as it was published, what is ours is small and fetches nothing elsewhere."""
+"""The page's files: what is not ours is as it was published, what is ours has types and fetches nothing elsewhere."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from pathlib import Path
 
-HERE = Path(__file__).parents[2] / "src/livebode/dashboard"
+ROOT = Path(__file__).parents[2]
+HERE = ROOT / "src/livebode/dashboard"
 
 
 def test_uplot_is_as_it_was_published() -> None:
@@ -19,15 +21,24 @@ def test_uplot_is_as_it_was_published() -> None:
     assert re.search(r"uPlot 1\.\d+\.\d+", words)
 
 
-def test_ours_are_small_and_import_only_what_is_here() -> None:
+def test_ours_have_checked_types_and_import_only_what_is_here() -> None:
     for file in (HERE / "static").glob("*.js"):
         text = file.read_text(encoding="utf-8")
-        assert text.startswith("//"), file.name
-        assert text.count("\n") < 300, file.name
-        assert max(map(len, text.splitlines())) <= 200, file.name
-        for name in re.findall(r'from "([^"]+)"', text):
+        assert text.startswith("// @ts-check\n"), file.name
+        assert not re.search(r"@ts-(ignore|nocheck)|[{<:|]\s*any\b", text), file.name
+        for name in re.findall(r'^import [^;"]*"([^"]+)"', text, re.M):
             where = (
                 HERE / "_vendor" / name.removeprefix("/static/") if name.startswith("/static/") else file.parent / name
             )
             assert where.is_file(), (file.name, name)
         assert not re.search(r"https?://(?!www\.w3\.org)", text), file.name
+
+
+def test_the_tools_of_the_page_are_pinned_by_hash_and_without_addresses() -> None:
+    lock = json.loads((ROOT / "package-lock.json").read_text())
+    tools = {name: facts for name, facts in lock["packages"].items() if name}
+    assert {"node_modules/typescript", "node_modules/@biomejs/biome"} <= tools.keys()
+    assert all(facts["integrity"].startswith("sha512-") and "resolved" not in facts for facts in tools.values())
+    shown = re.search(r"uPlot ([\d.]+)", (HERE / "_vendor/uplot/README.md").read_text())
+    assert shown is not None
+    assert tools["node_modules/uplot"]["version"] == shown[1]  # its types are those of the uPlot that is shipped

@@ -1,4 +1,4 @@
-"""The codes of errors: declared, raised, and listed in docs/errors.md."""
+"""The codes of errors: declared, raised, and listed in docs/reference/errors.md."""
 
 from __future__ import annotations
 
@@ -56,4 +56,4 @@ def test_no_message_of_the_library_names_an_option_of_the_command_line() -> None
 
 
 def test_the_page_of_codes_is_what_the_classes_say() -> None:
-    assert (ROOT / "docs" / "errors.md").read_text() == page()
+    assert (ROOT / "docs" / "reference" / "errors.md").read_text() == page()

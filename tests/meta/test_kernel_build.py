@@ -150,7 +150,7 @@ def test_sanitizers_find_nothing(tmp_path):
 
 def test_the_documented_example_compiles_and_runs(built, tmp_path):
     compiler, _, objects = built
-    text = (ROOT / "docs" / "kernel.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "kernel.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```c\n(.*?)```", text, re.S)
     (expected,) = re.findall(r"```text prints\n(.*?)```", text, re.S)
     source = tmp_path / "example.c"

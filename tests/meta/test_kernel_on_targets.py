@@ -6,7 +6,7 @@ import pytest
 
 from bench.firmware import KERNEL, M4F, M7, ROOT, kept, run, undefined
 from bench.mcu import LIMIT, TABLES, count
-from tests.targets import need_tools
+from tests.support.targets import need_tools
 
 STEP = ("push", "queue", "read", "count", "instruction_set")
 # What libgcc has for a processor: divisions of 64 bits, and the double precision that a Cortex-M4F does without.
@@ -14,7 +14,7 @@ DIVISION = {"__aeabi_uldivmod", "__aeabi_ul2d"}
 DOUBLE = {f"__aeabi_{name}" for name in ("dadd", "dsub", "dmul", "ddiv", "dcmplt", "dcmpgt", "dcmpeq", "ui2d", "d2f")}
 ALLOWED = {M4F: DIVISION | DOUBLE, M7: DIVISION}
 NAMED = {"__aeabi_ldivmod"}  # by gcc beside the unsigned one, and never called: an object lists it as undefined
-PAGE = (ROOT / "docs" / "microcontroller.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "microcontroller.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module", params=[(M4F, "-O2"), (M4F, "-O3"), (M4F, "-Os"), (M7, "-O2"), (M7, "-O3")])

@@ -69,10 +69,3 @@ def _pins(lock: Path) -> dict[str, set[str]]:
     for package, release in re.findall(r"^([a-z0-9-]+)==(\S+)", text, re.M):
         pins.setdefault(package, set()).add(release)
     return pins
-
-
-def test_every_link_in_the_documentation_leads_somewhere() -> None:
-    for page in [ROOT / "README.md", *ROOT.glob("docs/*.md")]:
-        for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
-            if "://" not in target:
-                assert (page.parent / target).exists(), f"{page.name}: {target}"

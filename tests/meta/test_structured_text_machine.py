@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.structured_text import Machine, RefusedError
-from tests.structured_text.types import ULINT
+from tests.support.structured_text import Machine, RefusedError
+from tests.support.structured_text.types import ULINT
 
 VARIABLES = (
     "a : LREAL; b : LREAL; n : UDINT; m : UDINT; i : DINT; big : ULINT; yes : BOOL; t : ARRAY [0..1, 0..2] OF LREAL;"

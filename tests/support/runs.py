@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.runtime import Destination, run
-from tests.command import write_parquet
+from tests.support.command import write_parquet
 
 
 def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[str, object]) -> Path:

@@ -33,5 +33,4 @@ typedef void (*handler)(void);
 __attribute__((section(".vectors"), used)) static const struct {
     const void *stack;
     handler handlers[15];
-} vectors = {stack_top,
-             {reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, fault, 0, 0, fault, systick}};
+} vectors = {stack_top, {reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, fault, 0, 0, fault, systick}};

@@ -3,7 +3,7 @@
  *   size → init → push | queue | process → read        (every call returns a status)
  *
  * Memory belongs to the caller; nothing here allocates, prints or calls libm. The same functions exist for
- * double (lb_sdft64_…) and for float (lb_sdft32_…), from one source text. docs/kernel.md explains the method.
+ * double (lb_sdft64_…) and for float (lb_sdft32_…), from one source text. docs/reference/kernel.md explains the method.
  */
 #ifndef LIVEBODE_SDFT_H
 #define LIVEBODE_SDFT_H

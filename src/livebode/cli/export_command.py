@@ -66,7 +66,7 @@ def _check(to: str, at: float | None, mean: bool, parameters: bool, formats: tup
         raise UsageError(
             "not-one-of",
             f"{to} is not a file format",
-            f"in Python use {_IN_PYTHON[to]} (docs/export.md)",
+            f"in Python use {_IN_PYTHON[to]} (docs/how-to/export.md)",
             argument="to",
             value=to,
             allowed=list(formats),

@@ -186,7 +186,7 @@ class LoopSection(_Section):
 
 
 class RecordSection(_Section):
-    """[record]: with this section, the run is recorded in segments that survive a kill (docs/run-directory.md)."""
+    """[record]: the run is recorded in segments that survive a kill (docs/reference/run-directory.md)."""
 
     samples: bool = False
     budget_bytes: Annotated[int, Field(ge=BUDGET_BYTES_MIN)] | None = None
@@ -194,7 +194,7 @@ class RecordSection(_Section):
 
 
 class ServeSection(_Section):
-    """[serve]: address of `livebode run --serve`, and access to it (docs/dashboard.md)."""
+    """[serve]: address of `livebode run --serve`, and access to it (docs/how-to/dashboard.md)."""
 
     address: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8765

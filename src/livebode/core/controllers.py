@@ -1,6 +1,7 @@
 """Controllers as they run in a drive: each with its own rate, hold, delay and integrator rule.
 
-docs/loop.md lists the effect of a wrong description; one forgotten tick of delay is 10 % of the plant's response.
+docs/how-to/loop.md lists the effect of a wrong description; one forgotten tick of delay is 10 % of the plant's
+response.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ class Parameters:
         """Half-width of the interval that covers the true value with this probability, shape (rows, parameters).
 
         For a normal error: 1.96 sigma for 95 %. It covers noise and the model error of `epsilon`; a model error that
-        is the same in every response remains as a bias (docs/fits.md).
+        is the same in every response remains as a bias (docs/explanation/fits.md).
 
         Raises
         ------

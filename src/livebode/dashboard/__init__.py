@@ -1,4 +1,4 @@
-"""The page that shows a run while it is recorded, and afterwards (docs/dashboard.md)."""
+"""The page that shows a run while it is recorded, and afterwards (docs/how-to/dashboard.md)."""
 
 from livebode.dashboard.dashboard import Dashboard
 from livebode.dashboard.hub import Hub

@@ -31,7 +31,7 @@ def axis_text(
     log
         The recording, relative to the file.
     loop
-        The tables below [loop], as in docs/configuration.md.
+        The tables below [loop], as in docs/reference/configuration.md.
     motion
         The table [motion].
     tracking

@@ -1,4 +1,4 @@
-"""Doctor: what a person asks first when something does not work, and a bundle for a report (docs/doctor.md)."""
+"""Doctor: what a person asks first when something does not work, and a bundle for a report (docs/how-to/doctor.md)."""
 
 from livebode.doctor.bundle import write_bundle
 from livebode.doctor.check import Check, Verdict, worst

@@ -163,7 +163,7 @@ class Experiment(BaseModel):
         return MeasuredAxis(self.measured, self.loop)
 
     def loop_tables(self) -> dict[str, Any]:
-        """[loop] of the axis.toml, as in docs/configuration.md."""
+        """[loop] of the axis.toml, as in docs/reference/configuration.md."""
         axis = self.axis()
         if axis is None:
             return _finite(self._measured_axis.loop_tables())

@@ -30,7 +30,7 @@ class Fitter:
     Rows are processed in groups of sixteen: a row starts from the last valid fit of the previous groups, and uses the ε
     of their newest 64 valid rows, so that ε is constant within a group; only the rows of the first group find their
     own. The results do not depend on how the responses are cut into batches (to rounding). A row whose fit fails from
-    this start is scanned again (docs/fits.md).
+    this start is scanned again (docs/explanation/fits.md).
 
     Delay: none beyond that of the Responses.
 

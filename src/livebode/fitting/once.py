@@ -194,8 +194,8 @@ def fit(
 ) -> Fit:
     """Fit a model to a Response, or to the mean of Responses (`mean_response`).
 
-    The variance of a line is sigma² + (ε|G|)², with ε ≥ 0 such that the reduced chi² is 1; docs/fits.md explains what
-    the bounds then cover. The other arguments are those of `Fitter`.
+    The variance of a line is sigma² + (ε|G|)², with ε ≥ 0 such that the reduced chi² is 1; docs/explanation/fits.md
+    explains what the bounds then cover. The other arguments are those of `Fitter`.
 
     Bias: as `Fitter`.
 
@@ -223,7 +223,7 @@ def fit(
 
 
 def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
-    """One row of a Fitter, after a competition with extended models (docs/fits.md)."""
+    """One row of a Fitter, after a competition with extended models (docs/explanation/fits.md)."""
     found = fit_of(fitter, parameters, measured)
     if found.status != "ok":
         return found

@@ -17,7 +17,8 @@ namespace nb = nanobind;
 
 namespace {
 
-const char *words(lb_status status) {
+const char *words(lb_status status)
+{
     switch (status) {
     case LB_ERROR_INSTRUCTION_SET: return "this machine or this build does not have the instruction set asked for";
     case LB_ERROR_SIZE: return "window × bins needs more memory than this machine can address";
@@ -30,7 +31,8 @@ const char *words(lb_status status) {
     }
 }
 
-void expect(lb_status status) {
+void expect(lb_status status)
+{
     if (status != LB_OK) throw nb::value_error(words(status));
 }
 
@@ -38,13 +40,15 @@ void expect(lb_status status) {
 struct View {
     Py_buffer buffer{};
     bool held = false;
-    bool open(PyObject *object, int flags) {
+    bool open(PyObject *object, int flags)
+    {
         held = PyObject_GetBuffer(object, &buffer, flags) == 0;
         if (!held) PyErr_Clear();
         return held;
     }
     bool has_format(const char *format) const { return buffer.format && std::strcmp(buffer.format, format) == 0; }
-    ~View() {
+    ~View()
+    {
         if (held) PyBuffer_Release(&buffer);
     }
     View() = default;
@@ -63,7 +67,8 @@ class Engine {
   public:
     Engine(uint32_t window, const std::vector<uint32_t> &bins, uint32_t channels, bool is_double, int variant,
            double damping, int set)
-        : window_(window), channels_(channels), bins_(bins.size()), is_double_(is_double) {
+        : window_(window), channels_(channels), bins_(bins.size()), is_double_(is_double)
+    {
         const lb_config config = {window,
                                   channels,
                                   static_cast<uint32_t>(bins.size()),
@@ -87,19 +92,22 @@ class Engine {
     uint32_t window() const { return window_; }
     uint32_t channels() const { return channels_; }
 
-    uint64_t count() const {
+    uint64_t count() const
+    {
         uint64_t count = 0;
         expect(is_double_ ? lb_sdft64_count(dft64_, &count) : lb_sdft32_count(dft32_, &count));
         return count;
     }
 
-    int instruction_set() const {
+    int instruction_set() const
+    {
         lb_instruction_set set = LB_BEST;
         expect(is_double_ ? lb_sdft64_instruction_set(dft64_, &set) : lb_sdft32_instruction_set(dft32_, &set));
         return set;
     }
 
-    void push(nb::handle x) {
+    void push(nb::handle x)
+    {
         if (PyFloat_CheckExact(x.ptr()) && channels_ == 1 && !busy_) {
             const double value = PyFloat_AS_DOUBLE(x.ptr());
             if (is_double_) {
@@ -113,14 +121,16 @@ class Engine {
         push_any(x);
     }
 
-    nb::object process(nb::handle x, nb::handle hop, nb::handle out, nb::handle phase) {
+    nb::object process(nb::handle x, nb::handle hop, nb::handle out, nb::handle phase)
+    {
         const size_t step = hop_of(hop);
         return run(x, step, out, phase_of(phase));
     }
 
     void advance(nb::handle x) { run(x, 0, nb::none(), LB_PHASE_WINDOW); }
 
-    nb::object spectrum(nb::handle phase) {
+    nb::object spectrum(nb::handle phase)
+    {
         not_busy();
         nb::object result = arguments_.attr("empty_spectrum")(bins_, channels_, is_double_);
         View view;
@@ -132,7 +142,8 @@ class Engine {
         return result;
     }
 
-    nb::bytes snapshot() {
+    nb::bytes snapshot()
+    {
         not_busy();
         size_t bytes = 0;
         expect(is_double_ ? lb_sdft64_snapshot_size(dft64_, &bytes) : lb_sdft32_snapshot_size(dft32_, &bytes));
@@ -144,13 +155,15 @@ class Engine {
         return owner;
     }
 
-    void restore(nb::bytes snapshot) {
+    void restore(nb::bytes snapshot)
+    {
         not_busy();
         expect(is_double_ ? lb_sdft64_restore(dft64_, snapshot.data(), snapshot.size())
                           : lb_sdft32_restore(dft32_, snapshot.data(), snapshot.size()));
     }
 
-    void reset() {
+    void reset()
+    {
         not_busy();
         expect(is_double_ ? lb_sdft64_reset(dft64_) : lb_sdft32_reset(dft32_));
     }
@@ -173,12 +186,15 @@ class Engine {
     const char *real_format() const { return is_double_ ? "d" : "f"; }
     const char *complex_format() const { return is_double_ ? "Zd" : "Zf"; }
 
-    void not_busy() const {
+    void not_busy() const
+    {
         if (busy_)
-            throw std::runtime_error("this SlidingDFT is processing a block in another thread; give each thread its own");
+            throw std::runtime_error(
+                "this SlidingDFT is processing a block in another thread; give each thread its own");
     }
 
-    void push_any(nb::handle x) {
+    void push_any(nb::handle x)
+    {
         not_busy();
         if (push_floats(x)) return;
         nb::object array = arguments_.attr("as_sample")(x, channels_, is_double_);
@@ -191,7 +207,8 @@ class Engine {
     }
 
     // A tuple or list of as many floats as channels: the usual form of a sample of several signals.
-    bool push_floats(nb::handle x) {
+    bool push_floats(nb::handle x)
+    {
         constexpr Py_ssize_t most = 16;
         const bool is_list = PyList_CheckExact(x.ptr());
         if (!is_list && !PyTuple_CheckExact(x.ptr())) return false;
@@ -209,7 +226,8 @@ class Engine {
         return true;
     }
 
-    size_t hop_of(nb::handle hop) const {
+    size_t hop_of(nb::handle hop) const
+    {
         if (PyLong_CheckExact(hop.ptr())) {
             const Py_ssize_t value = PyLong_AsSsize_t(hop.ptr());
             if (value > 0) return static_cast<size_t>(value);
@@ -218,7 +236,8 @@ class Engine {
         return nb::cast<size_t>(arguments_.attr("as_hop")(hop));
     }
 
-    lb_phase phase_of(nb::handle phase) const {
+    lb_phase phase_of(nb::handle phase) const
+    {
         if (PyUnicode_Check(phase.ptr())) {
             if (PyUnicode_CompareWithASCIIString(phase.ptr(), "window") == 0) return LB_PHASE_WINDOW;
             if (PyUnicode_CompareWithASCIIString(phase.ptr(), "fixed") == 0) return LB_PHASE_FIXED;
@@ -227,7 +246,8 @@ class Engine {
         return LB_PHASE_WINDOW; // not reached
     }
 
-    bool fits(const View &view) const {
+    bool fits(const View &view) const
+    {
         const Py_buffer &b = view.buffer;
         const auto item = static_cast<Py_ssize_t>(real_bytes());
         if (!view.has_format(real_format()) || reinterpret_cast<uintptr_t>(b.buf) % real_bytes() != 0) return false;
@@ -236,7 +256,8 @@ class Engine {
         return (b.ndim == 1 && channels_ == 1) || (b.ndim == 2 && b.shape[0] == static_cast<Py_ssize_t>(channels_));
     }
 
-    Samples samples_of(const View &view) const {
+    Samples samples_of(const View &view) const
+    {
         const Py_buffer &b = view.buffer;
         const auto item = static_cast<Py_ssize_t>(real_bytes());
         const int last = b.ndim - 1;
@@ -244,7 +265,8 @@ class Engine {
                 static_cast<size_t>(b.shape[last])};
     }
 
-    nb::object run(nb::handle x, size_t hop, nb::handle out, lb_phase phase) {
+    nb::object run(nb::handle x, size_t hop, nb::handle out, lb_phase phase)
+    {
         not_busy();
         nb::object converted; // outlives its view
         View direct, indirect;
@@ -264,8 +286,8 @@ class Engine {
         expect(is_double_ ? lb_sdft64_rows(dft64_, samples.length, hop, &rows)
                           : lb_sdft32_rows(dft32_, samples.length, hop, &rows));
         const bool flat = input.buffer.ndim == 1;
-        nb::object result = out.is_none() ? arguments_.attr("empty_rows")(channels_, rows, bins_, flat, is_double_)
-                                          : nb::borrow(out);
+        nb::object result =
+            out.is_none() ? arguments_.attr("empty_rows")(channels_, rows, bins_, flat, is_double_) : nb::borrow(out);
         View output;
         if (!output.open(result.ptr(), PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) ||
             !takes(output, rows, flat) || overlap(output.buffer, samples))
@@ -274,7 +296,8 @@ class Engine {
         return result;
     }
 
-    bool takes(const View &view, size_t rows, bool flat) const {
+    bool takes(const View &view, size_t rows, bool flat) const
+    {
         const Py_buffer &b = view.buffer;
         const Py_ssize_t *shape = b.shape + (flat ? 0 : 1);
         return view.has_format(complex_format()) && b.ndim == (flat ? 2 : 3) &&
@@ -284,7 +307,8 @@ class Engine {
     }
 
     // Whether the output overlaps the input, by the ends of both.
-    bool overlap(const Py_buffer &out, const Samples &in) const {
+    bool overlap(const Py_buffer &out, const Samples &in) const
+    {
         if (in.length == 0 || out.len == 0) return false;
         const auto item = static_cast<ptrdiff_t>(real_bytes());
         const ptrdiff_t spans[2] = {in.channel_stride * static_cast<ptrdiff_t>(channels_ - 1) * item,
@@ -295,7 +319,8 @@ class Engine {
         return first < high && low < end;
     }
 
-    void compute(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows) {
+    void compute(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows)
+    {
         if (in.length * channels_ * (bins_ + 8) < long_work) {
             status_ = call(in, hop, phase, out, rows);
         } else {
@@ -309,18 +334,19 @@ class Engine {
         expect(status_);
     }
 
-    lb_status call(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows) {
-        return is_double_
-                   ? lb_sdft64_process(dft64_, static_cast<const double *>(in.data), in.channel_stride,
-                                       in.sample_stride, in.length, hop, phase, static_cast<double *>(out), rows)
-                   : lb_sdft32_process(dft32_, static_cast<const float *>(in.data), in.channel_stride,
-                                       in.sample_stride, in.length, hop, phase, static_cast<float *>(out), rows);
+    lb_status call(const Samples &in, size_t hop, lb_phase phase, void *out, size_t rows)
+    {
+        return is_double_ ? lb_sdft64_process(dft64_, static_cast<const double *>(in.data), in.channel_stride,
+                                              in.sample_stride, in.length, hop, phase, static_cast<double *>(out), rows)
+                          : lb_sdft32_process(dft32_, static_cast<const float *>(in.data), in.channel_stride,
+                                              in.sample_stride, in.length, hop, phase, static_cast<float *>(out), rows);
     }
 };
 
 } // namespace
 
-NB_MODULE(_native, m) {
+NB_MODULE(_native, m)
+{
     m.def("best_instruction_set", [] { return static_cast<int>(lb_best_instruction_set()); });
     nb::class_<Engine>(m, "Engine")
         .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int>())

@@ -54,7 +54,7 @@ class OpenLoop:
             raise FitError(
                 "loop-unknown",
                 "margins need the loop's controllers, and the loop has none",
-                "describe them under [loop] (docs/loop.md)",
+                "describe them under [loop] (docs/how-to/loop.md)",
                 key="loop",
             )
 

@@ -25,8 +25,8 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
     """Margins of the loop at each row of `fits`.
 
     Read from L = F·G(fit) where it crosses, exact to 1e-10 of a frequency, on the model and never between lines without
-    one. Linear propagation of the fit's covariance: valid if the covariance is (docs/margins.md), and if the critical
-    crossing remains the critical one.
+    one. Linear propagation of the fit's covariance: valid if the covariance is (docs/how-to/margins.md), and if the
+    critical crossing remains the critical one.
 
     Parameters
     ----------

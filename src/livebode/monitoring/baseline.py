@@ -128,7 +128,7 @@ class Baseline:
         return load(path)
 
     def save(self, path: Path) -> None:
-        """Write it to a file, completely or not at all; docs/monitoring.md describes the content."""
+        """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content."""
         from livebode.monitoring.baseline_file import save
 
         save(self, path)

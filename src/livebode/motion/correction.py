@@ -50,7 +50,7 @@ class MotionCorrection:
     `sigma` is that of the corrected response: it is from the scatter of R between periods (or from the detection lines
     of r), without the motion, which is also in y_model. Windows in which the axis is at standstill, reverses or creeps
     while dry friction stops it are invalid, and an Event of kind "held" reports them; an axis at standstill without dry
-    friction remains valid. docs/motion.md gives the detection rate.
+    friction remains valid. docs/explanation/motion.md gives the detection rate.
 
     Delay: a response is returned when its chunk and one more window are complete, at most chunk + window samples after
     its newest sample; `finish` returns the rest at once. The results do not depend on how the samples are cut into

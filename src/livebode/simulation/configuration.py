@@ -228,7 +228,7 @@ class BeltAxis:
         )
         smooth = ceil(fastest / self.drive.rate_hz / _STEP_MAX)
         backlash = bool(np.any(self.condition(self._moments_s).gap_m))
-        # A sign smoothed over less speed changes within less time (measured: 5e-8 of a stroke at worst, docs/axis.md).
+        # A sign smoothed over less speed changes within less time (docs/reference/axis.md: 5e-8 of a stroke at worst).
         dry = 2 * ceil(sqrt(0.005 / self.friction.smoothing_m_per_s)) if self.friction.dry else 1
         return max(smooth, dry, 16 if backlash else 1)
 

@@ -25,7 +25,8 @@ using Column = std::array<double, LB_AXIS_INPUTS>;
 double number(const nb::dict &settings, const char *name) { return nb::cast<double>(settings[name]); }
 int whole(const nb::dict &settings, const char *name) { return nb::cast<int>(settings[name]); }
 
-lb_axis_config config_of(const nb::dict &s) {
+lb_axis_config config_of(const nb::dict &s)
+{
     lb_axis_config c{};
     c.states = whole(s, "states");
     c.motor_inertia_kg_m2 = number(s, "motor_inertia_kg_m2");
@@ -73,11 +74,13 @@ lb_axis_config config_of(const nb::dict &s) {
 
 class Engine {
   public:
-    Engine(const nb::dict &settings, double position_m) : config_(config_of(settings)) {
+    Engine(const nb::dict &settings, double position_m) : config_(config_of(settings))
+    {
         lb_axis_rest(&config_, position_m, &state_);
     }
 
-    size_t advance(const Rows &input, const Out &output) {
+    size_t advance(const Rows &input, const Out &output)
+    {
         const size_t ticks = input.shape(1);
         const auto rows = static_cast<size_t>(LB_AXIS_SIGNALS + config_.states);
         if (output.shape(0) != rows || output.shape(1) != ticks)
@@ -88,7 +91,8 @@ class Engine {
 
     std::vector<double> plant() const { return {state_.plant, state_.plant + config_.states}; }
 
-    std::vector<double> derivative(const std::vector<double> &now, double torque, const std::vector<double> &state) {
+    std::vector<double> derivative(const std::vector<double> &now, double torque, const std::vector<double> &state)
+    {
         if (now.size() != LB_AXIS_INPUTS || state.size() != static_cast<size_t>(config_.states))
             throw nb::value_error("wrong number of inputs or states");
         std::vector<double> slope(state.size());
@@ -103,7 +107,8 @@ class Engine {
 
 } // namespace
 
-NB_MODULE(_axis, m) {
+NB_MODULE(_axis, m)
+{
     nb::class_<Engine>(m, "Engine")
         .def(nb::init<const nb::dict &, double>(), nb::arg("settings"), nb::arg("position_m"))
         .def_prop_ro("plant", &Engine::plant)

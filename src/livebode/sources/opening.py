@@ -28,7 +28,7 @@ def open_log(
     channels: Sequence[str] | None = None,
     block_samples: int = 65536,
 ) -> Log:
-    """Open a recording of any format that `docs/readers.md` lists.
+    """Open a recording of any format that `docs/reference/readers.md` lists.
 
     Parameters
     ----------

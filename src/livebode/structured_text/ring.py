@@ -1,4 +1,4 @@
-"""The ring buffer that livebode's ADS source reads: its type, and the block that fills it (docs/live.md)."""
+"""The ring buffer that livebode's ADS source reads: its type, and the block that fills it (docs/how-to/live.md)."""
 
 from __future__ import annotations
 

@@ -122,10 +122,10 @@ def sliding_dft(
 ) -> str:
     """Text of a function block that computes the DFT of the last N samples at the lines, for channels with one index.
 
-    The operations are those of `livebode.kernel.SlidingDFT` in float64 (docs/kernel.md), so the results have the same
-    bits if the PLC rounds every product and sum to 64 bits. It is called once per cycle with a sample of each channel;
-    the outputs `re` and `im` are [channel, bin]. It first fills its table, one entry per cycle, and processes samples
-    after N cycles; `count` is their number, and `valid` is true from the Nth.
+    The operations are those of `livebode.kernel.SlidingDFT` in float64 (docs/reference/kernel.md), so the results have
+    the same bits if the PLC rounds every product and sum to 64 bits. It is called once per cycle with a sample of each
+    channel; the outputs `re` and `im` are [channel, bin]. It first fills its table, one entry per cycle, and processes
+    samples after N cycles; `count` is their number, and `valid` is true from the Nth.
 
     Parameters
     ----------

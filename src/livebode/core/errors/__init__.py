@@ -1,4 +1,4 @@
-"""All errors that livebode raises on purpose; docs/errors.md lists their codes.
+"""All errors that livebode raises on purpose; docs/reference/errors.md lists their codes.
 
 Wrong use by a programmer (a wrong type, a call in the wrong order) is a TypeError, ValueError or RuntimeError instead.
 """

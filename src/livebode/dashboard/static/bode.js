@@ -1,22 +1,59 @@
+// @ts-check
 // Magnitude, phase and coherence over logarithmic frequency: measured with its band, reference, baseline, model.
 import { axis, chart, degreeTicks, frequencyAxis, steady } from "./chart.js";
-import { NAMES, extent, moved, overGrid, turns } from "./curves.js";
+import { extent, moved, NAMES, overGrid, turns } from "./curves.js";
 import { byFinger } from "./finger.js";
 import { colour } from "./theme.js";
 
+/** @import { Chart, Range } from "./chart.js" */
+/** @import { Curve, Values } from "./curves.js" */
+/** @import { Curves, Found, Frame, Run } from "./messages.js" */
+
 const FEW_LINES = 40;
+/** @type {Record<Curves, number[]>} */
 const DASHES = { measured: [], reference: [8, 4], baseline: [2, 3], model: [5, 2] };
 
+// What each panel draws of a curve: its value, the edges of its band, and the values that differ from zero.
+const MAGNITUDE = /** @type {const} */ ({ value: "db", edges: ["dbHigh", "dbLow"], sure: "dbSure", room: 3 });
+const PHASE = /** @type {const} */ ({ value: "deg", edges: ["degHigh", "degLow"], sure: "degSure", room: 10 });
+const PANELS = /** @type {const} */ ([MAGNITUDE, PHASE, { value: "coherence", edges: [] }]);
+
 export class Bode {
+  /**
+   * @param {HTMLElement[]} hosts of magnitude, phase and coherence
+   * @param {(hz: number, found: Found) => void} onCursor
+   */
   constructor(hosts, onCursor) {
-    Object.assign(this, { hosts, onCursor });
+    this.hosts = hosts;
+    this.onCursor = onCursor;
     this.shown = new Set(NAMES);
+    /** @type {Partial<Record<Curves, Curve>>} */
     this.curves = {};
+    /** @type {Chart[]} */
     this.charts = [];
+    /** @type {number[]} frequencies of the lines, Hz */
+    this.lines = [];
+    /** @type {number[]} frequencies at which the curves are drawn, Hz */
+    this.grid = [];
+    /** @type {number[]} index in the grid of each line */
+    this.at = [];
+    /** @type {Values} */
+    this.nothing = [];
+    /** @type {Range} */
+    this.whole = [1, 10];
+    /** @type {Range} */
+    this.sight = this.whole;
+    this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
     this.line = 0;
   }
 
-  // Start again with these lines.
+  /**
+   * Start again with these lines.
+   *
+   * @param {Run} facts
+   * @param {string} unit
+   * @param {string} symbol
+   */
   begin(facts, unit, symbol) {
     this.clear();
     this.lines = facts.frequency_hz;
@@ -26,12 +63,20 @@ export class Bode {
     );
     this.line = Math.min(this.line, this.lines.length - 1);
     this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
-    const pad = (this.grid.at(-1) / this.grid[0]) ** 0.03 || 1.1;
-    this.whole = [this.grid[0] / Math.max(pad, 1.02), this.grid.at(-1) * Math.max(pad, 1.02)];
+    this.nothing = new Array(this.grid.length).fill(null);
+    const low = this.grid[0],
+      high = this.grid[this.grid.length - 1],
+      pad = (high / low) ** 0.03 || 1.1;
+    this.whole = [low / Math.max(pad, 1.02), high * Math.max(pad, 1.02)];
     this.sight = this.whole;
     this.charts = [
-      this.panel(0, `|${symbol}| in dB${unit ? ` re 1 ${unit}` : ""}`, { range: () => this.limits(0) }, false),
-      this.panel(1, "phase in °", { range: () => this.limits(1) }, false, { splits: degreeTicks }),
+      this.panel(
+        0,
+        `|${symbol}| in dB${unit ? ` re 1 ${unit}` : ""}`,
+        { range: () => this.limits(0, MAGNITUDE) },
+        false,
+      ),
+      this.panel(1, "phase in °", { range: () => this.limits(1, PHASE) }, false, { splits: degreeTicks }),
       this.panel(2, "coherence", { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
     ];
   }
@@ -43,11 +88,20 @@ export class Bode {
     this.curves = {};
   }
 
+  /**
+   * @param {number} index
+   * @param {string} label
+   * @param {uPlot.Scale} y
+   * @param {boolean} last
+   * @param {uPlot.Axis} more
+   */
   panel(index, label, y, last, more = {}) {
     const lines = () => this.lines;
     const few = this.lines.length <= FEW_LINES;
-    const series = [{ label: "frequency" }],
-      bands = [];
+    /** @type {uPlot.Series[]} */
+    const series = [{ label: "frequency" }];
+    /** @type {uPlot.Band[]} */
+    const bands = [];
     for (const name of NAMES) {
       const show = this.shown.has(name);
       const first = series.length;
@@ -110,41 +164,51 @@ export class Bode {
     );
   }
 
+  /**
+   * @param {number} index
+   * @returns {[number[], ...Values[]]}
+   */
   data(index) {
-    const key = ["db", "deg", "coherence"][index],
-      found = [this.grid];
-    const nothing = (this.nothing ||= new Array(1).fill(null));
-    const empty =
-      nothing.length === this.grid.length ? nothing : (this.nothing = new Array(this.grid.length).fill(null));
+    const { value, edges } = PANELS[index];
+    /** @type {[number[], ...Values[]]} */
+    const found = [this.grid];
     for (const name of NAMES) {
       const curve = this.curves[name],
-        by = index === 1 ? curve?.turns || 0 : 0;
-      found.push(curve ? moved(curve[key], by) : empty);
-      if (index < 2 && name !== "model")
-        for (const edge of ["High", "Low"]) found.push(curve ? moved(curve[key + edge], by) : empty);
+        by = value === "deg" && curve ? curve.turns : 0;
+      for (const key of name === "model" ? [value] : [value, ...edges])
+        found.push(curve ? moved(curve[key], by) : this.nothing);
     }
     return found;
   }
 
-  limits(index) {
-    const key = ["db", "deg"][index];
-    const drawn = NAMES.filter((n) => this.shown.has(n) && this.curves[n]).map((n) => this.curves[n]);
-    const by = (curve, values) => moved(values, index ? curve.turns : 0);
-    const sure = drawn.map((curve) => by(curve, curve[`${key}Sure`]));
-    const known = sure.some((values) => values.some(Number.isFinite));
-    const edges = drawn.flatMap((curve) => [`${key}High`, `${key}Low`].map((edge) => by(curve, curve[edge])));
-    const all = drawn.map((curve) => by(curve, curve[key]));
+  /**
+   * @param {number} index
+   * @param {typeof MAGNITUDE | typeof PHASE} panel
+   */
+  limits(index, { value, edges, sure, room }) {
+    const drawn = NAMES.flatMap((name) => (this.shown.has(name) && this.curves[name]) || []);
+    /** @type {(curve: Curve, values: Values) => Values} */
+    const by = (curve, values) => moved(values, value === "deg" ? curve.turns : 0);
+    const certain = drawn.map((curve) => by(curve, curve[sure]));
+    const known = certain.some((values) => values.some(Number.isFinite));
+    const bounds = drawn.flatMap((curve) => edges.map((edge) => by(curve, curve[edge])));
+    const all = drawn.map((curve) => by(curve, curve[value]));
     // A measured point is always in the picture; only its band may leave it.
     const points = drawn.flatMap((curve, i) => (curve === this.curves.measured ? [all[i]] : []));
-    return this.ranges[index](...extent(known ? [...sure, ...points] : all, [...edges, ...all], index ? 10 : 3));
+    return this.ranges[index](...extent(known ? [...certain, ...points] : all, [...bounds, ...all], room));
   }
 
-  // A frame of a curve; drawn at the next `draw`.
+  /**
+   * A frame of a curve; drawn at the next `draw`.
+   *
+   * @param {Frame} frame
+   */
   take(frame) {
-    const name = frame.kind === "newest" || frame.kind === "moment" ? "measured" : frame.kind;
+    const name = NAMES.find((known) => known === frame.kind) ?? "measured";
     this.curves[name] = overGrid(frame, this.grid, this.at);
   }
 
+  /** @param {Curves} name */
   drop(name) {
     delete this.curves[name];
   }
@@ -155,35 +219,40 @@ export class Bode {
       const curve = this.curves[name];
       if (curve) curve.turns = name === "measured" || !measured ? 0 : turns(curve, measured);
     }
-    this.charts.forEach((made, index) => made.setData(this.data(index)));
+    for (const [index, made] of this.charts.entries()) made.setData(this.data(index));
     this.tell();
   }
 
+  /**
+   * @param {Curves} name
+   * @param {boolean} show
+   */
   toggle(name, show) {
     if (show) this.shown.add(name);
     else this.shown.delete(name);
-    this.charts.forEach((made, index) => {
-      made.series.forEach((s, i) => {
-        if (i && s.label.split(" ")[0] === name && s.show !== show) made.setSeries(i, { show });
-      });
-    });
+    for (const made of this.charts)
+      for (const [i, { label, show: now }] of made.series.entries())
+        if (i && String(label).split(" ")[0] === name && now !== show) made.setSeries(i, { show });
     this.draw();
   }
 
+  /** @param {Range} sight */
   zoom(sight) {
     this.sight = sight;
     for (const made of this.charts) made.setData(made.data);
   }
 
+  /** @param {Chart} u */
   select(u) {
     const { left, width } = u.select;
     if (width > 8) this.zoom([u.posToVal(left, "x"), u.posToVal(left + width, "x")]);
     u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
   }
 
+  /** @param {Chart} u */
   follow(u) {
     const { left } = u.cursor;
-    if (left === undefined || left < 0 || this.placing) return;
+    if (left === undefined || left < 0) return;
     const f = u.posToVal(left, "x");
     this.line = this.lines.reduce(
       (best, g, i) => (Math.abs(Math.log(g / f)) < Math.abs(Math.log(this.lines[best] / f)) ? i : best),
@@ -193,7 +262,11 @@ export class Bode {
     this.ring();
   }
 
-  // The next or the previous line under the cursor.
+  /**
+   * The next or the previous line under the cursor.
+   *
+   * @param {number} by
+   */
   step(by) {
     if (!this.charts.length) return;
     this.line = Math.min(this.lines.length - 1, Math.max(0, this.line + by));
@@ -205,7 +278,11 @@ export class Bode {
     for (const made of this.charts) made.redraw(false, false);
   }
 
-  // A ring around each curve's value at the line under the cursor.
+  /**
+   * A ring around the measured value at the line under the cursor.
+   *
+   * @param {Chart} u
+   */
   mark(u) {
     const index = this.charts.indexOf(u),
       at = this.at[this.line],
@@ -223,7 +300,7 @@ export class Bode {
     ctx.setLineDash([]);
     ctx.lineWidth = 2 * devicePixelRatio;
     const value = u.data[1][at];
-    if (Number.isFinite(value) && this.shown.has("measured")) {
+    if (value !== null && value !== undefined && Number.isFinite(value) && this.shown.has("measured")) {
       ctx.strokeStyle = colour("ink");
       ctx.beginPath();
       ctx.arc(x, u.valToPos(value, "y", true), 6.5 * devicePixelRatio, 0, 7);
@@ -233,15 +310,16 @@ export class Bode {
   }
 
   tell() {
-    const at = this.at[this.line],
-      found = {};
+    const at = this.at[this.line];
+    /** @type {Found} */
+    const found = {};
     for (const name of NAMES) {
       const curve = this.curves[name];
       if (!curve || !this.shown.has(name)) continue;
       const i = curve.frame.columns === this.grid.length && name === "model" ? at : this.line;
       found[name] = {
         db: curve.frame.magnitude[i],
-        deg: curve.frame.phase[i] + (curve.turns || 0),
+        deg: curve.frame.phase[i] + curve.turns,
         reach: curve.frame.reach[i],
         coherence: curve.frame.coherence[i],
         frame: curve.frame,

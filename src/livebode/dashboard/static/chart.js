@@ -1,14 +1,24 @@
+// @ts-check
 // Common parts of the charts: colours, letters, ticks, and ranges that do not jump.
 import uPlot from "/static/uplot/uPlot.esm.js";
 import { colour, onTheme } from "./theme.js";
 import { hertz } from "./words.js";
 
+/** @typedef {uPlot} Chart */
+/** @typedef {[low: number, high: number]} Range */
+
 const FONT = '12px system-ui, "DejaVu Sans", sans-serif';
+/** @type {Set<Chart>} */
 const charts = new Set();
 onTheme(() => {
   for (const chart of charts) chart.redraw(false, true);
 });
 
+/**
+ * @param {uPlot.Axis.Label} label
+ * @param {uPlot.Axis} more
+ * @returns {uPlot.Axis}
+ */
 export function axis(label, more = {}) {
   return {
     label,
@@ -25,7 +35,12 @@ export function axis(label, more = {}) {
   };
 }
 
-// Round frequencies on a logarithmic axis: the lines themselves if they are few, otherwise 1, 2, 5 of every decade.
+/**
+ * Round frequencies on a logarithmic axis: the lines themselves if they are few, otherwise 1, 2, 5 of every decade.
+ *
+ * @param {() => number[]} lines
+ * @returns {Extract<uPlot.Axis.Splits, Function>}
+ */
 export function frequencyTicks(lines) {
   return (u, _axis, low, high) => {
     const inside = lines().filter((f) => f >= low && f <= high);
@@ -44,6 +59,10 @@ export function frequencyTicks(lines) {
   };
 }
 
+/**
+ * @param {() => number[]} lines
+ * @param {string} label
+ */
 export const frequencyAxis = (lines, label) =>
   axis(label, {
     size: label ? 26 : 8,
@@ -53,17 +72,24 @@ export const frequencyAxis = (lines, label) =>
     values: (_u, splits) => splits.map((f) => (label ? hertz(f) : "")),
   });
 
-// A range that grows immediately and shrinks after a delay, so that the picture is steady.
+/**
+ * A range that grows immediately and shrinks after a delay, so that the picture is steady.
+ *
+ * @param {{step: number, least: number, holdMs?: number}} options
+ * @returns {(low: number, high: number) => Range}
+ */
 export function steady({ step, least, holdMs = 2500 }) {
-  let kept = null,
-    since = 0;
+  /** @type {Range | null} */
+  let kept = null;
+  let since = 0;
+  /** @type {(low: number, high: number) => Range} */
   const round = (low, high) => {
     const middle = (low + high) / 2,
       half = Math.max((high - low) * 0.54, least / 2);
     const s = half > 12 * step ? 2 * step : step;
     return [Math.floor((middle - half) / s) * s, Math.ceil((middle + half) / s) * s];
   };
-  const range = (low, high) => {
+  return (low, high) => {
     if (!(high >= low)) return kept || [-least / 2, least / 2];
     const wanted = round(low, high),
       now = performance.now();
@@ -78,22 +104,32 @@ export function steady({ step, least, holdMs = 2500 }) {
     }
     return kept;
   };
-  range.forget = () => {
-    kept = null;
-  };
-  return range;
 }
 
-// Round multiples for degrees.
-export function degreeTicks(_u, _axis, low, high, space) {
+/**
+ * Round multiples for degrees.
+ *
+ * @param {Chart} u
+ * @param {number} _axis
+ * @param {number} low
+ * @param {number} high
+ */
+export function degreeTicks(u, _axis, low, high) {
   const step =
-    [5, 10, 15, 30, 45, 90, 180, 360].find((s) => ((high - low) / s) * 26 < _u.bbox.height / devicePixelRatio) || 720;
+    [5, 10, 15, 30, 45, 90, 180, 360].find((s) => ((high - low) / s) * 26 < u.bbox.height / devicePixelRatio) || 720;
   const found = [];
   for (let d = Math.ceil(low / step) * step; d <= high + 1e-9; d += step) found.push(d);
   return found;
 }
 
-// A chart in a host element that follows its size.
+/**
+ * A chart in a host element that follows its size.
+ *
+ * @param {HTMLElement} host
+ * @param {Omit<uPlot.Options, "width" | "height">} options
+ * @param {uPlot.AlignedData} data
+ * @returns {Chart}
+ */
 export function chart(host, options, data) {
   const size = () => ({ width: Math.max(60, host.clientWidth), height: Math.max(40, host.clientHeight) });
   const made = new uPlot(

@@ -1,5 +1,8 @@
+// @ts-check
 // Times of a run: time of day in the viewer's zone if the run has a clock, otherwise the run's own time in s.
+/** @type {Intl.DateTimeFormatOptions} */
 const PLAIN = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" };
+/** @param {Intl.DateTimeFormatOptions} more */
 const format = (more) => new Intl.DateTimeFormat("en-GB", { ...PLAIN, ...more });
 const TIME = format({}),
   TENTHS = format({ fractionalSecondDigits: 1 }),
@@ -7,22 +10,35 @@ const TIME = format({}),
   DAY = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short" }), // year-month-day
   ZONE = format({ timeZoneName: "short" });
 
-let clock = []; // pairs: second of the run from which it is valid, and seconds since 1970 at second 0 of the run
+/** @typedef {[fromS: number, since1970S: number][]} Clock Second of the run from which it is valid, and seconds since 1970 at second 0 of the run. */
+/** @type {Clock} */
+let clock = [];
 
-// Whether another clock is used from here on.
+/**
+ * Whether another clock is used from here on.
+ *
+ * @param {Clock} pieces
+ */
 export function setClock(pieces) {
   const before = clock;
   clock = pieces;
   return JSON.stringify(before) !== JSON.stringify(clock);
 }
 
+/** @param {number} timeS */
 const originS = (timeS) => (clock.findLast(([fromS]) => fromS <= timeS) ?? clock[0])[1];
+/** @param {number} timeS */
 const dateOf = (timeS) => new Date(1000 * (timeS + originS(timeS)));
-const zoneOf = (date) => ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName").value;
+/** @param {Date} date */
+const zoneOf = (date) => ZONE.formatToParts(date).find(({ type }) => type === "timeZoneName")?.value ?? "";
 
-// For a sentence: "14:32:07 CEST", with its date if that is not today; `fine` with hundredths.
+/**
+ * For a sentence: "14:32:07 CEST", with its date if that is not today; `fine` with hundredths.
+ *
+ * @param {number | undefined} timeS
+ */
 export function moment(timeS, fine = false) {
-  if (!Number.isFinite(timeS)) return "–";
+  if (timeS === undefined || !Number.isFinite(timeS)) return "–";
   if (!clock.length) return seconds(timeS);
   const date = dateOf(timeS),
     day = DAY.format(date);
@@ -30,6 +46,7 @@ export function moment(timeS, fine = false) {
   return day === DAY.format(new Date()) ? words : `${day} ${words}`;
 }
 
+/** @param {number} timeS */
 function seconds(timeS) {
   const sign = timeS < 0 ? "−" : "",
     size = Math.abs(timeS);
@@ -40,12 +57,18 @@ function seconds(timeS) {
   return `${sign}${hours ? `${hours} h ` : ""}${minutes} min ${whole % 60} s`;
 }
 
-// For an axis of time, with marks that are so many seconds apart.
+/**
+ * For an axis of time, with marks that are so many seconds apart.
+ *
+ * @param {number[]} splits
+ * @param {number} stepS
+ */
 export function ticks(splits, stepS) {
   if (!clock.length) return splits.map((v) => Number(v.toFixed(6)).toString().replace("-", "−"));
   return splits.map((v) => (stepS < 0.1 ? HUNDREDTHS : stepS < 1 ? TENTHS : TIME).format(dateOf(v + 1e-6)));
 }
 
+/** @param {number} timeS */
 export function timeLabel(timeS) {
   if (!clock.length) return "time in s";
   return Number.isFinite(timeS) ? `time, ${zoneOf(dateOf(timeS))}` : "time";

@@ -1,27 +1,48 @@
+// @ts-check
 // Buttons, tabs, downloads and keys.
 import { moment } from "./clock.js";
 import { Menu, numbers, picture } from "./download.js";
 import { keys } from "./keys.js";
-import { choose, element, segments } from "./make.js";
+import { reason } from "./link.js";
+import { byId as $, choose, element, segments } from "./make.js";
 import { nextTheme } from "./theme.js";
 
-const $ = (id) => document.getElementById(id);
+/** @import { Page, Quantity } from "./messages.js" */
+
+/** @type {[value: string, text: string][]} */
 const TABS = [
   ["map", "Map"],
   ["parameters", "Parameters"],
   ["margins", "Margins"],
 ];
+/** @type {[value: string, text: string][]} */
 const SPANS = [
   ["20", "20 s"],
   ["120", "2 min"],
   ["whole", "all"],
 ];
 
+/**
+ * @param {Page} page
+ * @param {object} parts
+ * @param {import("./bode.js").Bode} parts.bode
+ * @param {import("./tracking.js").Tracking} parts.tracking
+ * @param {import("./map.js").LineMap} parts.map
+ * @param {import("./timeline.js").Timeline} parts.timeline
+ * @param {object} actions
+ * @param {(quantity: Quantity, why?: string) => void} actions.watch
+ * @param {() => void} actions.freeze
+ * @param {() => void} actions.fill
+ * @param {() => void} actions.say
+ * @param {() => void} actions.clear
+ * @param {(text: string) => void} actions.complain
+ */
 export function controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain }) {
+  /** @param {string} name */
   function tab(name) {
     page.tab = name;
     for (const [value] of TABS) $(`pane-${value}`).hidden = value !== name;
-    for (const button of $("tabs").children) {
+    for (const button of $("tabs").querySelectorAll("button")) {
       const on = button.dataset.value === name;
       button.setAttribute("aria-selected", String(on));
       button.tabIndex = on ? 0 : -1;
@@ -47,6 +68,13 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
       ),
     ),
   );
+  /**
+   * @template {string} V
+   * @param {string} id
+   * @param {[value: V, text: string][]} choices
+   * @param {V} chosen
+   * @param {(value: V) => void} act
+   */
   const option = (id, choices, chosen, act) =>
     segments(
       $(id),
@@ -102,16 +130,26 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   );
   tab("map");
 
-  const stem = () => `${page.facts.name}-${page.quantity.replace(" ", "-")}`;
+  const title = () => page.facts?.name ?? "";
+  const stem = () => `${title()}-${page.quantity?.replace(" ", "-")}`;
+  /**
+   * @param {"csv" | "mat"} format
+   * @param {boolean} whole
+   */
   const query = (format, whole) => {
     const at = bode.curves.measured?.frame.timeS[0] ?? timeline.span.last_s;
     const [from, to] = whole ? [tracking.fromS, tracking.toS] : [at, at];
     return { axis: page.axis, quantity: page.quantity, format, from, to };
   };
-  const ready = (act) => () => (page.facts.begun ? act() : complain("The run has not started."));
+  /** @param {() => void} act */
+  const ready = (act) => () => (page.facts?.begun ? act() : complain("The run has not started."));
+  /**
+   * @param {"csv" | "mat"} format
+   * @param {boolean} whole
+   */
   const get = (format, whole) =>
     numbers(query(format, whole), `${stem()}${whole ? "-span" : ""}.${format}`).catch((error) =>
-      complain(error.message),
+      complain(reason(error)),
     );
   const menu = new Menu($("download"), $("download-menu"), [
     [
@@ -119,7 +157,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
       ready(() =>
         picture(
           `${stem()}.png`,
-          `${page.facts.name}: ${page.quantity}`,
+          `${title()}: ${page.quantity}`,
           `at ${moment(bode.curves.measured?.frame.timeS[0], true)}, bands are ±3σ`,
           bode.charts,
         ),
@@ -130,8 +168,9 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     ["all responses in the time span as CSV", ready(() => get("csv", true))],
     ["all responses in the time span as .mat", ready(() => get("mat", true))],
   ]);
-  $("axis").addEventListener("change", () => {
-    page.axis = page.wanted = Number($("axis").value);
+  const axis = $("axis", HTMLSelectElement);
+  axis.addEventListener("change", () => {
+    page.axis = page.wanted = Number(axis.value);
     page.quantity = null;
     if (page.frozen) freeze();
     timeline.atS = null;
@@ -140,16 +179,18 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   });
   $("freeze").addEventListener("click", freeze);
   $("theme").addEventListener("click", nextTheme);
-  $("help").addEventListener("click", () => $("keys").showModal());
+  const help = $("keys", HTMLDialogElement);
+  $("help").addEventListener("click", () => help.showModal());
+  /** @param {number} i */
   const nth = (i) => () => {
-    const q = page.facts?.quantities?.[i];
+    const q = page.facts?.begun && page.facts.quantities[i];
     if (q) watch(q.name, q.why_not);
   };
   keys(
-    $("keys"),
+    help,
     $("keys-list"),
     [
-      [["?"], "this help", () => $("keys").showModal()],
+      [["?"], "this help", () => help.showModal()],
       [[" "], "pause or resume", () => timeline.toggle()],
       [["←", "→"], "move the cursor to the next line", null],
       [[",", "."], "0.1 s backward or forward in the record", null],

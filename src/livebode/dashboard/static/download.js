@@ -1,22 +1,35 @@
+// @ts-check
 // Downloads: the picture from the canvases, the exact numbers from the server.
+import { address } from "./link.js";
 import { element } from "./make.js";
-import { colour } from "./theme.js";
+import { colour, drawing } from "./theme.js";
 
+/**
+ * @param {string} name
+ * @param {Blob} blob
+ */
 function save(name, blob) {
   const link = element("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// The displayed Bode plot with a title, as a PNG.
-export async function picture(name, title, words, charts) {
+/**
+ * The displayed Bode plot with a title, as a PNG.
+ *
+ * @param {string} name
+ * @param {string} title
+ * @param {string} words
+ * @param {import("./chart.js").Chart[]} charts
+ */
+export function picture(name, title, words, charts) {
   const ratio = devicePixelRatio,
     head = 54 * ratio;
   const canvases = charts.map((made) => made.ctx.canvas);
   const sheet = element("canvas");
   sheet.width = Math.max(...canvases.map((c) => c.width));
   sheet.height = head + canvases.reduce((sum, c) => sum + c.height, 0);
-  const ctx = sheet.getContext("2d");
+  const ctx = drawing(sheet);
   ctx.fillStyle = colour("paper");
   ctx.fillRect(0, 0, sheet.width, sheet.height);
   ctx.fillStyle = colour("ink");
@@ -30,53 +43,56 @@ export async function picture(name, title, words, charts) {
     ctx.drawImage(canvas, 0, top);
     top += canvas.height;
   }
-  save(name, await new Promise((done) => sheet.toBlob(done, "image/png")));
+  sheet.toBlob((blob) => blob && save(name, blob), "image/png");
 }
 
+/**
+ * @param {import("./link.js").Query} query
+ * @param {string} name
+ */
 export async function numbers(query, name) {
-  const answer = await fetch(`/api/export?${new URLSearchParams(query)}`);
+  const answer = await fetch(address("/api/export", query));
   if (!answer.ok) throw new Error((await answer.json()).error);
   save(name, await answer.blob());
 }
 
 export class Menu {
+  /**
+   * @param {HTMLElement} button
+   * @param {HTMLElement} menu
+   * @param {[text: string, act: () => void][]} items
+   */
   constructor(button, menu, items) {
-    Object.assign(this, { button, menu });
-    menu.replaceChildren(
-      ...items.map(([text, act]) =>
-        element(
-          "button",
-          {
-            type: "button",
-            role: "menuitem",
-            onclick: () => {
-              this.show(false);
-              act();
-            },
-          },
-          text,
-        ),
-      ),
-    );
-    button.addEventListener("click", () => this.show(menu.hidden));
+    this.button = button;
+    this.menu = menu;
+    this.items = items.map(([text, act]) => {
+      const onclick = () => {
+        this.show(false);
+        act();
+      };
+      return element("button", { type: "button", role: "menuitem", onclick }, text);
+    });
+    menu.replaceChildren(...this.items);
+    button.addEventListener("click", () => this.show(Boolean(menu.hidden)));
     document.addEventListener("click", (event) => {
-      if (!button.parentElement.contains(event.target)) this.show(false, false);
+      if (!(event.target instanceof Node && button.parentElement?.contains(event.target))) this.show(false, false);
     });
     menu.addEventListener("keydown", (event) => {
-      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key],
-        all = [...menu.children];
+      const step = event.key === "ArrowDown" ? 1 : event.key === "ArrowUp" ? -1 : 0;
       if (event.key === "Escape") this.show(false);
       if (!step) return;
       event.preventDefault();
-      all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
+      const at = this.items.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement)) + step;
+      this.items[(at + this.items.length) % this.items.length].focus();
     });
   }
 
+  /** @param {boolean} open */
   show(open, back = true) {
     if (this.menu.hidden === !open) return;
     this.menu.hidden = !open;
     this.button.setAttribute("aria-expanded", String(open));
-    if (open) this.menu.firstChild.focus();
+    if (open) this.items[0].focus();
     else if (back) this.button.focus();
   }
 }

@@ -1,7 +1,11 @@
+// @ts-check
 // Events, one row for each cause, newest first; alarms can be acknowledged.
-import { element } from "./make.js";
-import { post } from "./link.js";
+
 import { moment } from "./clock.js";
+import { post, reason } from "./link.js";
+import { element } from "./make.js";
+
+/** @import { Notice } from "./messages.js" */
 
 const ALARMS = new Set([
   "change",
@@ -27,8 +31,24 @@ const ALARMS = new Set([
 const SHOWN_MAX = 300;
 
 export class Events {
+  /**
+   * @param {HTMLElement} host
+   * @param {HTMLInputElement} only
+   * @param {HTMLElement} count
+   * @param {(text: string) => void} onError
+   */
   constructor(host, only, count, onError) {
-    Object.assign(this, { host, only, count, onError, all: new Map(), waiting: new Set(), open: 0 });
+    this.host = host;
+    this.only = only;
+    this.count = count;
+    this.onError = onError;
+    this.axis = 0;
+    this.may = false;
+    /** @type {Map<string, Notice>} */
+    this.all = new Map();
+    /** @type {Set<string>} causes whose acknowledgement is on its way */
+    this.waiting = new Set();
+    this.open = 0;
     only.addEventListener("change", () => this.draw());
     count.addEventListener("click", () => {
       only.checked = true;
@@ -38,6 +58,10 @@ export class Events {
     });
   }
 
+  /**
+   * @param {number} axis
+   * @param {boolean} may whether this person may acknowledge
+   */
   begin(axis, may) {
     this.axis = axis;
     this.may = may;
@@ -45,6 +69,7 @@ export class Events {
     this.draw();
   }
 
+  /** @param {Notice[]} list */
   take(list) {
     for (const notice of list) {
       this.all.delete(notice.cause); // the newest goes to the end
@@ -55,25 +80,34 @@ export class Events {
   }
 
   draw() {
-    const list = [...this.all.values()].sort((a, b) => b.last_s - a.last_s),
-      alarm = (n) => n.kinds.some((kind) => ALARMS.has(kind));
+    const list = [...this.all.values()].sort((a, b) => b.last_s - a.last_s);
+    /** @param {Notice} n */
+    const alarm = (n) => n.kinds.some((kind) => ALARMS.has(kind));
     const open = list.filter((n) => alarm(n) && n.seen < n.count).length;
     this.open = open;
     this.count.hidden = !open;
     this.count.textContent = `⚠ ${open} ${open === 1 ? "alarm" : "alarms"}`;
     const shown = list.filter((n) => !this.only.checked || alarm(n)).slice(0, SHOWN_MAX);
-    const kept = document.activeElement?.dataset?.event;
+    const kept = document.activeElement?.getAttribute("data-event");
     this.host.replaceChildren(
       ...(shown.length
         ? shown.map((n) => this.item(n, alarm(n)))
         : [element("li", {}, element("p", {}, this.only.checked ? "no alarms" : "no events yet"))]),
     );
-    if (kept) (this.host.querySelector(`[data-event="${CSS.escape(kept)}"]`) || this.host).focus();
+    if (!kept) return;
+    /** @type {HTMLElement | null} */
+    const again = this.host.querySelector(`[data-event="${CSS.escape(kept)}"]`);
+    (again ?? this.host).focus();
   }
 
+  /**
+   * @param {Notice} notice
+   * @param {boolean} alarm
+   */
   item(notice, alarm) {
     const { id, cause, kind, first_s: firstS, last_s: lastS, message, count, seen } = notice;
     const open = seen < count;
+    /** @type {HTMLElement} */
     let act = element("span", {}, open ? "" : "✓ acknowledged");
     if (open && this.may && alarm) {
       act = element(
@@ -104,7 +138,12 @@ export class Events {
     );
   }
 
-  // All of a cause up to the event that is shown.
+  /**
+   * All of a cause up to the event that is shown.
+   *
+   * @param {string} cause
+   * @param {string} event
+   */
   async acknowledge(cause, event) {
     this.waiting.add(cause);
     this.draw();
@@ -112,7 +151,7 @@ export class Events {
       await post("/api/acknowledge", { axis: this.axis, event });
     } catch (error) {
       this.waiting.delete(cause);
-      this.onError(error.message);
+      this.onError(reason(error));
       this.draw();
     }
   }

@@ -1,13 +1,25 @@
+// @ts-check
 // Frames from the server as typed arrays; frames.py documents the layout.
-const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history"];
-export const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
 
-// All frames of a message, in order.
+/** @import { Frame, FrameKind, Quantity } from "./messages.js" */
+
+/** @type {FrameKind[]} */
+const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history"];
+/** @type {Quantity[]} */
+const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
+
+/**
+ * All frames of a message, in order.
+ *
+ * @param {ArrayBuffer} buffer
+ * @returns {Generator<Frame, void>}
+ */
 export function* framesOf(buffer) {
   const view = new DataView(buffer);
   let at = 0;
   while (at + 16 <= buffer.byteLength) {
-    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1) throw new Error("this is not a frame of curves");
+    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 1)
+      throw new Error("this is not a frame of curves");
     const rows = view.getUint32(at + 8, true),
       columns = view.getUint32(at + 12, true),
       cells = rows * columns;
@@ -17,7 +29,12 @@ export function* framesOf(buffer) {
       next += 8 * rows;
       return a;
     };
-    const frame = {
+    const floats = () => {
+      const a = new Float32Array(buffer, next, cells);
+      next += 4 * cells;
+      return a;
+    };
+    yield {
       kind: KINDS[view.getUint8(at + 5)],
       quantity: QUANTITIES[view.getUint8(at + 6)],
       axis: view.getUint8(at + 7),
@@ -26,22 +43,32 @@ export function* framesOf(buffer) {
       timeS: doubles(),
       schedule: doubles(),
       dof: doubles(),
+      magnitude: floats(),
+      phase: floats(),
+      reach: floats(),
+      coherence: floats(),
     };
-    const floats = () => {
-      const a = new Float32Array(buffer, next, cells);
-      next += 4 * cells;
-      return a;
-    };
-    Object.assign(frame, { magnitude: floats(), phase: floats(), reach: floats(), coherence: floats() });
-    yield frame;
     at = (next + 7) & ~7;
   }
 }
 
 // Edges of the band of ±3σ around a magnitude in dB or a phase in degrees; see frames.py.
 const FLOOR_DB = -1000;
+/**
+ * @param {number} db
+ * @param {number} reach
+ */
 export const lowDb = (db, reach) => (reach < 1 ? db + 20 * Math.log10(1 - reach) : reach >= 1 ? FLOOR_DB : NaN);
+/**
+ * @param {number} db
+ * @param {number} reach
+ */
 export const highDb = (db, reach) => db + 20 * Math.log10(1 + reach);
+/** @param {number} reach */
 export const halfDeg = (reach) => (reach < 1 ? (180 / Math.PI) * Math.asin(reach) : reach >= 1 ? 180 : NaN);
-// The probability that the band covers the true value: |error|²/σ² follows F(2, 2·dof).
+/**
+ * The probability that the band covers the true value: |error|²/σ² follows F(2, 2·dof).
+ *
+ * @param {number} dof
+ */
 export const holds = (dof) => (Number.isFinite(dof) ? 1 - (1 + 9 / dof) ** -dof : 1 - Math.exp(-9));

@@ -1,21 +1,36 @@
+// @ts-check
 // State of the source and of the tracking, in one line.
 import { element } from "./make.js";
 import { plain } from "./words.js";
 
+/** @import { Health, Run } from "./messages.js" */
+/** @typedef {[name: string, value: string, bad: boolean, title: string]} Tile */
+
+/** @param {number} n */
 const whole = (n) => (Number.isFinite(n) ? Math.round(n).toLocaleString("en-GB").replaceAll(",", " ") : "–");
+/** @param {number | null | undefined} v */
 const ms = (v) => (v === null || v === undefined ? "–" : `${v < 10 ? v.toFixed(1) : Math.round(v)} ms`);
 
-export function health(host, found, facts, span) {
-  const { source, counts } = found,
-    live = span.live,
-    tiles = [];
+/**
+ * @param {Health} found
+ * @param {Run} facts
+ * @param {boolean} live
+ */
+function tilesOf(found, facts, live) {
+  const { source, counts } = found;
+  /** @type {Tile[]} */
+  const tiles = [];
+  /**
+   * @param {string} name
+   * @param {string} value
+   */
   const tile = (name, value, bad = false, title = "") => tiles.push([name, value, bad, title]);
   if (live && source) tile("source", source.connected ? "connected" : "not connected", !source.connected);
   const measured = source?.measured_hz;
   tile(
     "rate",
     `${plain(facts.rate_hz, 6)} Hz${measured ? `, measured ${plain(measured, 5)} Hz` : ""}`,
-    measured && Math.abs(measured / facts.rate_hz - 1) > 0.02,
+    Boolean(measured && Math.abs(measured / facts.rate_hz - 1) > 0.02),
     "samples per second",
   );
   if (live) tile("responses", found.responses_per_s === null ? "–" : `${plain(found.responses_per_s, 3)} per s`);
@@ -30,7 +45,7 @@ export function health(host, found, facts, span) {
       tile(
         "silent",
         source.silent_s === null ? "–" : ms(1000 * source.silent_s),
-        found.stale,
+        Boolean(found.stale),
         "time since the last batch",
       );
       if (source.latency_s !== null)
@@ -40,7 +55,7 @@ export function health(host, found, facts, span) {
         tile("backlog", `${source.waiting_s.toFixed(1)} s`, source.waiting_s > 2, "received, but not yet tracked");
     }
   }
-  if (found.behind_ms !== undefined)
+  if (found.behind_p99_ms !== undefined)
     tile("arrival to response", `${ms(found.behind_ms)}, p99 ${ms(found.behind_p99_ms)}`, found.behind_p99_ms > 1000);
   if (found.given_up)
     tile(
@@ -51,12 +66,24 @@ export function health(host, found, facts, span) {
     );
   if (found.refused) tile("wrong tokens", whole(found.refused), true);
   tile("window", `${whole(facts.window)} samples, ${plain((1000 * facts.window) / facts.rate_hz, 4)} ms`);
+  return tiles;
+}
+
+/**
+ * @param {HTMLElement} host
+ * @param {Health} found
+ * @param {Run} facts
+ * @param {{live: boolean}} span
+ */
+export function health(host, found, facts, { live }) {
+  const tiles = tilesOf(found, facts, live);
   if (host.children.length !== tiles.length)
     host.replaceChildren(...tiles.map(() => element("div", {}, "", element("b"))));
-  tiles.forEach(([name, value, bad, title], i) => {
-    const made = host.children[i];
-    made.firstChild.textContent = name;
-    made.lastChild.textContent = `${value}${bad ? " ⚠" : ""}`;
+  host.querySelectorAll("div").forEach((made, i) => {
+    const [name, value, bad, title] = tiles[i],
+      [label, number] = made.childNodes;
+    label.textContent = name;
+    number.textContent = `${value}${bad ? " ⚠" : ""}`;
     made.className = bad ? "bad" : "";
     made.title = title;
   });

@@ -1,8 +1,20 @@
+// @ts-check
 // The keyboard and its help.
 import { element } from "./make.js";
 
-// Whether the element with the focus uses a key itself.
-function uses({ tagName, type }, key) {
+/** @typedef {() => void} Act */
+/** @typedef {[keys: string[], words: string, act: Act | null]} Action Without `act`, each key has its own. */
+
+/**
+ * Whether the element with the focus uses a key itself.
+ *
+ * @param {EventTarget | null} focus
+ * @param {string} key
+ */
+function uses(focus, key) {
+  if (!(focus instanceof Element)) return false;
+  const { tagName } = focus,
+    type = focus.getAttribute("type");
   if (tagName === "INPUT" && type === "range") return key.startsWith("Arrow");
   if (tagName === "INPUT" && type === "checkbox") return key === " ";
   if (tagName === "BUTTON" || tagName === "SUMMARY") return key === " " || key === "Enter";
@@ -10,7 +22,12 @@ function uses({ tagName, type }, key) {
   return tagName === "INPUT" || tagName === "SELECT";
 }
 
-// `actions` are [keys, words, act]; `each` has the action of a key that shares its words with others.
+/**
+ * @param {HTMLDialogElement} dialog
+ * @param {HTMLElement} list
+ * @param {Action[]} actions
+ * @param {Record<string, Act>} each the action of a key that shares its words with others
+ */
 export function keys(dialog, list, actions, each) {
   list.replaceChildren(
     ...actions.flatMap(([names, words]) => [
@@ -18,6 +35,7 @@ export function keys(dialog, list, actions, each) {
       element("dd", {}, words),
     ]),
   );
+  /** @type {Record<string, string>} */
   const real = { "←": "ArrowLeft", "→": "ArrowRight" };
   const known = new Map(
     actions.flatMap(([names, , act]) => names.map((name) => [real[name] || name, act || each[name]])),

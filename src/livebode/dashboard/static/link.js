@@ -1,58 +1,101 @@
+// @ts-check
 // The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
 import { framesOf } from "./frames.js";
+
+/** @import { Frame, News, Wish } from "./messages.js" */
 
 const PAUSE_MS_MAX = 8000;
 
 export class Link {
+  /**
+   * @param {object} listeners
+   * @param {(news: News) => void} listeners.onNews
+   * @param {(frame: Frame) => void} listeners.onFrame
+   * @param {(up: boolean) => void} listeners.onState
+   */
   constructor({ onNews, onFrame, onState }) {
-    Object.assign(this, { onNews, onFrame, onState });
-    this.wishes = new Map(); // requests to repeat after a reconnection, by kind
+    this.onNews = onNews;
+    this.onFrame = onFrame;
+    this.onState = onState;
+    /** @type {Map<string, Wish>} requests to repeat after a reconnection, by kind */
+    this.wishes = new Map();
     this.pauseMs = 250;
-    this.connect();
+    this.socket = this.connect();
   }
 
   connect() {
-    this.socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onopen = () => {
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
       this.pauseMs = 250;
-      for (const wish of this.wishes.values()) this.socket.send(JSON.stringify(wish));
+      for (const wish of this.wishes.values()) socket.send(JSON.stringify(wish));
       this.onState(true);
     };
-    this.socket.onmessage = ({ data }) => {
+    socket.onmessage = ({ data }) => {
       if (typeof data === "string") this.onNews(JSON.parse(data));
       else for (const frame of framesOf(data)) this.onFrame(frame);
     };
-    this.socket.onclose = (event) => {
+    socket.onclose = (event) => {
       this.onState(false);
       if (event.code === 1008) {
         location.reload();
         return;
       }
       if (event.code === 4000) this.pauseMs = PAUSE_MS_MAX; // another browser has this place
-      setTimeout(() => this.connect(), this.pauseMs);
+      setTimeout(() => {
+        this.socket = this.connect();
+      }, this.pauseMs);
       this.pauseMs = Math.min(2 * this.pauseMs, PAUSE_MS_MAX);
     };
+    return socket;
   }
 
-  // `keep` is the name under which the request is repeated after a reconnection; a later one of this name replaces it.
+  /**
+   * @param {Wish} wish
+   * @param {string} [keep] name under which the request is repeated after a reconnection; a later one replaces it
+   */
   wish(wish, keep) {
     if (keep) this.wishes.set(keep, wish);
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(wish));
   }
 
+  /** @param {string} keep */
   forget(keep) {
     this.wishes.delete(keep);
   }
 }
 
+/** @typedef {Record<string, string | number | null>} Query */
+
+/**
+ * @param {string} path
+ * @param {Query} query
+ */
+export const address = (path, query) =>
+  `${path}?${new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]))}`;
+
+/**
+ * @param {string} path
+ * @param {Query} query
+ */
 export async function ask(path, query) {
-  const answer = await fetch(`${path}?${new URLSearchParams(query)}`);
+  const answer = await fetch(address(path, query));
   if (answer.status === 401) location.reload();
   if (!answer.ok) throw new Error((await answer.json()).error);
   return answer.arrayBuffer();
 }
 
+/**
+ * What a person reads of an error.
+ *
+ * @param {unknown} error
+ */
+export const reason = (error) => (error instanceof Error ? error.message : String(error));
+
+/**
+ * @param {string} path
+ * @param {object} body
+ */
 export async function post(path, body) {
   const answer = await fetch(path, {
     method: "POST",

@@ -1,12 +1,12 @@
+// @ts-check
 // The token is sent once, in the body of a POST; the answer is a cookie that scripts cannot read.
+import { byId } from "./make.js";
 import { applyTheme } from "./theme.js";
 
 applyTheme();
-const form = document.getElementById("form"),
-  wrong = document.getElementById("wrong");
-form.addEventListener("submit", async (event) => {
+const token = byId("token", HTMLInputElement);
+byId("form").addEventListener("submit", async (event) => {
   event.preventDefault();
-  const token = document.getElementById("token");
   const answer = await fetch("/login", {
     method: "POST",
     headers: { "content-type": "application/json" },
@@ -14,5 +14,5 @@ form.addEventListener("submit", async (event) => {
   }).catch(() => null);
   token.value = "";
   if (answer?.ok) location.replace("/");
-  else wrong.textContent = answer ? (await answer.json()).error : "The server does not answer.";
+  else byId("wrong").textContent = answer ? (await answer.json()).error : "The server does not answer.";
 });

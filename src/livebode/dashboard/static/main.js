@@ -1,12 +1,12 @@
+// @ts-check
 // The page: messages from the server go to the panels, actions of the person go to the server.
 import { Bode } from "./bode.js";
 import { setClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
-import { REFERENCE_GONE, freezing } from "./freezing.js";
 import { health } from "./health.js";
 import { Link } from "./link.js";
-import { choose, element, segments } from "./make.js";
+import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { Margins } from "./margins.js";
 import { past } from "./past.js";
@@ -19,10 +19,13 @@ import { Trends } from "./trends.js";
 import { lamp, verdict } from "./verdict.js";
 import { named } from "./words.js";
 
-const $ = (id) => document.getElementById(id);
+/** @import { Beginning, Curves, Page, Quantity, Run } from "./messages.js" */
+
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
+const REFERENCE_GONE = "A new run with other lines or another quantity has started: the frozen reference was released.";
+/** @type {[name: Curves, words: string, line: string][]} */
 const LEGEND = [
   ["measured", "measured ±3σ", ""],
   ["reference", "reference", "dashed"],
@@ -31,25 +34,53 @@ const LEGEND = [
 ];
 
 applyTheme();
-const page = { axis: 0, quantity: null, spanS: "20", dirty: new Set(), last: {}, tab: "map" };
+/** @type {Page} */
+const page = {
+  axis: 0,
+  quantity: null,
+  spanS: "20",
+  tab: "map",
+  up: false,
+  facts: null,
+  health: null,
+  schedule: { name: "", unit: "" },
+  frozen: false,
+  rows: new Rows(1),
+  past: null,
+  seen: null,
+  read: null,
+  dirty: new Set(),
+  last: {},
+  key: null,
+  measured: null,
+  seeking: false,
+};
+const axisChoice = $("axis", HTMLSelectElement);
 const bode = new Bode([$("magnitude"), $("phase"), $("coherence")], (hz, found) => {
   page.read = [hz, found];
   page.dirty.add("read");
 });
 const tracking = new Tracking($("tracking"), $("tracking-lines"), (timeS) => timeline.go(timeS));
-const map = new LineMap($("map"), $("map-hover"));
+const map = new LineMap($("map", HTMLCanvasElement), $("map-hover"));
 const parameters = new Trends(
   $("pane-parameters"),
   (t) => t.model !== "margins",
   "No model is fitted: add [fit] to the configuration.",
 );
 const margins = new Margins($("pane-margins"));
-const events = new Events($("events"), $("alarms-only"), $("alarm-count"), (text) => complain(text));
+const events = new Events($("events"), $("alarms-only", HTMLInputElement), $("alarm-count"), (text) => complain(text));
 const timeline = new Timeline(
-  { slider: $("time"), pause: $("pause"), from: $("time-from"), to: $("time-to"), now: $("time-now") },
+  {
+    slider: $("time", HTMLInputElement),
+    pause: $("pause"),
+    from: $("time-from"),
+    to: $("time-to"),
+    now: $("time-now"),
+  },
   { onMoment: (timeS) => showMoment(timeS), onLive: () => goLive() },
 );
 
+/** @param {string} text */
 function complain(text) {
   $("notice").textContent = text;
   $("notice").hidden = !text;
@@ -62,13 +93,14 @@ function complain(text) {
 const link = new Link({
   onState: (up) => {
     page.up = up;
-    if (!up) page.facts && status();
+    if (!up) status();
   },
   onNews: (news) => {
-    if (news.facts && overtaken(news)) return;
+    const beginning = news.facts ? news : null;
+    if (beginning && overtaken(beginning)) return;
     if (news.error) complain(news.error);
     if (news.span && setClock(news.span.clock)) newClock();
-    if (news.facts) begin(news);
+    if (beginning) begin(beginning);
     if (news.span) timeline.take(news.span);
     if (news.health && page.facts?.begun) {
       page.health = news.health;
@@ -84,7 +116,7 @@ const link = new Link({
       }
       page.dirty.add("trends");
     }
-    if (page.facts) status();
+    status();
   },
   onFrame: (frame) => {
     if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
@@ -99,20 +131,28 @@ const link = new Link({
   },
 });
 
-// An answer to an earlier request; it would undo the choice of another axis.
-const overtaken = ({ facts, axes }) => page.wanted < axes.length && facts.axis !== (page.wanted ?? facts.axis);
+/**
+ * An answer to an earlier request; it would undo the choice of another axis.
+ *
+ * @param {Beginning} news
+ */
+const overtaken = ({ facts, axes }) =>
+  page.wanted !== undefined && page.wanted < axes.length && facts.axis !== page.wanted;
 
-// The axis or its quantity has changed, the run has started, or the link is new.
+/**
+ * The axis or its quantity has changed, the run has started, or the link is new.
+ *
+ * @param {Beginning} news
+ */
 function begin({ facts, axes, trends }) {
   page.facts = facts;
   $("axis-label").hidden = axes.length < 2;
-  if ($("axis").children.length !== axes.length)
-    $("axis").replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
+  if (axisChoice.options.length !== axes.length)
+    axisChoice.replaceChildren(...axes.map((name, i) => element("option", { value: i }, name)));
   if (!facts.begun) {
     page.axis = facts.axis;
     document.title = `${facts.name} · livebode`;
     clear();
-    events.begin(facts.axis, false);
     return;
   }
   const measured = JSON.stringify([facts.frequency_hz, facts.quantity]);
@@ -135,7 +175,7 @@ function begin({ facts, axes, trends }) {
     page.key = key;
     page.rows = new Rows(facts.frequency_hz.length);
     page.past = null;
-    bode.begin(facts, shown.unit, shown.symbol);
+    bode.begin(facts, shown?.unit ?? "", shown?.symbol ?? "");
     tracking.begin(facts, page.schedule);
     map.begin(facts, page.schedule);
     fill();
@@ -155,8 +195,9 @@ function begin({ facts, axes, trends }) {
 // Another axis was chosen, whose machine may not have sent anything: clear the page.
 function clear() {
   Object.assign(page, { key: null, measured: null, past: null, seen: null, read: null, health: null });
-  if (page.facts) page.facts = { ...page.facts, begun: false, name: $("axis").selectedOptions[0]?.text ?? page.facts.name };
-  page.rows?.clear();
+  if (page.facts)
+    page.facts = { ...page.facts, begun: false, name: axisChoice.selectedOptions[0]?.text ?? page.facts.name };
+  page.rows.clear();
   for (const panel of [bode, tracking, map]) panel.clear();
   for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
   parameters.begin([]);
@@ -173,13 +214,18 @@ function newClock() {
   for (const what of ["bode", "rows", "trends"]) page.dirty.add(what);
 }
 
+/** @param {Run} facts */
 const whyNoMargins = (facts) =>
-  facts.quantities.find((q) => q.name === "open loop").why_not
+  facts.quantities.find((q) => q.name === "open loop")?.why_not
     ? "Margins need the loop: describe its controllers under [loop]."
     : "Margins need a fitted model: add [fit] to the configuration.";
 
 const say = () => link.wish({ kind: "watch", axis: page.axis, quantity: page.quantity }, "watch");
 
+/**
+ * @param {Quantity} quantity
+ * @param {string} [why] it cannot be shown
+ */
 function watch(quantity, why) {
   if (why) {
     complain(`${quantity}: ${why}`);
@@ -193,14 +239,24 @@ function watch(quantity, why) {
 }
 
 function status() {
-  const [word, look] = lamp(page, timeline.span, timeline.atS !== null);
+  const { up, facts, health } = page;
+  if (!facts) return;
+  const known = { up, facts, health };
+  const [word, look] = lamp(known, timeline.span, timeline.atS !== null);
   $("lamp").className = `lamp ${look}`;
-  $("status-text").textContent = `${page.facts.name} · ${word}`;
-  const [judged, tone, why] = verdict(page, events.open, look);
+  $("status-text").textContent = `${facts.name} · ${word}`;
+  const [judged, tone, why] = verdict(known, events.open, look);
   Object.assign($("verdict"), { textContent: judged, className: `verdict ${tone}`, title: why, hidden: false });
 }
 
 function legend() {
+  const { facts } = page;
+  const hidden = {
+    measured: false,
+    reference: !page.frozen,
+    baseline: !(facts?.begun && facts.baseline),
+    model: !(facts?.begun && facts.model),
+  };
   $("legend").replaceChildren(
     ...LEGEND.map(([name, words, line]) => {
       const swatch = element("span", { class: `swatch ${line}`, "aria-hidden": "true" });
@@ -219,27 +275,54 @@ function legend() {
         swatch,
         words,
       );
-      made.hidden =
-        name === "reference"
-          ? !page.frozen
-          : name === "baseline"
-            ? !page.facts.baseline
-            : name === "model"
-              ? !page.facts.model
-              : false;
+      made.hidden = hidden[name];
       return made;
     }),
   );
 }
 
+// Freeze the response that is shown as a reference, or release the frozen one.
+function freeze() {
+  if (page.frozen) {
+    letGo();
+    return;
+  }
+  const timeS = bode.curves.measured?.frame.timeS[0];
+  if (timeS === undefined) return;
+  link.wish({ kind: "freeze", time_s: timeS }, "freeze");
+  frozen(true);
+}
+
+function letGo() {
+  link.forget("freeze");
+  link.wish({ kind: "unfreeze" });
+  bode.drop("reference");
+  page.dirty.add("bode");
+  frozen(false);
+}
+
+/** @param {boolean} is */
+function frozen(is) {
+  page.frozen = is;
+  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
+  $("freeze").classList.toggle("primary", is);
+  legend();
+}
+
+/** @param {number} now */
 function draw(now) {
   requestAnimationFrame(draw);
   if (!page.facts?.begun || !bode.charts.length) return;
-  const due = (what, ms) =>
-    page.dirty.has(what) &&
-    now - (page.last[what] ?? -1e9) >= ms &&
-    page.dirty.delete(what) &&
-    ((page.last[what] = now), true);
+  /**
+   * @param {string} what
+   * @param {number} ms
+   */
+  const due = (what, ms) => {
+    if (!page.dirty.has(what) || now - (page.last[what] ?? -1e9) < ms) return false;
+    page.dirty.delete(what);
+    page.last[what] = now;
+    return true;
+  };
   if (due("bode", 0)) bode.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule);
   if (due("rows", TRACK_MS)) drawRows(now);
@@ -250,12 +333,7 @@ function draw(now) {
   }
 }
 
-const { fill, showMoment, goLive, drawRows } = past(
-  page,
-  { bode, tracking, map, timeline, link },
-  { complain, status },
-);
-const { freeze, letGo } = freezing(page, { bode, link }, $("freeze"), legend);
+const { fill, showMoment, goLive, drawRows } = past(page, { bode, tracking, timeline, link }, { complain, status });
 controls(page, { bode, tracking, map, timeline }, { watch, freeze, fill, say, clear, complain });
 window.livebode = { page, bode, tracking, map, parameters, margins, events, timeline };
 requestAnimationFrame(draw);

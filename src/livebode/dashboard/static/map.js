@@ -1,10 +1,41 @@
+// @ts-check
 // Position × frequency (time × frequency at standstill): the level, or its change from the median of the place.
 import { moment, ticks, timeLabel } from "./clock.js";
-import { onTheme, colour } from "./theme.js";
+import { between } from "./rows.js";
+import { colour, drawing, onTheme } from "./theme.js";
 import { hertz, signed } from "./words.js";
 
+/** @import { History, Named } from "./messages.js" */
+/** @typedef {[red: number, green: number, blue: number]} Colour */
+
+/**
+ * Values by column and line, and where the columns are: from `low` in steps, in s or in the unit of the schedule.
+ *
+ * @typedef {object} Cells
+ * @property {number[][]} level
+ * @property {number[][]} change
+ * @property {number} low
+ * @property {number} step
+ * @property {number} columns
+ * @property {boolean} moving
+ */
+
+/**
+ * @typedef {object} Scales
+ * @property {Cells} cells
+ * @property {number} low
+ * @property {number} high
+ * @property {Colour[]} stops
+ * @property {(log: number) => number} yOf
+ * @property {boolean} change
+ */
+
 const CELLS = 56;
-// Cividis (Nuñez, Anderton, Renslow 2018), which looks the same with any colour vision; blue to orange for a change.
+/**
+ * Cividis (Nuñez, Anderton, Renslow 2018), which looks the same with any colour vision.
+ *
+ * @type {Colour[]}
+ */
 const LEVELS = [
   [0, 32, 76],
   [0, 48, 111],
@@ -17,6 +48,11 @@ const LEVELS = [
   [228, 213, 86],
   [255, 234, 70],
 ];
+/**
+ * Blue to orange for a change.
+ *
+ * @type {Record<string, Colour[]>}
+ */
 const CHANGES = {
   light: [
     [0, 84, 150],
@@ -34,6 +70,10 @@ const CHANGES = {
   ],
 };
 
+/**
+ * @param {Colour[]} stops
+ * @param {number} share
+ */
 function shade(stops, share) {
   const x = Math.min(1, Math.max(0, share)) * (stops.length - 1),
     i = Math.min(stops.length - 2, Math.floor(x)),
@@ -41,15 +81,36 @@ function shade(stops, share) {
   return `rgb(${stops[i].map((c, k) => Math.round(c + t * (stops[i + 1][k] - c))).join(",")})`;
 }
 
+/** @param {number[]} values */
 const middle = (values) => {
   values.sort((a, b) => a - b);
   const h = values.length >> 1;
   return values.length % 2 ? values[h] : (values[h - 1] + values[h]) / 2;
 };
 
+// The mean of the newest quarter.
+const newest = (/** @type {number[]} */ values) => {
+  const quarter = Math.max(1, values.length >> 2);
+  return values.slice(-quarter).reduce((a, b) => a + b, 0) / quarter;
+};
+
 export class LineMap {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {HTMLElement} hover
+   */
   constructor(canvas, hover) {
-    Object.assign(this, { canvas, hover, what: "level", cells: null });
+    this.canvas = canvas;
+    this.hover = hover;
+    /** @type {"level" | "change"} */
+    this.what = "level";
+    this.begun = false;
+    /** @type {number[]} */
+    this.lines = [];
+    /** @type {Named} */
+    this.schedule = { name: "", unit: "" };
+    /** @type {Cells | null} */
+    this.cells = null;
     canvas.addEventListener("pointermove", (event) => this.point(event));
     canvas.addEventListener("pointerdown", (event) => this.point(event));
     canvas.addEventListener("pointerleave", () => {
@@ -59,7 +120,12 @@ export class LineMap {
     onTheme(() => this.paint());
   }
 
+  /**
+   * @param {{frequency_hz: number[]}} facts
+   * @param {Named} schedule
+   */
   begin(facts, schedule) {
+    this.begun = true;
     this.lines = facts.frequency_hz;
     this.schedule = schedule;
     this.cells = null;
@@ -72,19 +138,28 @@ export class LineMap {
     this.hover.textContent = "";
   }
 
-  // Sort the rows into cells.
+  /**
+   * Sort the rows into cells.
+   *
+   * @param {History} rows
+   * @param {number} fromS
+   * @param {number} toS
+   */
   draw(rows, fromS, toS) {
-    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter(
-      (r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS,
-    );
+    this.cells = this.sorted(rows, between(rows, fromS, toS));
+    this.paint();
+  }
+
+  /**
+   * @param {History} rows
+   * @param {number[]} order
+   * @returns {Cells | null}
+   */
+  sorted(rows, order) {
     const moving = order.some((r) => Number.isFinite(rows.schedule[r])),
       x = moving ? rows.schedule : rows.timeS;
     const known = order.filter((r) => Number.isFinite(x[r]));
-    if (!known.length) {
-      this.cells = null;
-      this.paint();
-      return;
-    }
+    if (!known.length) return null;
     let low = Infinity,
       high = -Infinity;
     for (const r of known) {
@@ -93,37 +168,20 @@ export class LineMap {
     }
     const columns = Math.max(1, Math.min(CELLS, Math.ceil(known.length / 6))),
       step = (high - low) / columns || 1;
+    /** @type {number[][]} */
     const bins = Array.from({ length: columns }, () => []);
     for (const r of known) bins[Math.min(columns - 1, Math.floor((x[r] - low) / step))].push(r);
-    const level = bins.map((bin) =>
+    /** @type {(of: (values: number[]) => number) => (bin: number[]) => number[]} */
+    const each = (of) => (bin) =>
       this.lines.map((_, line) => {
         const values = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
-        return values.length
-          ? values.slice(-Math.max(1, values.length >> 2)).reduce((a, b) => a + b, 0) / Math.max(1, values.length >> 2)
-          : NaN;
-      }),
-    );
-    if (!level.flat().some(Number.isFinite)) {
-      this.cells = null;
-      this.paint();
-      return;
-    }
-    const usual = moving
-      ? bins.map((bin) =>
-          this.lines.map((_, line) => {
-            const v = bin.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
-            return v.length ? middle(v) : NaN;
-          }),
-        )
-      : (() => {
-          const all = this.lines.map((_, line) => {
-            const v = known.map((r) => rows.magnitude[r * rows.columns + line]).filter(Number.isFinite);
-            return v.length ? middle(v) : NaN;
-          });
-          return bins.map(() => all);
-        })();
-    this.cells = { level, change: level.map((c, i) => c.map((v, k) => v - usual[i][k])), low, step, columns, moving };
-    this.paint();
+        return values.length ? of(values) : NaN;
+      });
+    const level = bins.map(each(newest));
+    if (!level.flat().some(Number.isFinite)) return null;
+    const all = moving ? [] : each(middle)(known),
+      usual = moving ? bins.map(each(middle)) : bins.map(() => all);
+    return { level, change: level.map((c, i) => c.map((v, k) => v - usual[i][k])), low, step, columns, moving };
   }
 
   box() {
@@ -133,17 +191,17 @@ export class LineMap {
 
   edges() {
     const log = this.lines.map(Math.log),
-      between = log.slice(1).map((v, i) => (v + log[i]) / 2);
+      inner = log.slice(1).map((v, i) => (v + log[i]) / 2);
     if (log.length === 1) return [log[0] - 0.1, log[0] + 0.1];
-    return [2 * log[0] - between[0], ...between, 2 * log.at(-1) - between.at(-1)];
+    return [2 * log[0] - inner[0], ...inner, 2 * log[log.length - 1] - inner[inner.length - 1]];
   }
 
   paint() {
     const { canvas, cells } = this,
       { w, h, left, top, right, bottom } = this.box();
-    if (w < 10 || h < 10 || !this.lines) return;
+    if (w < 10 || h < 10 || !this.begun) return;
     const ratio = devicePixelRatio,
-      ctx = canvas.getContext("2d");
+      ctx = drawing(canvas);
     canvas.width = Math.round(w * ratio);
     canvas.height = Math.round(h * ratio);
     ctx.scale(ratio, ratio);
@@ -160,25 +218,28 @@ export class LineMap {
     const sizes = flat.map(Math.abs).sort((a, b) => a - b),
       reach = Math.max(0.1, sizes[Math.floor(0.99 * (sizes.length - 1))] || 0);
     const [low, high] = change ? [-reach, reach] : [Math.min(...flat), Math.max(...flat, Math.min(...flat) + 0.1)];
-    const stops = change ? CHANGES[document.documentElement.dataset.theme] || CHANGES.light : LEVELS;
-    const yOf = (log) => bottom - ((log - edges[0]) / (edges.at(-1) - edges[0])) * (bottom - top),
-      width = (right - left) / cells.columns;
+    const stops = change ? CHANGES[document.documentElement.dataset.theme ?? "light"] || CHANGES.light : LEVELS;
+    /** @param {number} log */
+    const yOf = (log) => bottom - ((log - edges[0]) / (edges[edges.length - 1] - edges[0])) * (bottom - top);
+    const width = (right - left) / cells.columns;
     ctx.fillStyle = colour("nothing");
     ctx.fillRect(left, top, right - left, bottom - top);
-    values.forEach((column, i) =>
-      column.forEach((v, k) => {
-        if (!Number.isFinite(v)) return;
+    for (const [i, column] of values.entries())
+      for (const [k, v] of column.entries()) {
+        if (!Number.isFinite(v)) continue;
         ctx.fillStyle = shade(stops, (v - low) / (high - low));
         const y = yOf(edges[k + 1]);
         ctx.fillRect(left + i * width, y, width + 0.6, yOf(edges[k]) - y + 0.6);
-      }),
-    );
-    this.scales(ctx, { low, high, stops, edges, yOf, change });
+      }
+    this.scales(ctx, { cells, low, high, stops, yOf, change });
   }
 
-  scales(ctx, { low, high, stops, yOf, change }) {
-    const { left, top, right, bottom, h } = this.box(),
-      { cells } = this;
+  /**
+   * @param {CanvasRenderingContext2D} ctx
+   * @param {Scales} drawn
+   */
+  scales(ctx, { cells, low, high, stops, yOf, change }) {
+    const { left, top, right, bottom, h } = this.box();
     ctx.fillStyle = colour("muted");
     ctx.textAlign = "right";
     ctx.textBaseline = "middle";
@@ -205,7 +266,11 @@ export class LineMap {
       ctx.fillText(text, left + ((right - left) * i) / 4, bottom + 4);
     });
     const unit = this.schedule.unit ? ` in ${this.schedule.unit}` : "";
-    ctx.fillText(cells.moving ? `${this.schedule.name || "schedule"}${unit}` : timeLabel(cells.low), (left + right) / 2, h - 15);
+    ctx.fillText(
+      cells.moving ? `${this.schedule.name || "schedule"}${unit}` : timeLabel(cells.low),
+      (left + right) / 2,
+      h - 15,
+    );
     for (let i = 0; i < 60; i++) {
       ctx.fillStyle = shade(stops, i / 59);
       ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6);
@@ -226,6 +291,7 @@ export class LineMap {
     ctx.fillText("dB", right + 16, h - 15);
   }
 
+  /** @param {PointerEvent} event */
   point(event) {
     const { left, top, right, bottom } = this.box(),
       { cells } = this,
@@ -236,7 +302,7 @@ export class LineMap {
       return;
     }
     const edges = this.edges(),
-      log = edges[0] + ((bottom - y) / (bottom - top)) * (edges.at(-1) - edges[0]);
+      log = edges[0] + ((bottom - y) / (bottom - top)) * (edges[edges.length - 1] - edges[0]);
     const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)),
       i = Math.floor(((x - left) / (right - left)) * cells.columns);
     const place = cells.low + (i + 0.5) * cells.step;
@@ -244,4 +310,5 @@ export class LineMap {
   }
 }
 
+/** @param {number} high */
 const reachDigits = (high) => (high < 1 ? 2 : 1);

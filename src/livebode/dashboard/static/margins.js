@@ -1,10 +1,17 @@
+// @ts-check
 // The margins of the loop with their bounds; small ones are marked.
 import { element } from "./make.js";
 import { Series } from "./series.js";
 import { bounded } from "./trends.js";
 import { hertz, plain } from "./words.js";
 
-// Usual limits of a servo loop: 6 dB, 30°, Ms 2. Worse values are marked, with a word.
+/** @import { AtLines, Trend } from "./messages.js" */
+
+/**
+ * Usual limits of a servo loop: 6 dB, 30°, Ms 2. Worse values are marked, with a word.
+ *
+ * @type {[name: string, words: string, small: (v: number) => boolean][]}
+ */
 const ROWS = [
   ["gain_margin", "gain may rise by", (v) => v < 6],
   ["gain_reduction", "gain may fall by", (v) => Math.abs(v) < 6],
@@ -15,10 +22,20 @@ const ROWS = [
 ];
 
 export class Margins {
-  constructor(host, whyNot) {
-    Object.assign(this, { host, whyNot, items: new Map(), lines: null });
+  /** @param {HTMLElement} host */
+  constructor(host) {
+    this.host = host;
+    /** @type {Map<string, Series>} */
+    this.items = new Map();
+    /** @type {AtLines | null} */
+    this.lines = null;
+    this.why = "";
   }
 
+  /**
+   * @param {Trend[]} list
+   * @param {string} why there may be none
+   */
   begin(list, why) {
     this.items.clear();
     this.why = why;
@@ -26,10 +43,12 @@ export class Margins {
     this.draw();
   }
 
+  /** @param {Trend} trend */
   take(trend) {
     if (trend.model !== "margins") return;
-    if (!this.items.has(trend.name)) this.items.set(trend.name, new Series(trend));
-    this.items.get(trend.name).take(trend);
+    const series = this.items.get(trend.name) ?? new Series(trend);
+    this.items.set(trend.name, series);
+    series.take(trend);
   }
 
   // The margins at a time, or the newest.
@@ -41,7 +60,7 @@ export class Margins {
       if (!found?.t.length) continue;
       const row = found.at(atS),
         beside = items.get(`${name}_frequency`);
-      const at = beside?.v[beside.at(atS)],
+      const at = beside ? beside.v[beside.at(atS)] : NaN,
         value = found.v[row];
       const none = found.status[row] === "none",
         mark = !none && small(value);

@@ -1,18 +1,31 @@
+// @ts-check
 // The past: times in the record, and the history in the tracking plot and the map.
 import { framesOf } from "./frames.js";
-import { ask } from "./link.js";
+import { ask, reason } from "./link.js";
+
+/** @import { Page } from "./messages.js" */
 
 const WHOLE_MS = 4000,
   ROWS = 1000;
 
-export function past(page, { bode, tracking, map, timeline, link }, { complain, status }) {
+/**
+ * @param {Page} page
+ * @param {object} parts
+ * @param {import("./bode.js").Bode} parts.bode
+ * @param {import("./tracking.js").Tracking} parts.tracking
+ * @param {import("./timeline.js").Timeline} parts.timeline
+ * @param {import("./link.js").Link} parts.link
+ * @param {{complain: (text: string) => void, status: () => void}} actions
+ */
+export function past(page, { bode, tracking, timeline, link }, { complain, status }) {
   // The time before this page was opened: first the recent past, the whole run on request.
   async function fill() {
     const { span } = timeline,
       whole = page.spanS === "whole",
       half = Number(page.spanS) / 2;
-    const between = page.facts?.axis !== page.axis || page.quantity === null; // another axis was chosen, and its facts have not arrived
-    if (between || !page.facts.begun || !Number.isFinite(span.last_s)) {
+    const { facts } = page;
+    const between = facts?.axis !== page.axis || page.quantity === null; // another axis was chosen, and its facts have not arrived
+    if (between || !facts.begun || !Number.isFinite(span.last_s)) {
       setTimeout(fill, 300);
       return;
     }
@@ -28,11 +41,12 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
       page.past = { frame, from, to: end };
       if (!whole && timeline.atS === null) page.rows = page.rows.behind(frame);
     } catch (error) {
-      complain(error.message);
+      complain(reason(error));
     }
     page.dirty.add("rows");
   }
 
+  /** @param {number} timeS */
   async function showMoment(timeS) {
     link.wish({ kind: "pause" }, "pause");
     page.dirty.add("trends");
@@ -46,7 +60,8 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
     try {
       const buffer = await ask("/api/moment", { axis: page.axis, quantity: page.quantity, from: timeS, to: timeS });
       if (timeline.atS !== null) {
-        for (const name of ["model", "baseline"]) bode.drop(name);
+        bode.drop("model");
+        bode.drop("baseline");
         for (const frame of framesOf(buffer)) if (frame.quantity === page.quantity) bode.take(frame);
         page.dirty.add("bode");
       }
@@ -54,7 +69,7 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
       if (!past || timeS < past.from || timeS > past.to || page.spanS !== "whole") await fill();
       page.dirty.add("rows");
     } catch (error) {
-      complain(error.message);
+      complain(reason(error));
     }
     page.seeking = false;
     if (page.next !== undefined) {
@@ -74,13 +89,15 @@ export function past(page, { bode, tracking, map, timeline, link }, { complain, 
     status();
   }
 
+  /** @param {number} now */
   function drawRows(now) {
     const { span } = timeline,
       whole = page.spanS === "whole",
       paused = timeline.atS !== null;
     const end = Math.max(span.last_s, page.rows.lastS || -Infinity);
-    let rows = page.rows,
-      from = end - Number(page.spanS),
+    /** @type {import("./messages.js").History} */
+    let rows = page.rows;
+    let from = end - Number(page.spanS),
       to = end;
     if ((whole || paused) && page.past) {
       rows = page.past.frame;

@@ -1,19 +1,33 @@
+// @ts-check
 // The values at the cursor: Hz, dB, degrees, their bounds, coherence, and the difference from the reference.
 import { moment } from "./clock.js";
 import { halfDeg, highDb, holds, lowDb } from "./frames.js";
 import { element } from "./make.js";
 import { hertz, signed } from "./words.js";
 
+/** @import { AtCursor, Curves, Found, Named } from "./messages.js" */
+
 const WORDS = { measured: "measured", reference: "reference", baseline: "baseline", model: "fitted model" };
 
+/**
+ * @param {number} low
+ * @param {number} value
+ * @param {number} high
+ */
 function around(low, value, high) {
-  if (!Number.isFinite(value - low) || low <= -999)
-    return Number.isFinite(high) ? "includes zero" : "bound not known";
+  if (!Number.isFinite(value - low) || low <= -999) return Number.isFinite(high) ? "includes zero" : "bound not known";
   return `−${(value - low).toFixed(2)} … +${(high - value).toFixed(2)} dB`;
 }
 
+/**
+ * @param {HTMLElement} host
+ * @param {number} hz
+ * @param {Found} found
+ * @param {Named} schedule
+ */
 export function readout(host, hz, found, schedule) {
-  const rows = Object.entries(found).map(([name, { db, deg, reach, coherence }]) => {
+  const shown = /** @type {[Curves, AtCursor][]} */ (Object.entries(found));
+  const rows = shown.map(([name, { db, deg, reach, coherence }]) => {
     const away = name !== "measured" && found.measured ? [db - found.measured.db, deg - found.measured.deg] : null;
     return element(
       "tr",
@@ -36,9 +50,9 @@ export function readout(host, hz, found, schedule) {
     element(
       "table",
       {},
+      element("thead", {}, element("tr", {}, element("th", { colspan: 7 }, `${hertz(hz)} Hz`))),
       element("caption", {}, words),
       element("tbody", {}, ...(rows.length ? rows : [element("tr", {}, element("th", {}, "–"))])),
     ),
   );
-  host.firstChild.prepend(element("thead", {}, element("tr", {}, element("th", { colspan: 7 }, `${hertz(hz)} Hz`))));
 }

@@ -1,6 +1,8 @@
+// @ts-check
 // Light, dark, or the setting of the system; stored in this browser.
 const WORDS = ["auto", "light", "dark"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
+/** @type {Set<() => void>} */
 const listeners = new Set();
 
 let word = "auto";
@@ -26,16 +28,35 @@ export function nextTheme() {
   applyTheme();
 }
 
+/** @param {() => void} listener */
 export function onTheme(listener) {
   listeners.add(listener);
 }
 
+/** @type {Map<string, string>} */
 const colours = new Map();
-// A colour of look.css, for canvases.
+/**
+ * A colour of look.css, for canvases.
+ *
+ * @param {string} name
+ */
 export function colour(name) {
-  if (!colours.has(name))
-    colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
-  return colours.get(name);
+  const known = colours.get(name);
+  if (known !== undefined) return known;
+  const found = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  colours.set(name, found);
+  return found;
 }
 
 dark.addEventListener("change", applyTheme);
+
+/**
+ * What draws on a canvas.
+ *
+ * @param {HTMLCanvasElement} canvas
+ */
+export function drawing(canvas) {
+  const ctx = canvas.getContext("2d");
+  if (!ctx) throw new Error("this browser cannot draw on a canvas");
+  return ctx;
+}

@@ -1,11 +1,25 @@
+// @ts-check
 // The time that is shown: the newest, or a time in the record.
 import { moment } from "./clock.js";
 
+/** @typedef {Omit<import("./messages.js").Span, "clock">} Span */
+
 export class Timeline {
+  /**
+   * @param {{slider: HTMLInputElement, pause: HTMLElement, from: HTMLElement, to: HTMLElement, now: HTMLElement}} parts
+   * @param {{onMoment: (timeS: number) => void, onLive: () => void}} listeners
+   */
   constructor({ slider, pause, from, to, now }, { onMoment, onLive }) {
-    Object.assign(this, { slider, pause, from, to, now, onMoment, onLive });
-    this.span = { first_s: NaN, last_s: NaN };
-    this.atS = null; // null follows the newest
+    this.slider = slider;
+    this.pause = pause;
+    this.from = from;
+    this.to = to;
+    this.now = now;
+    this.onMoment = onMoment;
+    this.onLive = onLive;
+    this.span = { first_s: NaN, last_s: NaN, live: false, growing: false };
+    /** @type {number | null} null follows the newest */
+    this.atS = null;
     slider.addEventListener("input", () => this.go(this.value()));
     pause.addEventListener("click", () => this.toggle());
   }
@@ -15,6 +29,7 @@ export class Timeline {
     return first + (Number(this.slider.value) / 1000) * (last - first);
   }
 
+  /** @param {Span} span */
   take(span) {
     this.span = { ...span, first_s: span.first_s ?? NaN, last_s: span.last_s ?? NaN };
     const { first_s: first, last_s: last } = this.span;
@@ -23,7 +38,11 @@ export class Timeline {
     else this.draw();
   }
 
-  // Show a time in the record.
+  /**
+   * Show a time in the record.
+   *
+   * @param {number} timeS
+   */
   go(timeS) {
     const { first_s: first, last_s: last } = this.span;
     if (!Number.isFinite(first)) return;
@@ -32,6 +51,7 @@ export class Timeline {
     this.onMoment(this.atS);
   }
 
+  /** @param {number} byS */
   step(byS) {
     this.go((this.atS ?? this.span.last_s) + byS);
   }
@@ -47,12 +67,19 @@ export class Timeline {
 
   draw() {
     const { first_s: first, last_s: last, live } = this.span,
-      paused = this.atS !== null;
-    this.slider.value = paused && last > first ? (1000 * (this.atS - first)) / (last - first) : 1000;
-    this.slider.setAttribute("aria-valuetext", moment(paused ? this.atS : last));
+      paused = this.atS !== null,
+      shown = this.atS ?? last;
+    this.slider.value = String(paused && last > first ? (1000 * (shown - first)) / (last - first) : 1000);
+    this.slider.setAttribute("aria-valuetext", moment(shown));
     this.from.textContent = moment(first);
     this.to.textContent = moment(last);
-    this.now.textContent = !Number.isFinite(first) ? "" : paused ? `shown: ${moment(this.atS, true)}` : live ? "newest" : "end";
+    this.now.textContent = !Number.isFinite(first)
+      ? ""
+      : paused
+        ? `shown: ${moment(shown, true)}`
+        : live
+          ? "newest"
+          : "end";
     this.pause.textContent = paused ? (live ? "Live" : "End") : "Pause";
     this.pause.classList.toggle("primary", paused);
   }

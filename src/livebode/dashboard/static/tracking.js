@@ -1,11 +1,17 @@
+// @ts-check
 // Chosen lines over time or over the position, with their bands.
 import { axis, chart, steady } from "./chart.js";
 import { moment, ticks, timeLabel } from "./clock.js";
 import { halfDeg, highDb, lowDb } from "./frames.js";
 import { element } from "./make.js";
+import { between } from "./rows.js";
 import { colour } from "./theme.js";
 import { hertz } from "./words.js";
 
+/** @import { Chart } from "./chart.js" */
+/** @import { History, Named, Run } from "./messages.js" */
+
+/** @param {number} v */
 const number = (v) => Number(v.toFixed(6)).toString().replace("-", "−");
 const COLOURS = 10,
   LINES_MAX = 10,
@@ -13,21 +19,52 @@ const COLOURS = 10,
   GAP_S = 2;
 
 export class Tracking {
+  /**
+   * @param {HTMLElement} host
+   * @param {HTMLElement} chips
+   * @param {(timeS: number) => void} onMoment
+   */
   constructor(host, chips, onMoment) {
-    Object.assign(this, { host, chips, onMoment, what: "magnitude", over: "time", chosen: [], choices: new Map(), marked: NaN });
+    this.host = host;
+    this.chips = chips;
+    this.onMoment = onMoment;
+    /** @type {"magnitude" | "phase"} */
+    this.what = "magnitude";
+    /** @type {"time" | "position"} */
+    this.over = "time";
+    /** @type {number[]} */
+    this.lines = [];
+    /** @type {number[]} indices of the tracked lines, in the order of their colours */
+    this.chosen = [];
+    /** @type {Map<string, number[]>} the same of every axis */
+    this.choices = new Map();
+    /** @type {Named} */
+    this.schedule = { name: "", unit: "" };
+    /** @type {History | null} */
+    this.rows = null;
+    this.fromS = NaN;
+    this.toS = NaN;
+    this.marked = NaN;
+    /** @type {Chart | null} */
+    this.made = null;
   }
 
+  /**
+   * @param {Run} facts
+   * @param {Named} schedule
+   */
   begin(facts, schedule) {
-    Object.assign(this, { fromS: NaN, toS: NaN });
+    this.fromS = NaN;
+    this.toS = NaN;
     this.lines = facts.frequency_hz;
     this.schedule = schedule;
     this.rows = null;
     // Each axis has its own choice, independent of the lines of others.
     const key = JSON.stringify([facts.axis, this.lines]),
       n = Math.min(AT_FIRST, this.lines.length);
-    this.chosen = this.choices.get(key);
-    if (!this.chosen)
-      this.chosen = Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
+    this.chosen =
+      this.choices.get(key) ??
+      Array.from({ length: n }, (_, i) => Math.round((i * (this.lines.length - 1)) / Math.max(1, n - 1)));
     this.choices.set(key, this.chosen);
     this.drawChips();
     this.build();
@@ -35,7 +72,12 @@ export class Tracking {
 
   // Show nothing until the next `begin`.
   clear() {
-    Object.assign(this, { lines: [], chosen: [], rows: null, fromS: NaN, toS: NaN, marked: NaN });
+    this.lines = [];
+    this.chosen = [];
+    this.rows = null;
+    this.fromS = NaN;
+    this.toS = NaN;
+    this.marked = NaN;
     this.drawChips();
     this.build();
   }
@@ -62,13 +104,14 @@ export class Tracking {
     );
   }
 
+  /** @param {number} i */
   toggle(i) {
     const place = this.chosen.indexOf(i);
     if (place >= 0) this.chosen.splice(place, 1);
     else this.chosen.push(i);
     if (this.chosen.length > LINES_MAX) this.chosen.shift();
     this.drawChips();
-    this.chips.querySelector(`[data-line="${i}"]`)?.focus();
+    this.chips.querySelectorAll("button")[i]?.focus();
     this.build();
     if (this.rows) this.draw(this.rows, this.fromS, this.toS);
   }
@@ -78,8 +121,10 @@ export class Tracking {
     const deg = this.what === "phase",
       byPlace = this.over === "position";
     const range = steady(deg ? { step: 15, least: 30 } : { step: 2, least: 4 });
-    const series = [{ label: "x" }],
-      bands = [];
+    /** @type {uPlot.Series[]} */
+    const series = [{ label: "x" }];
+    /** @type {uPlot.Band[]} */
+    const bands = [];
     this.chosen.forEach((line, i) => {
       const first = series.length,
         ink = () => colour(`t${i % COLOURS}`);
@@ -115,50 +160,63 @@ export class Tracking {
         cursor: { drag: { x: false, y: false }, y: false, points: { show: !byPlace, size: 6 } },
         hooks: { draw: [(u) => this.mark(u)], ready: [(u) => u.over.addEventListener("click", () => this.click(u))] },
       },
-      series.map(() => []),
+      [[], ...series.slice(1).map(() => [])],
     );
   }
 
+  /**
+   * @param {number | null} low
+   * @param {number | null} high
+   * @returns {[low: number, high: number]}
+   */
   sight(low, high) {
     if (this.over === "position")
-      return low === null
+      return low === null || high === null
         ? [0, 1]
         : high > low
           ? [low - 0.02 * (high - low), high + 0.02 * (high - low)]
           : [low - 1, high + 1];
-    return Number.isFinite(this.fromS) && this.toS > this.fromS
-      ? [this.fromS, this.toS]
-      : [0, 1];
+    return Number.isFinite(this.fromS) && this.toS > this.fromS ? [this.fromS, this.toS] : [0, 1];
   }
 
+  /** @returns {[low: number, high: number]} */
   reach() {
     let low = Infinity,
       high = -Infinity;
     const stride = this.over === "position" ? 1 : 3;
-    for (let s = 1; s < this.made.data.length; s += stride)
-      for (const v of this.made.data[s])
-        if (Number.isFinite(v)) {
+    const data = this.made?.data ?? [];
+    for (let s = 1; s < data.length; s += stride)
+      for (const v of data[s] ?? [])
+        if (v !== null && v !== undefined && Number.isFinite(v)) {
           low = Math.min(low, v);
           high = Math.max(high, v);
         }
     return [low, high];
   }
 
-  // The rows between two times; `rows` is a ring or a frame of history.
+  /**
+   * The rows between two times.
+   *
+   * @param {History} rows
+   * @param {number} fromS
+   * @param {number} toS
+   */
   draw(rows, fromS, toS) {
-    Object.assign(this, { rows, fromS, toS });
-    const order = (rows.order ? rows.order() : Array.from({ length: rows.rows }, (_, i) => i)).filter(
-      (r) => rows.timeS[r] >= fromS && rows.timeS[r] <= toS,
-    );
+    this.rows = rows;
+    this.fromS = fromS;
+    this.toS = toS;
+    const order = between(rows, fromS, toS);
     const byPlace = this.over === "position";
-    const x = [],
-      at = [];
+    /** @type {number[]} */
+    const x = [];
+    /** @type {number[]} */
+    const at = [];
     if (byPlace) {
       for (const r of order) if (Number.isFinite(rows.schedule[r])) at.push(r);
       at.sort((a, b) => rows.schedule[a] - rows.schedule[b]);
       for (const r of at) x.push(rows.schedule[r]);
     } else {
-      const usual = order.length > 1 ? (rows.timeS[order.at(-1)] - rows.timeS[order[0]]) / order.length : 0;
+      const usual = order.length > 1 ? (rows.timeS[order[order.length - 1]] - rows.timeS[order[0]]) / order.length : 0;
       order.forEach((r, i) => {
         // A gap in the record is a gap in the curve.
         if (i && rows.timeS[r] - rows.timeS[order[i - 1]] > Math.max(GAP_S, 5 * usual)) {
@@ -169,10 +227,13 @@ export class Tracking {
         at.push(r);
       });
     }
-    const data = [x],
-      deg = this.what === "phase";
+    /** @type {[number[], ...(number | null)[][]]} */
+    const data = [x];
+    const deg = this.what === "phase";
     for (const line of this.chosen) {
+      /** @param {number} r */
       const cell = (r) => r * rows.columns + line;
+      /** @param {(cell: number) => number} of */
       const value = (of) =>
         at.map((r) => {
           const v = r < 0 ? NaN : of(cell(r));
@@ -185,9 +246,10 @@ export class Tracking {
       );
       data.push(value((c) => (deg ? rows.phase[c] - halfDeg(rows.reach[c]) : lowDb(rows.magnitude[c], rows.reach[c]))));
     }
-    this.made.setData(data);
+    this.made?.setData(data);
   }
 
+  /** @param {Chart} u */
   mark(u) {
     if (this.over === "position" || !Number.isFinite(this.marked)) return;
     const x = u.valToPos(this.marked, "x", true),
@@ -211,7 +273,9 @@ export class Tracking {
     ctx.restore();
   }
 
+  /** @param {Chart} u */
   click(u) {
-    if (this.over === "time" && u.cursor.left >= 0) this.onMoment(u.posToVal(u.cursor.left, "x"));
+    const { left = -1 } = u.cursor;
+    if (this.over === "time" && left >= 0) this.onMoment(u.posToVal(left, "x"));
   }
 }

@@ -1,4 +1,7 @@
+// @ts-check
 // Numbers and names for people.
+
+/** @param {number | null | undefined} value */
 export function plain(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
@@ -9,15 +12,22 @@ export function plain(value, digits = 4) {
   return text.replace("-", "−");
 }
 
+/** @param {number} value */
 export const signed = (value, digits = 1) =>
   Number.isFinite(value) ? `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
 
+/** @param {number} f */
 export function hertz(f) {
   if (f >= 1e5) return `${Number((f / 1000).toPrecision(4))}k`;
   return Number(f.toPrecision(5)).toString();
 }
 
-// "x in m" → name and unit.
+/**
+ * "x in m" → name and unit.
+ *
+ * @param {string} label
+ * @returns {import("./messages.js").Named}
+ */
 export function named(label) {
   const cut = label.lastIndexOf(" in ");
   return cut < 0 ? { name: label, unit: "" } : { name: label.slice(0, cut), unit: label.slice(cut + 4) };

@@ -35,7 +35,7 @@ _logger = logging.getLogger(__name__)
 
 
 class Store:
-    """The record of one run, written by one process; see docs/run-directory.md for its files.
+    """The record of one run, written by one process; see docs/reference/run-directory.md for its files.
 
     Use it as a context manager. Rows and events wait until `commit` writes them together with the state to continue
     from. Leaving the context writes nothing more, for any reason; `finish` does.

@@ -1,4 +1,4 @@
-"""Live sources: machines that send their samples in batches. docs/live.md shows how to connect each."""
+"""Live sources: machines that send their samples in batches. docs/how-to/live.md shows how to connect each."""
 
 from livebode.sources.live.batch import Batch, LiveBlock
 from livebode.sources.live.frame import FrameDecoder, encode_layout, encode_samples

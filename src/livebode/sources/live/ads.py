@@ -38,7 +38,7 @@ class AdsSource(LiveSource):
             raise ConfigError(
                 "key-missing",
                 "ads needs source.net_id, source.symbol and source.channels",
-                "set them; docs/live.md describes what the PLC must have",
+                "set them; docs/how-to/live.md describes what the PLC must have",
                 key="source",
                 keys=["net_id", "symbol", "channels"],
             )

@@ -1,4 +1,4 @@
-"""The binary frame of livebode, for UDP, TCP and MQTT. docs/live.md describes it byte by byte."""
+"""The binary frame of livebode, for UDP, TCP and MQTT. docs/how-to/live.md describes it byte by byte."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ class OpcUaSource(LiveSource):
             raise ConfigError(
                 "key-missing",
                 "opc.tcp needs source.nodes and source.rate_hz",
-                "set them; docs/live.md describes what the server must have",
+                "set them; docs/how-to/live.md describes what the server must have",
                 key="source",
                 keys=["nodes", "rate_hz"],
             )

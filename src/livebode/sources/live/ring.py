@@ -1,6 +1,6 @@
 """The array ring buffer in a PLC program, as bytes: a header, and a row for each of the last samples.
 
-docs/live.md has the program that fills it, and the layout byte by byte.
+docs/how-to/live.md has the program that fills it, and the layout byte by byte.
 """
 
 from __future__ import annotations
@@ -79,7 +79,9 @@ def read_ring(raw: bytes, symbol_bytes: int) -> tuple[Ring, np.dtype[np.floating
 
 
 def wrong_ring(message: str, **facts: object) -> SourceError:
-    return SourceError("ring-invalid", message, "check source.symbol and the PLC program (docs/live.md)", **facts)
+    return SourceError(
+        "ring-invalid", message, "check source.symbol and the PLC program (docs/how-to/live.md)", **facts
+    )
 
 
 def new_rows(ring: Ring, have: int | None) -> list[tuple[int, int]]:

@@ -15,7 +15,7 @@ KINDS = (
     "connected", "disconnected", "refused", "loss", "repeat", "reordered", "restart", "clock-jump", "wrong-rate",
     "layout-changed", "unit-changed", "malformed", "foreign", "overflow", "resumed", "replaced", "computer-clock",
 )  # fmt: skip
-"""Kinds of Events of live sources; docs/live.md explains them."""
+"""Kinds of Events of live sources; docs/how-to/live.md explains them."""
 
 LEVELS = dict.fromkeys(KINDS, logging.WARNING) | {
     "connected": logging.INFO,

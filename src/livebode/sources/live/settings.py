@@ -28,7 +28,7 @@ LOG = {"log", "time", "rate_hz", "follow"}
 
 
 class SourceSettings(BaseModel):
-    """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/live.md has its keys.
+    """[source]: a recording (`log`), one that grows (`follow`), or a machine (`url`); docs/how-to/live.md has its keys.
 
     Relative paths are relative to the file that contains them.
     """

@@ -1,4 +1,4 @@
-r"""Spectra in frames, and the text of their layout. docs/live.md describes both byte by byte.
+r"""Spectra in frames, and the text of their layout. docs/how-to/live.md describes both byte by byte.
 
 The text is UTF-8, one item per line, its parts separated by tabs: ``window``, ``hop``, ``lines``, ``quiet``, then a
 ``signal`` for each spectrum and a ``value`` for each plain value, in the order of the payload.

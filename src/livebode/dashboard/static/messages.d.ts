@@ -1,0 +1,205 @@
+// Types of what the server sends (state.py, notices.py, trends.py, client.py) and of what the panels share.
+import type { Rows } from "./rows.js";
+
+export type Quantity = "plant" | "open loop" | "closed loop" | "sensitivity";
+export type Curves = "measured" | "reference" | "baseline" | "model";
+export type FrameKind = "newest" | "moment" | "reference" | "baseline" | "model" | "rows" | "history";
+/** A number of the server; what is not finite is sent as null. */
+export type Sent = number | null;
+
+/** Curves of one or more responses: per row a time, per row and column a value; see frames.py. */
+export interface Frame {
+  kind: FrameKind;
+  quantity: Quantity;
+  axis: number;
+  rows: number;
+  columns: number;
+  timeS: Float64Array;
+  schedule: Float64Array;
+  dof: Float64Array;
+  magnitude: Float32Array;
+  phase: Float32Array;
+  reach: Float32Array;
+  coherence: Float32Array;
+}
+
+/** Responses over time: the ring of the newest, or a frame of the record. */
+export type History = Frame | Rows;
+
+/** Name and unit of a channel. */
+export interface Named {
+  name: string;
+  unit: string;
+}
+
+interface Axis {
+  axis: number;
+  name: string;
+  live: boolean;
+  role: "viewer" | "operator";
+  watched: Quantity;
+}
+
+/** Facts of an axis whose run has not started. */
+export interface Waiting extends Axis {
+  begun: false;
+}
+
+/** Facts of a run. */
+export interface Run extends Axis {
+  begun: true;
+  directory: string;
+  frequency_hz: number[];
+  grid_hz: number[];
+  rate_hz: number;
+  window: number;
+  quantity: Quantity;
+  quantities: { name: Quantity; symbol: string; unit: string; why_not: string }[];
+  schedule: string;
+  model: string;
+  baseline: boolean;
+  remark: string;
+}
+
+export type Facts = Waiting | Run;
+
+/** Span of time with data; pairs of `clock` are a second of the run and seconds since 1970 at its second 0. */
+export interface Span {
+  first_s: Sent;
+  last_s: Sent;
+  live: boolean;
+  growing: boolean;
+  clock: [number, number][];
+}
+
+export interface SourceHealth {
+  connected: boolean;
+  lost: number;
+  latency_s: Sent;
+  measured_hz: Sent;
+  silent_s: Sent;
+  waiting_bytes: number;
+  waiting_s?: number;
+}
+
+export interface AtLines {
+  value: number;
+  bound: number;
+  frequency_hz: number;
+}
+
+export interface Health {
+  responses: number;
+  responses_per_s: Sent;
+  alarms: string[];
+  ms_at_lines: AtLines | null;
+  source?: SourceHealth | null;
+  counts?: { samples: number; gaps: number } | null;
+  samples?: number;
+  gaps?: number;
+  given_up?: number;
+  silent_s?: number;
+  stale?: boolean;
+  behind_ms?: number;
+  behind_p99_ms?: number;
+  refused: number;
+}
+
+/** The events of one cause. */
+export interface Notice {
+  cause: string;
+  id: string;
+  kind: string;
+  kinds: string[];
+  message: string;
+  first_s: number;
+  last_s: number;
+  count: number;
+  seen: number;
+}
+
+/** Rows of one parameter. */
+export interface Trend {
+  model: string;
+  name: string;
+  unit: string;
+  time_s: number[];
+  value: Sent[];
+  sigma: Sent[];
+  status: string[];
+}
+
+/** A message with the facts of an axis. */
+export interface Beginning {
+  facts: Facts;
+  axes: string[];
+  trends: Trend[];
+}
+
+/** A message; `newest` are the newest rows of the parameters. */
+export type News = (Beginning | { facts?: undefined }) & {
+  error?: string;
+  span?: Span;
+  health?: Health;
+  notices?: Notice[];
+  newest?: Trend[];
+};
+
+/** A request on the web socket; see asked.py. */
+export type Wish =
+  | { kind: "watch"; axis: number; quantity: Quantity | null }
+  | { kind: "freeze"; time_s: number }
+  | { kind: "unfreeze" | "pause" | "resume" };
+
+/** Values of one curve at the line under the cursor. */
+export interface AtCursor {
+  db: number;
+  deg: number;
+  reach: number;
+  coherence: number;
+  frame: Frame;
+}
+
+export type Found = Partial<Record<Curves, AtCursor>>;
+
+/** What the page shows, and what is to be drawn again (`dirty`). */
+export interface Page {
+  axis: number;
+  quantity: Quantity | null;
+  spanS: string;
+  tab: string;
+  up: boolean;
+  facts: Facts | null;
+  health: Health | null;
+  schedule: Named;
+  frozen: boolean;
+  rows: Rows;
+  /** Part of the record that the tracking plot and the map show instead of `rows`. */
+  past: { frame: Frame; from: number; to: number } | null;
+  /** Rows and span of time of the last drawing of the tracking plot. */
+  seen: [rows: History, fromS: number, toS: number] | null;
+  /** Frequency in Hz of the line under the cursor, and the values there. */
+  read: [hz: number, found: Found] | null;
+  dirty: Set<string>;
+  /** Time in ms of the last drawing of each part. */
+  last: Record<string, number>;
+  /** Identifies axis, lines and quantity of what is shown. */
+  key: string | null;
+  /** Identifies lines and quantity of the run. */
+  measured: string | null;
+  /** Axis that was chosen last; answers for others are ignored. */
+  wanted?: number;
+  /** The newest request for the past. */
+  asked?: string;
+  seeking: boolean;
+  /** Time to show after the one that is being fetched. */
+  next?: number;
+  silence?: number;
+}
+
+declare global {
+  interface Window {
+    /** The parts of the page, for tests and for a person at the console of the browser. */
+    livebode: object;
+  }
+}

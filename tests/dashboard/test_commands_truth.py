@@ -1,0 +1,137 @@
+"""`livebode view`, `run --serve` and `demo --serve`: the address is printed, and the page there is the run's."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from livebode.records import Run
+from tests.support.browser import Tab, chromium, until
+from tests.support.command import livebode, signals, write_parquet
+from tests.support.dashboards import Watched
+
+
+@contextmanager
+def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The command in a process of its own, and the address that it printed; ended by Ctrl-C, and cleanly."""
+    # What starts the tests in the background may have told them to ignore Ctrl-C.
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    code += "from livebode.cli import main; main()"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    log = folder / "log.txt"
+    with log.open("w") as out:
+        process = subprocess.Popen(
+            command, stdout=out, stderr=out, text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"}
+        )
+    found = None
+
+    def printed() -> bool:
+        nonlocal found
+        found = re.search(r"the dashboard is at (http\S+)", log.read_text())
+        assert process.poll() is None or found, log.read_text()
+        return found is not None
+
+    try:
+        until(printed, "the address", 60)
+        assert found
+        yield process, found.group(1)
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60) in (0, 130), log.read_text()
+        assert "Traceback" not in log.read_text(), log.read_text()
+
+
+def test_the_demo_is_shown_while_it_goes_on_and_behind_it(tmp_path: Path) -> None:
+    out = tmp_path / "demo"
+    with started(tmp_path, "demo", "--serve", "--port", 0, "--seconds", 16, "--out", out) as (_, url):
+        assert url.startswith("http://127.0.0.1:")
+        with chromium() as browser, Tab(browser, url) as tab:
+            assert tab.js("page.facts.live")
+            assert [q["why_not"] for q in tab.js("page.facts.quantities")] == [""] * 4
+            assert tab.js("page.schedule.unit") == "m"
+            first = tab.js("bode.curves.measured.frame.timeS[0]")
+            tab.until(f"bode.curves.measured.frame.timeS[0] > {first} + 0.5")
+            tab.until("!timeline.span.live")  # the run is done, and the page stays
+            assert (out / "run.json").is_file()
+            last = Run.open(out).responses()
+            at_s = float(last.time_s[last.valid.any(axis=1)][-1])
+            tab.until(f"bode.curves.measured.frame.timeS[0] === {at_s!r}")
+            assert tab.js("document.getElementById('status-text').textContent") == "demo · recorded"
+            assert tab.wrong == []
+        # The page knows of the end before the summary is printed.
+        until(lambda: "stiffness is 1" in (tmp_path / "log.txt").read_text(), "the alarm on the terminal")
+
+
+def test_the_demo_is_shown_unasked_and_ends_by_itself(tmp_path: Path) -> None:
+    with started(tmp_path, "demo", "--seconds", 16, "--out", tmp_path / "demo") as (process, url):
+        assert b"livebode" in urllib.request.urlopen(url).read()
+        assert process.wait(60) == 0
+    assert "stiffness is 1" in (tmp_path / "log.txt").read_text()
+
+
+def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
+    log = write_parquet(tmp_path / "log.parquet", signals(20_000))
+    arguments = [
+        "run",
+        log,
+        "--excitation",
+        "w",
+        "--output",
+        "y",
+        "--input",
+        "u",
+        "--lines",
+        "50,100,200",
+        "--window",
+        100,
+    ]
+    out = tmp_path / "run"
+    with started(tmp_path, *arguments, "--serve", "--port", 0, "--out", out) as (_, url):
+        until(lambda: (out / "run.json").is_file(), "the end of the run")
+        until(lambda: "until Ctrl-C" in (tmp_path / "log.txt").read_text(), "the end of what it prints")
+        until(lambda: b"livebode" in urllib.request.urlopen(url).read(), "the page")
+    assert "serve" not in json.loads((out / "run.json").read_text())["configuration"]
+
+
+def test_view_follows_a_run_that_another_process_records(tmp_path: Path) -> None:
+    with Watched(tmp_path / "run") as watched:
+        watched.go(6000)
+        viewing = started(tmp_path, "view", tmp_path / "run", "--port", 0)
+        with viewing as (_, url), chromium() as browser, Tab(browser, url) as tab:
+            before = tab.js("timeline.span.last_s ?? 0")
+            watched.go(11_000)
+            tab.until(f"timeline.span.last_s > {before} + 0.5")
+            assert tab.js("document.getElementById('status-text').textContent") == "run · being recorded"
+            at_s = tab.js("bode.curves.measured.frame.timeS[0]")
+            assert at_s in watched.record().responses().time_s
+            assert tab.wrong == []
+
+
+def test_what_cannot_be_shown_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = livebode("view", tmp_path)
+    assert (result.code, result.err.count("\n")) == (2, 1)
+    assert "not the directory of a run" in result.err
+    (tmp_path / "axis.toml").write_text(
+        '[source]\nlog = "x.csv"\n[signals]\noutput = "y"\n[serve]\naddress = "0.0.0.0"\n'
+    )
+    result = livebode("run", tmp_path / "axis.toml", "--serve")
+    assert result.code == 2
+    assert "requires a token" in result.err
+    assert "secrets.token_urlsafe" in result.err
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    log = write_parquet(tmp_path / "log.parquet", signals(2000))
+    options = ("--lines", "50,100,200", "--window", 100, "--out", tmp_path / "run")
+    assert livebode("run", log, "--excitation", "w", "--output", "y", "--input", "u", *options).code == 0
+    result = livebode("view", tmp_path / "run")
+    assert result.code == 2
+    assert "pip install 'livebode[dashboard]'" in result.err

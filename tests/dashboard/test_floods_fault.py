@@ -1,0 +1,205 @@
+"""Who asks too much of the dashboard, too slowly or too often, and that the owner and the run notice nothing of it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import resource
+import socket
+import ssl
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import websockets
+from websockets.sync.client import ClientConnection, connect
+
+from livebode.dashboard import Dashboard, Serving, patience
+from livebode.dashboard.client import DISPLACED
+from livebode.dashboard.listener import connections_max
+from livebode.dashboard.places import PLACES, Place, Places
+from livebode.dashboard.server import Faults
+from tests.support.browser import until
+from tests.support.dashboards import Watched
+from tests.support.guarded import TOKEN, answer, ask, closed, cookie, guarded, origin, port_of
+from tests.support.peers.certificates import Authority
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    with guarded(tmp_path_factory.mktemp("guarded")) as found:
+        yield found
+
+
+def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
+    url, headers = f"ws://127.0.0.1:{port_of(watched)}/live", {"Cookie": cookie(watched, TOKEN)}
+
+    def opened() -> ClientConnection:
+        return connect(url, origin=origin(watched), additional_headers=headers, ping_interval=None, close_timeout=1)
+
+    with contextlib.ExitStack() as stack:
+        for _ in range(PLACES):
+            stack.enter_context(opened())
+        with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+            opened()
+    with opened() as live:
+        with contextlib.suppress(websockets.exceptions.ConnectionClosed):
+            for _ in range(200):
+                live.send('{"kind": "pause"}')
+        assert closed(live)
+    with opened() as live:
+        live.send("x" * 100_000)
+        assert closed(live)
+    with opened() as live:  # a message that means nothing is answered, and no more
+        answer(live, "facts")
+        live.send("no json")
+        assert answer(live, "error") == "the message is not JSON; send an object of JSON"
+        live.send(b"\x00\xff")
+        assert answer(live, "error") == "a message is text, not bytes; send text"
+        live.send('{"kind": "watch"}')
+        answer(live, "facts")
+    assert not [line for line in watched.told if "internal error" in line]
+
+
+def test_held_web_sockets_shut_the_owner_out_of_no_page() -> None:
+    """Without a token nobody can show that the page is theirs: the oldest of the crowd goes."""
+    with Dashboard(Serving("127.0.0.1", 0)) as dashboard, contextlib.ExitStack() as stack:
+        dashboard.hub("axis")
+        url = dashboard.url.replace("http", "ws") + "live"
+
+        def opened(address: str = "127.0.0.1") -> ClientConnection:
+            near = socket.create_connection(
+                ("127.0.0.1", int(dashboard.url.rsplit(":", 1)[1][:-1])), None, (address, 0)
+            )
+            live = connect(url, sock=near, origin=dashboard.url.rstrip("/"), ping_interval=None, close_timeout=1)
+            return stack.enter_context(live)
+
+        held = [opened("127.0.0.2") for _ in range(PLACES)]
+        owner = opened()
+        answer(owner, "facts")
+        assert closed(held[0])
+        assert held[0].close_code == DISPLACED
+        more = [opened("127.0.0.2") for _ in range(PLACES)]
+        owner.send('{"kind": "watch"}')
+        assert answer(owner, "facts")
+        same = [opened() for _ in range(2)]
+        assert answer(same[-1], "facts")
+        assert closed(more[0])
+
+
+def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_operator() -> None:
+    gone = list[str]()
+    places = Places(open=False)
+    viewers = [Place("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
+    assert all(map(places.take, viewers))
+    assert not places.take(Place("viewer", "::1", lambda: None))
+    operators = [Place("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
+    assert [places.take(one) for one in operators] == [True] * PLACES + [False]
+    assert gone == [f"viewer {n}" for n in range(PLACES)]
+    places.leave(operators[0])
+    assert places.take(operators[-1])
+
+
+def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
+    """A socket that is never read fills up; the machine goes on, another browser sees it, memory stays bounded."""
+    mine = cookie(watched, TOKEN)
+    request = (
+        f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{port_of(watched)}\r\nOrigin: {origin(watched)}\r\nCookie: {mine}\r\n"
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    with socket.create_connection(("127.0.0.1", port_of(watched))) as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        deaf.sendall(request.encode())
+        with connect(
+            watched.url.replace("http", "ws") + "live", origin=origin(watched), additional_headers={"Cookie": mine}
+        ) as live:
+            live.recv()
+            for samples in range(6200, 10_001, 200):
+                watched.go(samples)
+            seen = 0
+            until(lambda: bool(live.recv(timeout=20)), "news")
+            for _ in range(40):
+                seen += isinstance(live.recv(timeout=20), bytes)
+                if seen > 2:
+                    break
+            assert seen > 2
+    assert watched.hub._values < 1 << 20
+
+
+def test_heads_that_never_end_are_refused(watched: Watched) -> None:
+    with socket.create_connection(("127.0.0.1", port_of(watched))) as long:
+        with contextlib.suppress(OSError):
+            long.sendall(b"GET / HTTP/1.1\r\nX: " + b"x" * 200_000)
+        answer = b""
+        with contextlib.suppress(OSError):
+            while part := long.recv(4096):
+                answer += part
+        assert answer == b"" or b" 400 " in answer.split(b"\r\n")[0] + b" "
+    assert ask(watched, "/?" + "x" * 2000)[0] == 414
+    assert ask(watched, "/login", "POST", b"x" * 10_000, Origin=origin(watched))[0] == 400
+
+
+def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As by a reload of the page: its connection is over before a request would have been due."""
+    authority, told = Authority(tmp_path, "authority"), list[str]()
+    tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
+    with Dashboard(Serving("127.0.0.1", 0, tls=tls), told.append) as dashboard:
+        dashboard.hub("axis")
+        url = dashboard.url.replace("https", "wss") + "live"
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            live.recv()
+        with connect(url, origin=dashboard.url.rstrip("/"), ssl=trust) as live:
+            monkeypatch.setattr(patience, "REQUEST_S", 0.2)  # now: a busy machine may take longer for a handshake
+            time.sleep(1.5)  # the listener has looked at both
+            live.send('{"kind": "pause"}')
+            assert "facts" in json.loads(live.recv())
+    assert told == []
+    assert capfd.readouterr().err == ""
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    host = f"127.0.0.1:{port_of(watched)}"
+    head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
+    with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=20) as slow:
+        slow.sendall(head.encode())
+        assert slow.recv(100) == b""
+    assert "internal error" not in " ".join(watched.told)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("soft", "most"), [(1024, 128), (256, 64), (16, 8), (resource.RLIM_INFINITY, 128)])
+def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.MonkeyPatch, soft: int, most: int) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, soft))
+    assert connections_max() == most
+
+
+def test_faults_of_the_server_are_told_once_a_minute() -> None:
+    told = list[str]()
+    faults = Faults(told.append)
+    for _ in range(1000):
+        try:
+            raise ValueError("odd")
+        except ValueError as error:
+            faults.take(error)
+    assert len(told) == 1
+    assert "internal error in the dashboard: ValueError('odd') at" in told[0]
+
+
+def test_the_event_loop_is_quiet() -> None:
+    """Starting and stopping leaves no thread and no loop behind."""
+    import threading
+
+    before = {t.name for t in threading.enumerate()}
+    with Dashboard(Serving("127.0.0.1", 0)):
+        pass
+    until(lambda: {t.name for t in threading.enumerate()} <= before, "the threads to end")
+    with pytest.raises(RuntimeError):
+        asyncio.get_running_loop()

@@ -1,0 +1,91 @@
+"""However samples are cut, and wherever a run is interrupted, the events are the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from livebode.core import BaselineError, Block, LivebodeError, UsageError
+from livebode.estimation import Settings, Tracker
+from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
+from livebode.simulation import TensionLoss
+from studies.monitoring_axis import LINES
+from tests.support.errors import refused
+from tests.support.monitored import machine, pieces, recorded, told
+
+SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet")
+FAULT = TensionLoss(start_s=6.0, loss=0.03)
+
+
+@cache
+def baseline(by_model: bool) -> Baseline:
+    responses = Tracker(SETTINGS).process(recorded((0.3,) * 12, seed=40))
+    at = places(LINES.window, SETTINGS.step)
+    rows = [Apart(LINES.window, place).of_responses(responses) for place in at]
+    table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], rows, len(at))
+    return Baseline(
+        LINES, SETTINGS.step, signals_of(SETTINGS), "joint", "plant", (table,), machine() if by_model else None
+    )
+
+
+def events_of(monitor: Monitor, tracker: Tracker, parts: list[Block]) -> list[tuple[str, int, str]]:
+    found = [e for part in parts for e in monitor.process(part, tracker.process(part))]
+    return [(e.kind, e.sample, e.message) for e in found]
+
+
+@pytest.mark.parametrize("by_model", [True, False], ids=["model", "tables"])
+def test_cuts_and_snapshots_change_nothing(by_model: bool) -> None:
+    block, learned = recorded((0.3, 0.3, 0.3), FAULT, seed=41), baseline(by_model)
+    whole = events_of(Monitor(learned, SETTINGS), Tracker(SETTINGS), [block])
+    assert [kind for kind, _, _ in whole] == ["change"]
+    monitor, tracker, cut = Monitor(learned, SETTINGS), Tracker(SETTINGS), []
+    for i, part in enumerate(pieces(block, [1, 3999, 40, 7001, 400])):
+        cut += events_of(monitor, tracker, [part])
+        if i % 3 == 0:
+            follower = Monitor(learned, SETTINGS)
+            follower.restore(monitor.snapshot())
+            monitor = follower
+    assert cut == whole
+    assert monitor.summary()["changes"] == 1
+    assert monitor.summary()["judged_by"] == ("model" if by_model else "tables")
+
+
+def test_a_gap_costs_its_windows_alone() -> None:
+    """A second is missing, and a sample is not finite: nothing is made up from it, and the change is found."""
+    block = recorded((0.3, 0.3, 0.3), FAULT, seed=42)
+    data = block.data.copy()
+    data[1, 9000] = np.nan
+    holed = Block(data, block.channels, block.rate_hz)
+    parts = [holed.cut(0, 20000), replace(holed.cut(24000, len(block)), gap=True)]
+    monitor, tracker = Monitor(baseline(True), SETTINGS), Tracker(SETTINGS)
+    found = [e for part in parts for e in monitor.process(part, tracker.process(part))]
+    assert told(found) == [("change", "stiffness")]
+    assert abs(found[0].details["since_s"] - 6.0) < 1.5
+
+
+def test_a_snapshot_of_another_monitor_is_refused() -> None:
+    snapshot = Monitor(baseline(True), SETTINGS).snapshot()
+    with pytest.raises(LivebodeError, match="other settings"):
+        Monitor(baseline(False), SETTINGS).restore(snapshot)
+
+
+def test_a_baseline_of_other_runs_is_refused() -> None:
+    learned = baseline(False)
+    for other, setting, own in (
+        (replace(SETTINGS, output="y"), "output", "velocity"),
+        (replace(SETTINGS, schedule=None), "schedule", "x"),
+        (replace(SETTINGS, estimator="direct"), "estimator", "joint"),
+    ):
+        with refused(BaselineError, "settings-differ", setting=setting, learned=own):
+            Monitor(learned, other)
+    with refused(UsageError, "unreadable", argument="false_alarms", value="now and then"):
+        Monitor(learned, SETTINGS, "now and then")
+
+
+def test_nothing_judged_is_said() -> None:
+    monitor = Monitor(baseline(True), SETTINGS)
+    assert monitor.finish() == []
+    assert "Nothing of the run could be judged" in monitor.summary()["message"]

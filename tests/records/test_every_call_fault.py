@@ -1,0 +1,142 @@
+"""Every call that the record makes on the file system fails once, or is the last one before the power goes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from livebode.core import LivebodeError
+from tests.support.recorded import RATE_HZ, check_beginning, check_whole, machine, record_machine, unfinished
+
+SAMPLES = 2000
+BESIDE = 20
+"""Calls that may change places: segments are closed and journals synced in threads of their own."""
+CLOSING = ("record-unclosed", "record-closed")
+CALLS = ("open", "write", "fdatasync", "fsync", "ftruncate", "replace", "unlink", "mkdir")
+
+
+class PowerCut(BaseException):
+    """Nothing is done after it."""
+
+
+class Disk:
+    """Counts the calls that change files, and lets the `at`-th one go wrong in a given way."""
+
+    def __init__(self, at: int, wrong: Callable[[Disk], None]) -> None:
+        self.at, self.wrong, self.count, self.dead = at, wrong, 0, False
+        self.counting = threading.Lock()
+
+    def around(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*args: Any, **kwargs: Any) -> Any:
+            if self.dead:
+                raise PowerCut
+            with self.counting:
+                self.count += 1
+                mine = self.count == self.at
+            if mine:
+                if name == "write":  # half of it reaches the disk
+                    call(args[0], memoryview(args[1])[: len(args[1]) // 2])
+                self.wrong(self)
+            return call(*args, **kwargs)
+
+        return called
+
+
+def full(_: Disk) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def cut(disk: Disk) -> None:
+    disk.dead = True
+    raise PowerCut
+
+
+@contextmanager
+def disk_that(wrong: Callable[[Disk], None], at: int) -> Iterator[Disk]:
+    disk = Disk(at, wrong)
+    with pytest.MonkeyPatch.context() as patch:
+        for name in CALLS:
+            patch.setattr(os, name, disk.around(name, getattr(os, name)))
+        yield disk
+
+
+@pytest.fixture(autouse=True)
+def _commit_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("livebode.runtime.segmented._INTERVAL_S", 0.0)
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """In memory, where the system has such a place: the calls are the same, and a sync waits for no disk."""
+    memory = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else None) as path:
+        yield Path(path)
+
+
+def calls_of_a_run(directory: Path) -> tuple[int, int, int]:
+    """Calls before the first block was asked for, before the last one came back, and in all."""
+    counts: list[int] = []
+    with disk_that(full, 0) as disk:
+        record_machine(machine(SAMPLES, lambda _: counts.append(disk.count)), directory)
+    check_whole(directory, SAMPLES)
+    assert not list((directory / "open").iterdir())
+    return counts[0], counts[-1], disk.count
+
+
+def test_a_call_that_fails_once_costs_nothing(folder: Path) -> None:
+    paused = unclosed = 0
+    begun, ended, calls = calls_of_a_run(folder / "whole")
+    for at in range(1, calls + 1):
+        out, said = folder / str(at), []
+        with disk_that(full, at):
+            if begun < at <= ended - BESIDE:
+                record_machine(machine(SAMPLES), out, tell=said.append)
+            else:  # at its very beginning or end the user may be told
+                with suppress(LivebodeError):
+                    record_machine(machine(SAMPLES), out, tell=said.append)
+        kinds = [event.kind for event in said if event.kind not in CLOSING]
+        unclosed += len(kinds) < len(said)
+        assert kinds in ([], ["record-paused", "record-resumed"], ["record-paused"]), at
+        paused += kinds == ["record-paused", "record-resumed"]
+        if unfinished(out):
+            record_machine(machine(SAMPLES), out)
+        check_whole(out, SAMPLES)
+        shutil.rmtree(out)
+    # The others were closing a segment, which waits without a pause.
+    assert paused > (ended - begun) / 3
+    assert unclosed > 0
+
+
+def test_power_may_go_at_any_call(folder: Path) -> None:
+    for at in range(1, calls_of_a_run(folder / "whole")[2] + BESIDE):
+        out, done = folder / str(at), 0
+
+        def progress(samples: int, _: int | None) -> None:
+            nonlocal done
+            done = samples
+
+        with disk_that(cut, at) as disk, suppress(PowerCut):
+            record_machine(machine(SAMPLES), out, progress=progress)
+        if (out / "run.json").exists() and unfinished(out):
+            assert disk.dead
+            check_beginning(out, SAMPLES, done - RATE_HZ)
+            with disk_that(cut, 1 + at % 25), suppress(PowerCut):  # once more, while it goes on
+                record_machine(machine(SAMPLES), out)
+            check_beginning(out, SAMPLES, done - RATE_HZ)
+        if unfinished(out):
+            record_machine(machine(SAMPLES), out)
+        check_whole(out, SAMPLES)
+        shutil.rmtree(out)
+        if not disk.dead:  # it was done before the call came
+            break
+    else:
+        raise AssertionError("no run was short enough to be done")

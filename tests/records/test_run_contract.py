@@ -1,0 +1,62 @@
+"""A run read back is what was written, and a damaged one is refused with a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.core import Block, DamageWarning, Lines, RecordError
+from livebode.estimation import Settings, Tracker
+from livebode.records import Run
+from tests.support.command import RATE_HZ, livebode, signals, write_parquet
+from tests.support.errors import refused
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    columns = signals()
+    columns["y"][700] = np.nan
+    log, out = write_parquet(tmp_path / "log.parquet", columns), tmp_path / "run"
+    given = ("--excitation", "w", "--input", "u", "--output", "y", "--schedule", "t", "--lines", "50,100,200")
+    assert livebode("run", log, *given, "--window", 100, "--hop", 1, "--out", out).code == 0
+    return out
+
+
+@pytest.mark.parametrize("rows", [1, 7, 1 << 16])
+def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("livebode.records.run._ROWS", rows)
+    columns = signals()
+    columns["y"][700] = np.nan
+    lines = Lines.parse("50,100,200", RATE_HZ, 100)
+    block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
+    expected = Tracker(Settings(lines=lines, output="y", input="u", excitation="w", schedule="t", hop=1)).process(block)
+    read = Run.open(run)
+    assert read.lines == lines
+    found = read.responses()
+    for field in fields(found):
+        a, b = getattr(found, field.name), getattr(expected, field.name)
+        assert np.array_equal(a, b, equal_nan=a.dtype.kind in "fc") if isinstance(a, np.ndarray) else a == b, field.name
+    assert [event.kind for event in read.events()] == ["noise-from-detection-lines", "non-finite"]
+
+
+def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) -> None:
+    with refused(RecordError, "not-a-run", path=str(tmp_path)):
+        Run.open(tmp_path)
+    table = run / "responses.parquet"
+    whole = table.read_bytes()
+    table.write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(DamageWarning, match=r"responses\.parquet is damaged: its end is damaged, so it cannot be read"):
+        assert len(Run.open(run).responses()) == 0
+    (run / "run.json").write_text("{")
+    with pytest.warns(DamageWarning, match=r"run\.json' is damaged: it has no checksum; its copy"):
+        assert Run.open(run).events()
+    (run / "run-copy.json").write_text("[]")
+    with refused(RecordError, "damaged", path=str(run / "run.json"), reason="it has no checksum"):
+        Run.open(run)
+    (run / "run-copy.json").unlink()
+    (run / "run.json").write_text("{}")
+    with refused(RecordError, "unexpected-content", path=str(run / "run.json"), reason="found: Field required"):
+        Run.open(run)

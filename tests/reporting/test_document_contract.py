@@ -1,0 +1,210 @@
+"""A report is one file that needs nothing else, in which data are text and nothing but text, and holds no secret."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from pypdf import PdfReader
+
+from livebode.core import Event
+from livebode.core.document import Document, Finding, Listing, Paragraph, Picture, Section, Table
+from livebode.report.html import to_html
+from livebode.report.pdf import save_pdf
+from livebode.reporting.run_report import run_report
+from livebode.reporting.wording import to_toml
+from tests.support.command import livebode
+from tests.support.recorded import machine, record_machine
+from tests.support.reports import Page, measured, strokes, write_run
+
+MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
+HOSTILE = (
+    "<script>alert(1)</script>", "</title><img src=http://evil/x onerror=alert(1)>", "]]></style><b>", "&lt;i&gt;",
+    "</text></svg><script>1</script>", "<font color=red><para>", "$x_{$",
+    "\x00\x1b[31m\u202e", '"onload="x', "a" * 3000,
+)  # fmt: skip
+# What a page is made of; figures add those of SVG.
+PAGE = {
+    *("html", "head", "meta", "title", "style", "body", "header", "main", "section", "footer", "nav", "a"),
+    *("p", "h1", "h2", "dl", "div", "dt", "dd", "ul", "li", "span", "pre", "figure", "figcaption"),
+    *("table", "thead", "tbody", "tr", "th", "td"),
+    *("svg", "defs", "g", "path", "use", "text", "tspan", "clippath", "rect", "image"),
+}
+
+
+def hostile(text: str) -> Document:
+    """A document with the text wherever one can be."""
+    data = {"responses": measured(6, 1), "schedule_name": text}
+    bode = {"responses": measured(6, 1, unit=text), "names": (text, text)}
+    parts = (
+        Paragraph(text), Table((text, "n"), ((text, text),), (1,), text), Listing(text),
+        Picture("tracking", data, text),
+        Picture("bode", bode, text),
+        Picture("parameters", {"time_s": np.arange(3.0), "curves": [(text, text, np.ones(3), np.ones(3))]}, text),
+    )  # fmt: skip
+    return Document(text, text, ((text, text),), (Finding("alarm", text),), (Section(text, parts),), text)
+
+
+@cache
+def plain_page() -> Page:
+    return Page(to_html(hostile("plain")))
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=st.text(min_size=1, max_size=60) | st.text("<>&\"'/=scriptm ", min_size=3, max_size=30))
+@example(text="".join(HOSTILE[:3]))
+@example(text="".join(HOSTILE[3:6]))
+@example(text="".join(HOSTILE[6:9]))
+@example(text=HOSTILE[9])
+def test_data_are_text_and_nothing_else(text: str, tmp_path: Path) -> None:
+    page = Page(to_html(hostile(text)))
+    plain = plain_page()
+    assert {tag for tag, _ in page.tags} <= PAGE
+    assert [tag for tag, _ in page.tags if tag not in ("text", "tspan", "path", "use", "g", "defs")] == [
+        tag for tag, _ in plain.tags if tag not in ("text", "tspan", "path", "use", "g", "defs")
+    ]
+    for _, attributes in page.tags:
+        assert not [name for name in attributes if name.startswith("on")]
+    if text.isprintable() and text.strip() == text:
+        assert " ".join(text.split()) in page.text
+    save_pdf(hostile(text), tmp_path / "a.pdf")
+    reader = PdfReader(tmp_path / "a.pdf")
+    if text.isascii() and text.isprintable() and text.strip() == text and len(text) < 40 and "  " not in text:
+        assert text in " ".join(reader.pages[0].extract_text().split())
+
+
+def references(html: str) -> list[str]:
+    """Everything that a browser would fetch."""
+    found = re.findall(r"url\(([^)]*)\)|@import\s+(\S+)", html)
+    page = Page(html)
+    named = [
+        v for _, a in page.tags for k, v in a.items() if k.split(":")[-1] in ("href", "src", "srcset", "data") and v
+    ]
+    return [f for pair in found for f in pair if f] + named
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run with a schedule, hostile names and events."""
+    events = [Event("change", 9, 0.1, f"{HOSTILE[0]} {i}", {}) for i in range(60)]
+    events += [Event("gap", 9, float(i), HOSTILE[1], {}) for i in range(3000)]
+    names = {"output": HOSTILE[0], "input": HOSTILE[1], "excitation": "$x_{$", "schedule": "</svg><script>"}
+    source = {"url": "mqtts://broker/<script>", "username": "ann", "password_env": "PLC_PASSWORD"}
+    configuration = {"source": source, "signals": names}
+    folder = tmp_path_factory.mktemp("moving")
+    responses = measured(5000, 1, schedule=strokes(5000))
+    return write_run(folder / "run", responses, configuration=configuration, events=events)
+
+
+def test_a_report_needs_nothing_else_and_holds_no_secret(moving: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PLC_PASSWORD", "hunter2-is-secret")
+    done = livebode("report", moving)
+    assert done.code == 0, done.err
+    html = (moving / "report.html").read_text("utf-8")
+    for reference in references(html):
+        assert reference.startswith(("#", "data:image/png;base64,")), reference
+    assert "default-src 'none'" in html
+    assert not [tag for tag, _ in Page(html).tags if tag in ("script", "link", "iframe", "object", "embed", "img")]
+    pdf = PdfReader(moving / "report.pdf")
+    text = "\n".join(page.extract_text() for page in pdf.pages)
+    for where in (html, text):
+        assert "hunter2" not in where
+        assert "PLC_PASSWORD" in where
+        assert "<script>alert(1)</script>" not in html
+    assert "http" not in re.sub(r"&lt;.*?&gt;", "", html.replace('http-equiv="', ""))
+
+
+def test_long_logs_are_grouped_and_long_runs_thinned_and_both_said(moving: Path) -> None:
+    document = run_report(moving, made=MADE)
+    (events,) = (s for s in document.sections if s.title == "Alarms and events")
+    grouped, in_full = (p for p in events.parts if isinstance(p, Table))
+    assert {row[0]: row[1] for row in grouped.rows} == {"change": "60", "gap": "3,000"}
+    assert len(in_full.rows) == 40
+    assert "20 events between them not shown" in in_full.note
+    pictures = {p.what: p for s in document.sections for p in s.parts if isinstance(p, Picture)}
+    assert len(pictures["bode"].data["responses"]) <= 2048
+    drawn = len(pictures["tracking"].data["responses"])
+    assert 250 < drawn <= 500
+    assert f"{drawn} of 5,000 responses)" in pictures["tracking"].caption
+    assert "of 5,000 responses)" in pictures["bode"].caption
+
+
+def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> None:
+    document = run_report(write_run(tmp_path / "run", measured(30, 1)), made=MADE)
+    save_pdf(document, tmp_path / "a.pdf")
+    save_pdf(document, tmp_path / "b.pdf")
+    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+    reader = PdfReader(tmp_path / "a.pdf")
+    for i, page in enumerate(reader.pages, 1):
+        assert f"{i} / {len(reader.pages)}" in page.extract_text()
+        assert [float(side) for side in page.mediabox[2:]] == pytest.approx([595.28, 841.89], abs=0.1)
+    assert [entry["/Title"] for entry in reader.outline] == [document.asked, *(s.title for s in document.sections)]
+
+
+def test_a_run_that_is_not_finished_says_so(tmp_path: Path) -> None:
+    def stop(done: int, _: int | None) -> None:
+        if done > 2500:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        record_machine(machine(8000), tmp_path / "run", progress=stop)
+    done = livebode("report", tmp_path / "run", "--out", tmp_path / "r")
+    assert done.code == 0, done.err
+    assert "The run is not finished" in Page((tmp_path / "r.html").read_text("utf-8")).text
+    again = livebode("report", tmp_path / "run", "--out", tmp_path / "r.pdf")
+    assert (again.code, "exists already" in again.err) == (2, True)
+    assert livebode("report", tmp_path / "run", "--out", tmp_path / "r", "--force").code == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"run", "r.html", "r.pdf"}
+
+
+def test_what_is_no_run_or_has_nothing_valid_is_refused(tmp_path: Path) -> None:
+    none = measured(5, 1)
+    none.valid[:] = False
+    for run, words in (
+        (tmp_path, "not the directory of a run"),
+        (write_run(tmp_path / "n", none), "valid at any line"),
+    ):
+        done = livebode("report", run)
+        assert (done.code, words in done.err) == (2, True), done.err
+    assert not list(tmp_path.glob("**/report.*"))
+
+
+def test_without_reportlab_the_page_is_written_and_the_rest_is_said(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", measured(20, 1))
+    code = (
+        "import sys; sys.modules['reportlab'] = None; sys.argv[1:] = ['report', sys.argv[1]]\n"
+        "from livebode.cli import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(run)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "pip install 'livebode[pdf]'" in done.stdout
+    assert (run / "report.html").is_file()
+    assert not (run / "report.pdf").exists()
+
+
+_NAMES = st.text(min_size=1, max_size=8)
+_VALUES = st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | st.text(max_size=20)
+
+
+@given(values=st.recursive(
+    st.dictionaries(_NAMES, _VALUES | st.lists(st.text(max_size=5), max_size=3), max_size=4),
+    lambda inner: st.dictionaries(_NAMES, inner, max_size=3), max_leaves=5,
+))  # fmt: skip
+def test_settings_read_back_as_what_they_are(values: dict[str, Any]) -> None:
+    assert _full(tomllib.loads(to_toml(values))) == _full(values)
+
+
+def _full(values: dict[str, Any]) -> dict[str, Any]:
+    """Without what TOML does not say: None, and sections in which nothing stands."""
+    found = {k: _full(v) if isinstance(v, dict) else v for k, v in values.items() if v is not None}
+    return {k: v for k, v in found.items() if v != {}}

@@ -1,0 +1,166 @@
+"""What a report says and draws is what the run holds: its tables, verdict and pictures, on the page and on paper."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pypdf import PdfReader
+
+from livebode.core.document import Document, Picture, Table
+from livebode.fitting import mean_response
+from livebode.records import Run
+from livebode.report.figures import drawn
+from livebode.report.svg import inline_svg
+from livebode.reporting.compare_report import Comparison
+from livebode.reporting.run_report import run_report
+from tests.cli.test_loop_truth import AXIS, record
+from tests.support.command import livebode
+from tests.support.reports import LINES, Page, measured, plant, strokes, write_run
+
+MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
+
+
+def parts(document: Document, kind: type, title: str) -> list:
+    return [p for s in document.sections if s.title == title for p in s.parts if isinstance(p, kind)]
+
+
+def artists(axes, gid: str) -> list:
+    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two masses in their loop, with fit and margins, two seconds with a sample that is not finite."""
+    folder = tmp_path_factory.mktemp("loop")
+    record(folder / "log.parquet", 1)
+    record(folder / "fresh.parquet", 2)
+    (folder / "axis.toml").write_text(AXIS.format(gain=0.2308, delay=0), encoding="utf-8")
+    assert livebode("run", folder / "axis.toml", "--out", folder / "run").code == 0
+    done = livebode("report", folder / "run", "--on", folder / "fresh.parquet")
+    assert done.code == 0, done.err
+    assert done.out.split() == [str(folder / "run" / "report.html"), str(folder / "run" / "report.pdf")]
+    return folder / "run"
+
+
+def test_the_table_of_lines_is_the_mean_with_its_bounds(run: Path) -> None:
+    document = run_report(run, made=MADE)
+    (table,) = parts(document, Table, "Frequency response")
+    responses = Run.open(run).responses()
+    mean = mean_response(responses)
+    size, radius = np.abs(mean.value[0]), mean.bound(np.sqrt(np.log(20)))[0]
+    for row, f, db, r, angle, c in zip(
+        table.rows, mean.lines.frequency_hz, 20 * np.log10(size), radius / size, np.angle(mean.value[0]),
+        np.nanmean(np.where(responses.valid, responses.coherence, np.nan), axis=0),
+    ):  # fmt: skip
+        assert float(row[0]) == f
+        assert float(row[1]) == pytest.approx(db, abs=0.005)
+        assert float(row[2]) == pytest.approx(-20 * np.log10(1 - r), rel=0.05)
+        assert float(row[3]) == pytest.approx(np.degrees(angle), abs=0.005)
+        assert float(row[4]) == pytest.approx(np.degrees(np.arcsin(r)), rel=0.05)
+        assert float(row[5]) == pytest.approx(c, abs=1e-4)
+
+
+def test_the_picture_draws_the_mean_its_bounds_and_the_fit(run: Path) -> None:
+    document = run_report(run, made=MADE)
+    (picture,) = parts(document, Picture, "Frequency response")
+    magnitude, phase, _ = drawn(picture).axes
+    mean = mean_response(Run.open(run).responses())
+    size, radius = np.abs(mean.value[0]), mean.bound(np.sqrt(np.log(20)))[0]
+    np.testing.assert_allclose(artists(magnitude, "newest")[0].get_ydata(), 20 * np.log10(size))
+    bars = np.array([bar[:, 1] for bar in artists(magnitude, "bound")[0].get_segments()])
+    np.testing.assert_allclose(bars, 20 * np.log10(np.column_stack([size - radius, size + radius])))
+    turned = np.exp(1j * np.radians(artists(phase, "newest")[0].get_ydata()))
+    np.testing.assert_allclose(turned, mean.value[0] / size)
+    curve = artists(magnitude, "fit")[0].get_xydata()
+    fitted = picture.data["fitted"].response(curve[:, 0])
+    np.testing.assert_allclose(curve[:, 1], 20 * np.log10(np.abs(fitted)))
+
+
+def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
+    document = run_report(run, made=MADE)
+    (picture,) = parts(document, Picture, "Parameters")
+    rows = [row for table in Run.open(run).tables("parameters") for row in table.to_pylist() if row["name"] == "Keff"]
+    curves = {name: (value, half) for name, _, value, half in picture.data["curves"]}
+    np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])
+    np.testing.assert_allclose(curves["Keff"][1], 1.96 * np.array([row["sigma"] for row in rows]))
+    (table,) = parts(document, Table, "Parameters")
+    keff = next(row for row in table.rows if row[0] == "Keff")
+    newest = next(row for row in reversed(rows) if row["status"] == "ok")
+    assert float(keff[3]) == pytest.approx(newest["value"], rel=1e-3)
+    assert float(keff[4]) == pytest.approx(1.96 * newest["sigma"], rel=0.05)
+    held = json.loads(livebode("fit", run, "--json").out)["quantities"]["Keff"]
+    assert float(keff[1]) == pytest.approx(held["value"], rel=1e-3)
+    assert float(keff[2]) == pytest.approx(held["bound_95"], rel=0.05)
+
+
+def test_page_and_paper_hold_the_same_numbers(run: Path) -> None:
+    document = run_report(run, made=MADE)
+    page = Page((run / "report.html").read_text("utf-8")).text
+    paper = " ".join("\n".join(p.extract_text() for p in PdfReader(run / "report.pdf").pages).split())
+    for table in (t for s in document.sections for t in s.parts if isinstance(t, Table)):
+        for row in table.rows:
+            for text in row:
+                if re.fullmatch(r"[-+]?[\d,.]+(e[-+]\d+)?", text):
+                    assert text in page, (table.headings, row)
+                    assert text in paper, (table.headings, row)
+    for words in (
+        "two-mass passes",
+        "Worst margins",
+        "1 sample of 8,000",
+        "joint: S_wy/S_wu",
+        "velocity: rate_hz 4000",
+    ):
+        assert words in page, words
+        assert words in paper, words
+    own = json.loads((run / "run.json").read_text("utf-8"))["loop"]["margins"]["phase_margin"]
+    (margins,) = parts(document, Table, "Margins of the loop")
+    row = next(row for row in margins.rows if row[0] == "phase margin")
+    assert abs(float(row[1]) - own["value"]) < own["bound_95"]
+
+
+def test_the_svg_draws_the_numbers() -> None:
+    time_s = np.arange(12.0)
+    value = np.random.default_rng(1).normal(size=12)
+    picture = Picture("parameters", {"time_s": time_s, "curves": [("k", "N/m", value, np.full(12, 0.1))]}, "")
+    svg = inline_svg(drawn(picture), "", "a")
+    paths = [
+        np.array(re.findall(r"[ML] ([-\d.]+) ([-\d.]+)", d), dtype=float) for d in re.findall(r' d="([^"]*)"', svg)
+    ]
+    lines = [p for p in paths if len(p) == 12]
+    # One of them is the curve: an affine image of the numbers, downwards where the page goes down.
+    fits = [(np.polyfit(time_s, p[:, 0], 1), np.polyfit(value, p[:, 1], 1), p) for p in lines]
+    assert any(
+        np.abs(np.polyval(x, time_s) - p[:, 0]).max() < 0.01 and np.abs(np.polyval(y, value) - p[:, 1]).max() < 0.01
+        and y[0] < 0 < x[0]
+        for x, y, p in fits
+    )  # fmt: skip
+
+
+def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) -> None:
+    runs = [measured(300, seed, resonance_hz=hz, schedule=strokes(300)) for seed, hz in ((1, 62.0), (2, 60.0))]
+    paths = [write_run(tmp_path / str(i), r) for i, r in enumerate(runs)]
+    comparison = Comparison.of(*paths)
+    document = comparison.document(MADE)
+    (picture,) = parts(document, Picture, "Frequency response")
+    magnitude, _, ratio_db, ratio_deg = drawn(picture).axes
+    ratio, true = comparison.found.overall.ratio, (plant(LINES.frequency_hz, 60) / plant(LINES.frequency_hz, 62))[0]
+    assert np.all(np.abs(ratio - true) < comparison.found.overall.bound)
+    for gid, one in (("before", comparison.found.overall.before), ("after", comparison.found.overall.after)):
+        np.testing.assert_allclose(artists(magnitude, gid)[0].get_ydata(), 20 * np.log10(np.abs(one.value)))
+    marked = np.concatenate([artists(ratio_db, "differs")[0].get_xdata(), artists(ratio_deg, "differs")[0].get_xdata()])
+    differing = LINES.frequency_hz[comparison.found.overall.differs]
+    np.testing.assert_array_equal(marked, np.tile(differing, 2))
+    assert 60 in differing
+    (places,) = parts(document, Picture, "By place")
+    dots = sum(len(a.get_xdata()) for axes in drawn(places).axes for a in artists(axes, "differs"))
+    assert dots == sum(int(p.difference.differs.sum()) for p in comparison.found.places)
+    done = livebode("compare", *paths, "--out", tmp_path / "both")
+    assert done.code == 0, done.err
+    assert done.out.split()[-2:] == [str(tmp_path / "both.html"), str(tmp_path / "both.pdf")]
+    assert "lines of 7 differ" in Page((tmp_path / "both.html").read_text("utf-8")).text
+    assert "lines of 7 differ" in " ".join(PdfReader(tmp_path / "both.pdf").pages[0].extract_text().split())

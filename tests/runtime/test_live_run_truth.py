@@ -1,0 +1,187 @@
+"""`livebode run` on a machine that sends: the same responses as from its recording, and a whole run directory."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from livebode.core import Channel, Event
+from livebode.records import Run
+from livebode.runtime import Audience
+from livebode.sources.live import Batch, encode_layout, encode_samples
+from livebode.sources.live.ndjson import encode_line
+from tests.support.command import RATE_HZ, livebode, signals, write_parquet
+from tests.support.live_session import LiveSession
+from tests.support.peers.peer import PATIENCE_S, batches, free_port, until
+from tests.support.peers.plain import TcpPeer
+from tests.support.small_axis import SMALL_AXIS
+
+CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
+
+
+def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch]:
+    columns = signals(samples)
+    data = np.array([columns[name] for name in "wuy"])
+    return [
+        Batch(first + at, data[:, at : at + size].copy(), CHANNELS, float(RATE_HZ), 9) for at in range(0, samples, size)
+    ]
+
+
+def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
+    path = folder / "axis.toml"
+    path.write_text(f"[source]\n{source}\n{rest}")
+    return path
+
+
+def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
+    command = [Path(sys.executable).with_name("livebode"), "run", str(path), "--out", str(out), "--json"]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
+    table = pa.concat_tables(Run.open(out).tables(what))
+    return {name: np.array(column) for name, column in table.to_pydict().items()}
+
+
+def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):
+    process = started(axis(tmp_path, 'url = "stdin:"'), tmp_path / "live")
+    out, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    assert (process.returncode, err) == (0, b"")
+    log = write_parquet(tmp_path / "log.parquet", signals())
+    livebode("run", axis(tmp_path, f'log = "{log}"'), "--out", tmp_path / "recorded")
+    live, recorded = table(tmp_path / "live"), table(tmp_path / "recorded")
+    for name in recorded:
+        np.testing.assert_array_equal(live[name], recorded[name], err_msg=name)
+    summary = json.loads(out)
+    assert summary["counts"]["samples"] == 2000
+    assert summary["source"]["first_sample"] == 70_000
+    assert summary["source"]["lost"] == 0
+    assert summary["found"]["format"] == "ndjson"
+
+
+def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
+    class Machine(TcpPeer):
+        layout = encode_layout(CHANNELS, float(RATE_HZ), epoch=9)
+
+    with Machine(tmp_path) as peer:
+        process = started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live")
+        peer.wait_ready()
+        for at, batch in enumerate(sent()):
+            if at not in (20, 21):
+                peer._link.sendall(encode_samples(batch, double=True))
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(2.0)  # it goes on, for the machine may send more
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, err) == (0, b"")
+    summary = json.loads(out)
+    assert summary["counts"]["samples"] == 1920
+    assert summary["counts"]["missing"] == summary["source"]["lost"] == 80
+    events = [json.loads(line) for line in (tmp_path / "live" / "events.jsonl").read_text().splitlines()]
+    assert [event["kind"] for event in events] == ["connected", "loss", "gap"]
+    assert (tmp_path / "live" / "bode.png").is_file()
+
+
+def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
+    path = axis(tmp_path, 'url = "stdin:"', SMALL_AXIS.replace("window = 100", ""))
+    process = started(path, tmp_path / "live")
+    _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
+    assert process.returncode == 2
+    assert b"set lines.frequencies and lines.window for a live source" in err
+    assert not (tmp_path / "live").exists()
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("", "needs either a log or a url"),
+        ('log = "a"\nurl = "udp://h:1"', "needs either a log or a url"),
+        ('url = "udp://h"', "give udp://host:port"),
+        ('url = "udp://h:1"\nsymbol = "x"', "source.symbol does not apply to udp"),
+        ('url = "udp://h:1"\nreorder_batches = 1000', "source.reorder_batches = 1000 is not usable"),
+        ('url = "mqtt://me:secret@h/t"', "source.url has a user or password"),
+        ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
+    ],
+)
+def test_sources_that_cannot_be(tmp_path, source, message):
+    result = livebode("run", axis(tmp_path, source), "--out", tmp_path / "live")
+    assert result.code == 2
+    assert message in result.err
+    assert "secret" not in result.err
+
+
+def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
+    """A second sender and a restart of the first: each is said where livebode was started, and not with every batch."""
+    given = sent(400)
+    stranger = [replace(batch, epoch=77) for batch in given]
+    again = [replace(batch, first_sample=batch.first_sample - 70_000, epoch=10) for batch in given]
+    port = free_port(socket.SOCK_DGRAM)
+    process = started(axis(tmp_path, f'url = "udp://127.0.0.1:{port}"'), tmp_path / "live")
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        layout = encode_layout(CHANNELS, float(RATE_HZ))
+        until(lambda: listens(sender, layout), "the port to be open")
+        mixed = [batch for pair in zip(given, stranger) for batch in pair]
+        for batch in mixed * 2 + again * 2:
+            sender.send(encode_samples(batch, double=True))
+            time.sleep(0.002)
+    until(lambda: (tmp_path / "live" / "events.jsonl").exists(), "the run to begin")
+    until(lambda: b"restart" in (tmp_path / "live" / "events.jsonl").read_bytes(), "the restart to be recorded")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE_S)
+    said = err.decode().splitlines()
+    assert sum("does not belong to the stream and was dropped" in line for line in said) == 1
+    assert sum("the sender restarted at its sample 0" in line for line in said) == 1
+
+
+def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):
+    """A connection that is lost, and what a person acknowledges, wait for no sample."""
+
+    class Person(Audience):
+        said: ClassVar = [Event("acknowledged", 0, 0.0, "seen")]
+
+        def drain_events(self):
+            return [self.said.pop()] if self.said and disconnected() else []
+
+    def disconnected() -> bool:
+        return any(event.kind == "disconnected" for event in session.events())
+
+    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, Person()) as session:
+        peer.wait_ready()
+        for batch in batches(40, first=0):
+            peer.send(batch)
+        until(session.events, "the record to begin")
+        peer.interrupt()
+        until(lambda: "acknowledged" in [event.kind for event in session.events()], "both to be recorded")
+
+
+def test_a_continued_run_records_what_happens_before_the_machine_sends_new_samples(tmp_path):
+    with TcpPeer(tmp_path) as peer:
+        for sent_again in (40, 1):  # the second time what is recorded already
+            with LiveSession(tmp_path, peer) as session:
+                peer.wait_ready()
+                before = len(session.events())
+                for batch in batches(40, first=0)[:sent_again]:
+                    peer.send(batch)
+                until(lambda n=before: session.events()[n:], "the connection to be recorded")
+                found = [event.kind for event in session.events()]
+            peer.hang_up()
+    assert found[1] == "record-continued"
+
+
+def listens(sender: socket.socket, frame: bytes) -> bool:
+    try:
+        return bool(sender.send(frame) and sender.send(frame))
+    except ConnectionRefusedError:
+        return False

@@ -1,0 +1,195 @@
+"""An edit of the configuration is applied without losing a sample, or refused with the reason."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from livebode.core import Event, Lines, Responses
+from livebode.estimation import Settings, Tracker
+from livebode.records import Run
+from tests.support.command import livebode
+from tests.support.peers.machine import Machine
+from tests.support.peers.peer import until
+from tests.support.recorded import same
+from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, said, source
+
+LINES = Lines.parse("50,100,200", 1000.0, 100)
+SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
+FIT = '[axes.x.fit]\nmodel = "rigid"\n'
+
+
+def one(machine: Machine, shared: str = SHARED) -> str:
+    return f"{shared}[axes.x]\n{source(machine)}"
+
+
+def joined(runs: list[Path]) -> Responses:
+    parts = [Run.open(run).responses() for run in runs]
+    return Responses.join(parts)
+
+
+def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: Path) -> None:
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
+        runs = [running.out / name for name in ("x", "x-2", "x-3", "x-4")]
+        texts = [one(machine) + FIT, one(machine), one(machine, SHARED.replace("samples = true", "samples = true\n"))]
+        running.tracked("x", 700)
+        running.edit(texts[0])  # by a signal
+        running.tracked("x-2", 700)
+        running.file.write_text(texts[1])  # by itself
+        running.tracked("x-3", 700)
+        running.edit(one(machine, SHARED.replace("hop = 20", "hop = 10")))
+        running.tracked("x-4", 700)
+        machine.silence()
+        until(lambda: numbers(runs[3])[-1] >= machine.sent - 700, "the last samples")  # half a second waits for more
+        code, _, err = running.end()
+        sent = machine.sent
+    assert code == 0, err
+    check_samples(runs, sent)
+    assert [(said(run).get("continues"), said(run).get("continued_in")) for run in runs] == [
+        (None, "x-2"), ("x", "x-3"), ("x-2", "x-4"), ("x-3", None),
+    ]  # fmt: skip
+    assert [said(run)["record"]["finished"] for run in runs] == [True, True, True, False]
+    assert sum(said(run)["counts"]["samples"] for run in runs[:3]) == numbers(runs[3])[0]
+    # The first three share their settings of tracking: the state went on, and it is as if nothing had been changed.
+    first, same_settings = numbers(runs[3])[0], joined(runs[:3])
+    truth = Tracker(SETTINGS).process(block(int(first)))
+    assert same(same_settings, truth)
+    # The last one tracks otherwise: as a tracker that begins at its first sample.
+    tracker = Tracker(Settings(**{**SETTINGS.__dict__, "hop": 10}))
+    assert same(Run.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
+    assert said(runs[1])["fit"]["model"] == "rigid"
+    assert pa.concat_tables(Run.open(runs[1]).tables("parameters")).num_rows > 0
+    applied = [[e for e in events(run) if e.kind == "configuration-applied"] for run in runs]
+    assert [[e.details["sections"] for e in found] for found in applied] == [[["fit"]], [["fit"]], [["tracking"]], []]
+    assert [found[0].sample for found in applied[:3]] == [numbers(run)[-1] + 1 for run in runs[:3]]
+    for run in runs:
+        assert (run / "bode.png").stat().st_size > 10_000
+
+
+def test_how_the_record_is_cut_changes_in_place(tmp_path: Path) -> None:
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
+        running.tracked("x", 500)
+        running.edit(one(machine, SHARED.replace("segment_s = 2", "segment_s = 0.2\nbudget_bytes = 20000000")))
+        running.told("x", "configuration-applied")
+        at = numbers(running.out / "x").size
+        running.tracked("x", at + 2500)
+        code, _, err = running.end()
+    assert code == 0, err
+    assert not (running.out / "x-2").exists()
+    long = [s.last_sample - s.first_sample for s in Run.open(running.out / "x").segments if s.table == "samples"]
+    assert len(long) >= 5
+    assert min(long) < 1000
+    number = numbers(running.out / "x")
+    assert np.array_equal(number, np.arange(number.size))
+
+
+REFUSED = (
+    ("hop = 20", "hop = 101", "axis x: hop=101 is not between 1 and the window"),
+    ("[lines]", "[lines", "is not TOML"),
+    ('output = "y"', 'output = "yy"', "did you mean 'y'"),
+    ("source.url = ", "source.timeout_s = 3\nsource.url = ", "[source] cannot be changed without losing samples"),
+)
+
+
+def reported(run: Path) -> list[Event]:
+    """The events of a run, without the rule for its noise."""
+    return [event for event in events(run) if event.kind != "noise-from-detection-lines"]
+
+
+def test_what_cannot_be_applied_is_refused_once_and_nothing_stops(tmp_path: Path) -> None:
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
+        running.tracked("x", 300)
+        for count, (before, after, says) in enumerate(REFUSED, 2):
+            running.file.write_text(one(machine).replace(before, after))
+            until(lambda count=count: len(reported(running.out / "x")) >= count, says)
+            assert says in reported(running.out / "x")[-1].message
+            at = numbers(running.out / "x").size
+            running.tracked("x", at + 2500)  # more than a look at the file
+        code, _, err = running.end()
+    assert code == 0
+    assert [event.kind for event in reported(running.out / "x")] == ["connected", *["configuration-refused"] * 4]
+    for _, _, says in REFUSED:
+        assert err.count(says) == 1
+    number = numbers(running.out / "x")
+    assert np.array_equal(number, np.arange(number.size))
+
+
+def test_a_silent_axis_holds_up_no_edit_of_the_others(tmp_path: Path) -> None:
+    silent = '[axes.z.source]\nurl = "tcp://127.0.0.1:1"\ntimeout_s = 3600\n'
+    with Machine(tmp_path) as machine, Running(tmp_path, one(machine) + silent) as running:
+        running.tracked("x", 300)
+        running.edit(one(machine) + silent.replace("3600", "1800"))
+        assert "axis z: the live source has sent no samples yet" in running.told("x", "configuration-refused").message
+        running.edit(one(machine) + FIT + silent)
+        running.tracked("x-2", 300)
+        running.edit(one(machine) + FIT)
+        running.tracked("x-2", 1500)
+        code, out, err = running.end()
+    assert code == 0, err
+    assert "z: the axis was removed and ends" in err
+    assert json.loads(out)["axes"]["x"]["counts"]["samples"]
+
+
+def test_a_live_run_with_a_loop_is_reported(tmp_path: Path) -> None:
+    loop = "[loop.velocity]\ngain = 0.01\nrate_hz = 1000\n"
+    text = SHARED.replace("hop = 20", "hop = 20\naverage = true") + loop
+    with Machine(tmp_path) as machine, Running(tmp_path, text + f"[axes.x]\n{source(machine)}") as running:
+        running.tracked("x", 800)
+        assert running.end()[0] == 0
+    result = livebode("report", running.out / "x")
+    assert result.code == 0, result.err
+    page = (running.out / "x" / "report.html").read_text()
+    for words in ("excitation at the plant input", "forgetting 0.8", "joint"):
+        assert words in page, words
+
+
+def test_axes_come_and_go(tmp_path: Path) -> None:
+    with Machine(tmp_path) as a, Machine(tmp_path) as b:
+        second = f"[axes.y]\n{source(b)}"
+        with Running(tmp_path, one(a), "--force") as running:
+            running.tracked("x", 300)
+            running.edit(one(a) + second)
+            running.tracked("y", 300)
+            running.edit(SHARED + second)
+            until(lambda: "counts" in said(running.out / "x"), "the end of the axis that was taken out")
+            left = numbers(running.out / "x")
+            running.tracked("y", numbers(running.out / "y").size + 500)
+            running.edit(one(a) + second)
+            running.tracked("x", left.size + 300)
+            code, out, err = running.end()
+    assert code == 0, err
+    found = json.loads(out)["axes"]
+    assert found.keys() == {"x", "y"}
+    for name, gaps in (("x", 1), ("y", 0)):
+        number = numbers(running.out / name)
+        assert np.array_equal(number[: left.size], np.arange(left.size))
+        assert np.count_nonzero(np.diff(number) != 1) == gaps
+        assert found[name]["counts"]["samples"] == number.size
+
+
+def test_the_same_command_goes_on_with_the_newest_run(tmp_path: Path) -> None:
+    with Machine(tmp_path) as machine:
+        with Running(tmp_path, one(machine)) as running:
+            running.tracked("x", 300)
+            running.edit(one(machine) + FIT)
+            running.tracked("x-2", 300)
+            running.end(signal.SIGKILL)
+        runs = [running.out / name for name in ("x", "x-2", "x-3")]
+        held = [numbers(run) for run in runs[:2]]
+        with Running(tmp_path, one(machine) + FIT) as running:
+            running.tracked("x-2", held[1].size + 300)
+            running.edit(one(machine))
+            running.tracked("x-3", 300)
+            assert running.end()[0] == 0
+        number = np.concatenate([numbers(run) for run in runs])
+        assert np.array_equal(number[: number.size], np.unique(number))
+        assert np.count_nonzero(np.diff(number) != 1) == 1  # where it was killed
+        assert [said(run).get("continues") for run in runs] == [None, "x", "x-2"]
+        with Running(tmp_path, one(machine), "--force") as running:
+            until(lambda: not runs[1].exists() and not runs[2].exists(), "the end of what is replaced")
+            running.tracked("x", 300)
+            assert running.end()[0] == 0

@@ -1,0 +1,77 @@
+"""A tracker that stands still while a machine sends as fast as it can: a gap and an event, and bounded memory."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.records import Run
+from livebode.sources.live import Batch
+from livebode.sources.live.inbox import INBOX_BYTES_MAX, INBOX_BYTES_MIN, INBOX_S_MAX, Inbox
+from tests.support.live_session import SIZE, LiveSession, Stuck, hurried
+from tests.support.peers.broker import MqttPeer
+from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, batches, until
+from tests.support.peers.plain import TcpPeer, UdpPeer
+
+BATCHES = 400
+"""200 s of the machine, three times what may wait."""
+SLACK_BYTES = 64 << 20
+
+
+def rss_bytes() -> int:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.parametrize("kind", [UdpPeer, TcpPeer, MqttPeer])
+def test_what_does_not_fit_is_a_gap_and_memory_is_bounded(tmp_path: Path, kind: type[Peer]) -> None:
+    stuck = Stuck()
+    with kind(tmp_path) as peer, LiveSession(tmp_path, peer, stuck, record={"samples": True}) as session:
+        peer.wait_ready()
+        for batch in batches(12, first=0):
+            peer.send(batch)
+        assert stuck.held.wait(30)
+        before, source = rss_bytes(), session.orders.source
+        for batch in hurried(BATCHES, 12 * 50):
+            peer.send(batch)
+        until(lambda: source.health.counts["overflow"], "an overflow")
+        assert source.health.waiting_bytes <= INBOX_BYTES_MAX
+        grown = rss_bytes() - before
+        stuck.released.set()
+        until(lambda: not source.health.waiting_bytes, "the queue to be empty")
+        for batch in hurried(20, 12 * 50 + BATCHES * SIZE):  # the stream goes on
+            peer.send(batch)
+        until(lambda: source.health.lost, "the loss to be seen")
+    assert grown < INBOX_S_MAX * RATE_HZ * 2 * 8 + SLACK_BYTES
+    run = Run.open(tmp_path / "run")
+    kinds = [event.kind for event in run.events()]
+    assert "overflow" in kinds
+    assert "loss" in kinds
+    assert "gap" in kinds
+    assert run.summary["counts"]["missing"] == run.summary["source"]["lost"] > 0
+    tables = list(run.tables("samples"))
+    number, sent = (np.concatenate([t[name].to_numpy() for t in tables]) for name in ("sample", "w"))
+    assert np.array_equal(sent, number + sent[0])  # each sample is the one that its number says
+
+
+def test_the_inbox_takes_a_minute_of_any_machine() -> None:
+    def batch(samples: int, rate_hz: float) -> Batch:
+        return Batch(0, np.zeros((2, samples)), CHANNELS, rate_hz)
+
+    slow, fast, tiny = Inbox(), Inbox(), Inbox()
+    while slow.put(batch(100, 4000.0), wait=False):
+        pass
+    assert slow.bytes == pytest.approx(INBOX_S_MAX * 40 * (100 * 16 + 1000))
+    while fast.put(batch(10_000, 1e6), wait=False):
+        pass
+    assert INBOX_BYTES_MAX - 161_000 <= fast.bytes <= INBOX_BYTES_MAX
+    while tiny.put(batch(10, 1e-3), wait=False):  # hours of a machine that hardly sends
+        pass
+    assert INBOX_BYTES_MIN - 2000 <= tiny.bytes <= INBOX_BYTES_MIN
+    while slow.get(0.0) is not None:
+        pass
+    assert slow.bytes == 0
+    assert slow.put(batch(100, 4000.0), wait=False)

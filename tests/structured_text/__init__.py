@@ -1,6 +1,0 @@
-"""Runs the subset of Structured Text that livebode generates, from blark's parse tree: what is parsed is what runs."""
-
-from tests.structured_text.machine import Instance, Machine, parse
-from tests.structured_text.types import RefusedError
-
-__all__ = ["Instance", "Machine", "RefusedError", "parse"]

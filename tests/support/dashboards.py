@@ -1,0 +1,147 @@
+"""A machine whose run goes on as far as a test lets it, with the dashboard open."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from examples.closed_loop import RATE_HZ, Drive
+from livebode.configuration.axis import FitSection, LoopSection, RecordSection
+from livebode.core import Block, Channel, Lines, Responses
+from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.estimation import Settings, Tracker
+from livebode.excitation import multisine
+from livebode.records import Run
+from livebode.runtime.fits import Fits
+from livebode.runtime.tracking import record
+from tests.support.browser import until
+from tests.support.responses import made
+
+LINES = Lines.parse("20:140:10", RATE_HZ, 400)
+UNITS = {"w": "N m", "u": "N m", "y": "rad/s", "x": "m"}
+SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="x", hop=40)
+LOOP = {
+    "velocity": {"gain": 0.2308, "integral_time_s": 0.2, "rate_hz": RATE_HZ},
+    "position": {"gain": 1.0, "rate_hz": RATE_HZ / 2, "held_ticks": 2},
+}
+FIT = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
+SAMPLES = 12_000
+BAD = 5000  # a sample that is not finite: an event, and responses that are not valid
+
+
+@cache
+def data() -> np.ndarray:
+    """w, u, y and a position that goes there and back, shape (4, samples)."""
+    w = 0.3 * multisine(LINES)
+    u, y = Drive().run(w, SAMPLES // LINES.window, sigma=0.1, seed=1)
+    x = 0.9 + 0.6 * np.sin(2 * np.pi * np.arange(SAMPLES) / 8000)
+    found = np.array([np.resize(w, SAMPLES), u[0], y[0], x])
+    found[2, BAD] = np.nan
+    return found
+
+
+class Machine:
+    """Hands out its samples as far as `allow` says."""
+
+    samples = None
+
+    def __init__(self) -> None:
+        self._allowed = 0
+        self._more = threading.Condition()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return tuple(Channel(name, unit) for name, unit in UNITS.items())
+
+    def allow(self, samples: int) -> None:
+        with self._more:
+            self._allowed = samples
+            self._more.notify_all()
+
+    def blocks(self, channels: Sequence[str]) -> Iterator[Block]:
+        rows = [list(UNITS).index(name) for name in channels]
+        for start in range(0, SAMPLES, 200):
+            with self._more:
+                while self._allowed < start + 200:
+                    self._more.wait(0.05)
+                    if self._allowed >= start + 200:
+                        break
+                    if self._allowed < 0:
+                        return
+                    # So that what the audience has to say is recorded while the machine stands still.
+                    yield Block(np.empty((len(rows), 0)), tuple(channels), RATE_HZ, start=start)
+            yield Block(data()[rows, start : start + 200], tuple(channels), RATE_HZ, start=start)
+
+
+class Watched:
+    """A run in segments that the dashboard shows; `serving` says to whom."""
+
+    def __init__(
+        self, directory: Path, serving: Serving | None = None, loop: dict[str, Any] | None = LOOP, name: str = "axis"
+    ) -> None:
+        self.directory, self.machine = directory, Machine()
+        self.told: list[str] = []
+        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.told.append)
+        self.hub = self.dashboard.hub(name)
+        words = {"loop": loop or {}, "fit": FIT, "signals": {"output": "y", "input": "u", "schedule": "x"}}
+        section = FitSection.model_validate(FIT)
+        described = LoopSection.model_validate(loop or {}).build(RATE_HZ)
+        self._thread = threading.Thread(
+            target=record,
+            args=(self.machine, Tracker(SETTINGS), directory),
+            kwargs={
+                "about": {"configuration": words, "found": {"format": "test"}}, "force": False, "draw": lambda *_: None,
+                "progress": lambda *_: None, "fits": Fits(section, described if loop else None), "audience": self.hub,
+                "kept": RecordSection(segment_s=1.0),
+            },
+        )  # fmt: skip
+
+    def __enter__(self) -> Watched:
+        self.dashboard.__enter__()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+        self.dashboard.__exit__()
+
+    @property
+    def url(self) -> str:
+        return self.dashboard.url
+
+    def go(self, samples: int) -> None:
+        """Let the machine go on to this sample, and wait until all of it is published."""
+        self.machine.allow(samples)
+        until(lambda: self.hub.samples >= samples or not self._thread.is_alive(), f"sample {samples}")
+
+    def end(self) -> None:
+        """Let the run end."""
+        self.machine.allow(-1 if self.hub.samples < SAMPLES else SAMPLES)
+        self._thread.join(60)
+        assert not self._thread.is_alive()
+
+    def record(self) -> Run:
+        """What is recorded by now."""
+        return Run.open(self.directory)
+
+
+def whole_run(directory: Path, loop: dict[str, Any] | None = LOOP) -> Path:
+    """The directory of a run that is over."""
+    with Watched(directory, loop=loop) as run:
+        run.go(SAMPLES)
+    return directory
+
+
+def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0, rows: Responses | None = None) -> None:
+    """A run on these lines, with its first responses, that begins at this time."""
+    found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
+    found |= {"quantity": "plant", "unit": ""}
+    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
+    rows = rows or made(30, lines, hole=0.0, unit="")
+    hub.write(replace(rows, time_s=rows.time_s + from_s))

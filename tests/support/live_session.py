@@ -1,0 +1,81 @@
+"""A live run in this process on a peer that a test drives, and what holds it up."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from livebode.configuration import Axis
+from livebode.core import Block, Event
+from livebode.records import Run
+from livebode.runtime import Audience, Destination, Orders, run_live
+from livebode.sources.live import Batch, SourceSettings
+from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer
+
+SIZE = 2000
+"""Samples in a batch of a sender in a hurry: half a second."""
+
+
+def hurried(count: int, first: int) -> list[Batch]:
+    """Batches of half a second, numbered in their first channel."""
+    found = []
+    for start in range(first, first + count * SIZE, SIZE):
+        data = np.stack([np.arange(start, start + SIZE, dtype=float), np.sin(0.1 * np.arange(SIZE))])
+        found.append(Batch(start, data, CHANNELS, RATE_HZ, 0))
+    return found
+
+
+class Stuck(Audience):
+    """Holds up the thread that tracks, as a disk does that does not answer."""
+
+    def __init__(self) -> None:
+        self.held, self.released = threading.Event(), threading.Event()
+
+    def followed(self, _: Block) -> None:
+        self.held.set()
+        self.released.wait()
+
+
+class LiveSession:
+    """`run_live` in a thread, on a peer that is open; leaving it ends the run and waits for its record.
+
+    `sections` are those of the axis; w is the input and y the output by the direct estimator where not given.
+    """
+
+    def __init__(self, folder: Path, peer: Peer, audience: Audience | None = None, **sections: Any) -> None:
+        settings: dict[str, Any] = {
+            "source": SourceSettings(**peer.settings).model_dump(exclude_unset=True),
+            "signals": {"output": "y", "input": "w"},
+            "lines": {"frequencies": "100", "window": 400},
+            "tracking": {"estimator": "direct"},
+        }
+        self.run, self.orders = folder / "run", Orders()
+        self.told: list[Event] = []
+        to = Destination(self.run, lambda *_: None, audience=audience or Audience(), tell=self.told.append)
+        self._arguments = Axis.of(settings | sections, "test"), to, self.orders
+        self._error: BaseException | None = None
+
+    def __enter__(self) -> Self:
+        self._thread = threading.Thread(target=self._work)
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.orders.end()
+        self._thread.join()
+        if kind is None and self._error is not None:
+            raise self._error
+
+    def events(self) -> list[Event]:
+        """What is in the record now."""
+        begun = (self.run / "run.json").exists() and (self.run / "events.jsonl").exists()
+        return Run.open(self.run).events() if begun else []
+
+    def _work(self) -> None:
+        try:
+            run_live(*self._arguments)
+        except BaseException as error:
+            self._error = error
