@@ -10,7 +10,7 @@ import time
 from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Strokes
-from tests.simulation.test_motion_equations_truth import stroke_error
+from tools.motion_equations import stroke_error
 
 RATIO_TARGET, ERROR_TARGET, SECONDS = 100.0, 1e-6, 60.0
 EXCITATION = multisine(Lines.parse("20:140:20", rate_hz=4000, window=400))

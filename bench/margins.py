@@ -10,7 +10,7 @@ import control
 import numpy as np
 
 from livebode.margins import margins, tuning
-from tests.support.loops import BELT, Case, parameters
+from tools.loops import BELT, Case, parameters
 
 CASE = Case(BELT, gain=3 * 0.2308, delay_ticks=8)
 BAND_HZ = (20.0, 140.0)

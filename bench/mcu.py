@@ -12,7 +12,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.firmware import M4F, M7, ROOT, Core, flash, missing, run
+from tools.firmware import M4F, M7, ROOT, Core, flash, missing, run
 
 NATIVE = ROOT / "bench" / "mcu_native"
 WINDOW, HOP, CHANNELS = 400, 20, 2

@@ -16,8 +16,8 @@ from livebode.excitation import schroeder_phases
 from livebode.kernel import SlidingDFT
 from livebode.kernel.twin import TwinDFT
 from livebode.structured_text import multisine, sliding_dft
-from tests.support.structured_text import Instance, Machine
-from tests.support.structured_text.types import Array, Scalar
+from tools.structured_text import Instance, Machine
+from tools.structured_text.types import Array, Scalar
 
 WINDOW, RATE_HZ = 400, 4000.0
 

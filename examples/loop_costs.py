@@ -9,8 +9,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 from livebode import PID, Block, Cascade, Lines, Loop, Settings, Tracker, multisine
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 
@@ -37,9 +37,9 @@ LOOPS = {
 def costs() -> dict[str, float]:
     """Largest relative error of the plant for each description."""
     w = multisine(LINES)
-    _, y = Drive().run(w, periods=2)
+    _, y = TwoMassLoop().run(w, periods=2)
     block = Block(np.array([np.tile(w, 2), y[0]]), ("w", "y"), RATE_HZ)
-    truth = Plant().response(LINES.frequency_hz)
+    truth = TwoMassPlant().response(LINES.frequency_hz)
     found = {}
     for name, loop in LOOPS.items():
         settings = Settings(lines=LINES, output="y", excitation="w", estimator="indirect", loop=loop)

@@ -16,11 +16,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from examples.kernel_drive import KernelDrive
 from livebode import Channel, Lines, multisine
 from livebode.core import LivebodeError, SpectraLayout
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
-from livebode.sources.live import Batch, encode_layout, encode_samples, encode_spectra, encode_spectra_layout
+from livebode.sources.live import (
+    Batch,
+    encode_layout,
+    encode_samples,
+    encode_spectra,
+    encode_spectra_layout,
+)
+from livebode.sources.live.kernel_drive import KernelDrive
 
 BATCH = 100
 CHANNELS = ["w", "u", "velocity", "x"]

@@ -10,10 +10,54 @@ from dataclasses import replace
 
 import numpy as np
 
+from livebode.core import Lines
 from livebode.design import Waveform, belt_machine, peaks, worst
-from livebode.simulation import BeltAxis, SimulatedAxis
-from tests.design.test_predictions_truth import MOVING, STANDING
-from tests.support.experiments import extremes
+from livebode.excitation import chirp, chirp_lines, multisine, prbs
+from livebode.simulation import (
+    BeltAxis,
+    Drive,
+    Friction,
+    Mechanics,
+    Sensor,
+    SimulatedAxis,
+    Standstill,
+    Strokes,
+    extremes,
+)
+
+LINES = Lines.parse("20:140:20", 4000, 400)
+FINE = Lines.parse("10:150:5", 4000, 1600)
+ALONE = Lines.parse("40", 4000, 400)
+NOISE = Sensor(noise_rad_per_s=0.1)
+STANDING = {
+    "Schroeder": (BeltAxis(), LINES, multisine(LINES)),
+    "with noise, low crest": (BeltAxis(sensor=NOISE), LINES, multisine(LINES, 1.0, "low crest")),
+    "a line alone": (BeltAxis(), ALONE, multisine(ALONE)),
+    "three masses, chirp": (
+        BeltAxis(mechanics=Mechanics(masses=3)), chirp_lines(5, 250, 4000, 8000), chirp(5, 250, 4000, 8000, 2.0),
+    ),
+    "PRBS near the end": (
+        BeltAxis(motion=Standstill(position_m=1.6)), Lines(tuple(range(6, 90)), 2555, 4000.0),
+        prbs(9, 2.0, held_ticks=5),
+    ),
+    "late and stiff": (
+        BeltAxis(drive=Drive(velocity_rate_hz=2000, position_rate_hz=1000, position_gain_per_s=10, delay_ticks=2)),
+        FINE, multisine(FINE, 0.4, "random", seed=2),
+    ),
+    "differenced velocity": (
+        BeltAxis(sensor=Sensor(velocity_differenced=True)), FINE, multisine(FINE, 0.4, "random", seed=3),
+    ),
+}  # fmt: skip
+MOVING = {
+    "the paper's strokes with friction and noise": (
+        BeltAxis(motion=Strokes(), friction=Friction(load_coulomb_n=15.0), sensor=NOISE), LINES, multisine(LINES),
+    ),
+    "fast S-curves": (
+        BeltAxis(motion=Strokes(speed_m_per_s=1.5, acceleration_m_per_s2=10, jerk_m_per_s3=200)),
+        FINE, multisine(FINE, 0.3, "random"),
+    ),
+}  # fmt: skip
+
 
 TARGET = 0.1
 ALIGNMENTS = 40
@@ -25,7 +69,10 @@ def row(name: str, axis: BeltAxis, lines, samples: np.ndarray) -> str:
     at_m = axis.motion.cycle(axis.drive.rate_hz)[0]
     moves = len(at_m) > 1
     simulated = extremes(
-        axis, samples, ALIGNMENTS if moves else 1, 2 * len(at_m) / axis.drive.rate_hz if moves else 2.0
+        axis,
+        samples,
+        alignments=ALIGNMENTS if moves else 1,
+        seconds=2 * len(at_m) / axis.drive.rate_hz if moves else 2.0,
     )
     predicted = worst(peaks(Waveform(lines, samples), belt_machine(axis)))
     cells, ratios = [], []

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import signal
 
-from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode import Block, Lines, Response, Settings, Tracker, multisine
 from livebode.fitting import Fit, fit
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
 from livebode.validation import Validation, validate
 from studies.common import SIGMA, Floats
 from studies.drawing import LIGHT, figure_of
@@ -40,7 +40,7 @@ def runs(count: int, seed: int, amplitude: float = 1.0, colour: float = 0.0, sam
     rng, total = np.random.default_rng(seed), samples + BEFORE
     noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal((total, count)), axis=0) * SIGMA
     w = amplitude * EXCITATION
-    u, y = Drive().under(w, noise)
+    u, y = TwoMassLoop().under(w, noise)
     return np.stack([np.broadcast_to(np.resize(w, total), u.shape), u, y], axis=1)[..., BEFORE:]
 
 
@@ -48,7 +48,7 @@ def runs(count: int, seed: int, amplitude: float = 1.0, colour: float = 0.0, sam
 def true_model(stiffness: float = 1.0) -> Fit:
     """Two masses with the machine's own parameters, or with a wrong stiffness."""
     lines = Lines.parse("20:140:5", RATE_HZ, 800)
-    value, ones = Plant(keff=Plant().keff * stiffness).response(lines.frequency_hz), np.ones(len(lines))
+    value, ones = TwoMassPlant(keff=TwoMassPlant().keff * stiffness).response(lines.frequency_hz), np.ones(len(lines))
     exact = Response(lines, value, 1e-6 * ones, np.inf, ones, ones > 0, 0, 799, 0.1)
     return fit(exact, "two-mass", radius_m=0.019)
 

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,19 @@ import numpy as np
 
 from livebode.core import Block, Event
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
-from livebode.simulation import Drive, Friction, FrictionChange, Limits, Mechanics, Sensor, Strokes, TensionLoss
-from studies.monitoring_axis import CHANNELS, HIGH_M, LINES, LOW_M, RADIUS_M, RATE_HZ, SPEED_M_PER_S, axis, run
+from livebode.simulation import Drive, Friction, FrictionChange, Mechanics, Sensor, StrokeSequence, TensionLoss
+from studies.monitoring_axis import (
+    CHANNELS,
+    HIGH_M,
+    LINES,
+    LOW_M,
+    RADIUS_M,
+    RATE_HZ,
+    SPEED_M_PER_S,
+    axis,
+    length_s,
+    run,
+)
 
 NAMES = ("u", "velocity", "x")
 ASKED = "one in 30 days of motion"
@@ -68,39 +79,21 @@ CONDITIONS = {
 }
 
 
-@dataclass(frozen=True)
-class AnyStart:
+def any_start(start_m: float, seed: int, seconds: float = SECONDS, strokes_max: int = 1000) -> StrokeSequence:
     """Strokes at random speeds between the ends of the way, from `start_m` on, for at least `seconds`."""
-
-    start_m: float
-    seed: int
-    seconds: float = SECONDS
-    strokes_max: int = 1000
-
-    @cached_property
-    def _parts(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        generator, parts, at, samples = np.random.default_rng(self.seed), [], self.start_m, 0
-        end = HIGH_M if generator.uniform() < 0.5 else LOW_M
-        while samples < self.seconds * RATE_HZ and len(parts) < self.strokes_max:
-            speed = float(SPEED_M_PER_S * generator.uniform(0.3, 1.0))
-            if abs(end - at) > 0.05:
-                cycle = Strokes(start_m=at, end_m=end, speed_m_per_s=speed).cycle(RATE_HZ)
-                parts.append((cycle[0][: cycle[0].size // 2], cycle[1][: cycle[1].size // 2]))
-                samples += parts[-1][0].size
-            at, end = end, LOW_M + HIGH_M - end
-        return parts
-
-    def cycle(self, rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
-        assert rate_hz == RATE_HZ
-        position, speed = (np.concatenate(rows) for rows in zip(*self._parts))
-        return position, speed
-
-    def check(self, limits: Limits) -> None:
-        """They are within."""
-
-    @property
-    def whole_s(self) -> float:
-        return sum(part[0].size for part in self._parts) / RATE_HZ
+    generator = np.random.default_rng(seed)
+    end = HIGH_M if generator.uniform() < 0.5 else LOW_M
+    points, speeds, duration_s = [start_m], [], 0.0
+    while duration_s < seconds and len(speeds) < strokes_max:
+        speed = float(SPEED_M_PER_S * generator.uniform(0.3, 1.0))
+        if abs(end - points[-1]) > 0.05:
+            points.append(end)
+            speeds.append(speed)
+            duration_s += length_s(StrokeSequence(turning_points_m=tuple(points[-2:]), speeds_m_per_s=(speed,)))
+        else:
+            points[-1] = end
+        end = LOW_M + HIGH_M - end
+    return StrokeSequence(turning_points_m=tuple(points), speeds_m_per_s=tuple(speeds))
 
 
 def simulated(
@@ -108,14 +101,14 @@ def simulated(
 ) -> Callable[[], Iterable[Block]]:
     """A run of `SECONDS`, or of so many strokes."""
     generator = np.random.default_rng([seed, 7])
-    motion = AnyStart(
+    motion = any_start(
         float(generator.uniform(LOW_M, HIGH_M)) if strokes is None else LOW_M, seed, strokes_max=strokes or 1000
     )
     friction = Friction(load_coulomb_n=FRICTION_N * float(generator.uniform(0.8, 1.2)))
     machine = axis(
         motion,
         seed,
-        seconds=SECONDS if strokes is None else motion.whole_s,
+        seconds=SECONDS if strokes is None else length_s(motion),
         faults=faults,
         friction=friction,
         mechanics=Mechanics(**condition.mechanics),

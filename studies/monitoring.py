@@ -21,7 +21,7 @@ from livebode.core import Block, Event
 from livebode.monitoring import Evidence, Machine, MachineDetector, MachineMonitor, learn_machine, seconds_between
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.machine_detector import CHARTS
-from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, TensionLoss
+from livebode.simulation import DampingGrowth, LoadChange, SoftSpot, StrokeSequence, TensionLoss
 from studies.monitoring_axis import (
     HIGH_M,
     LINES,
@@ -29,9 +29,9 @@ from studies.monitoring_axis import (
     RADIUS_M,
     RATE_HZ,
     WINDOW,
-    RandomStrokes,
     axis,
     healthy_runs,
+    length_s,
     run,
     strokes,
 )
@@ -54,7 +54,7 @@ def monitor(machine: Machine, asked: str = ASKED) -> MachineMonitor:
 class Trial:
     """One stroke with a fault from its beginning on, and the events that came before it ended."""
 
-    motion: RandomStrokes
+    motion: StrokeSequence
     events: list[Event]
 
     @property
@@ -75,7 +75,7 @@ def trial(machine: Machine, seed: int, fault: Any, *, whole: bool = False) -> Tr
     if whole:
         return Trial(motion, events + watcher.finish())
     events += watcher.rest()
-    return Trial(motion, [e for e in events if e.time_s <= motion.edges_s[-1]])
+    return Trial(motion, [e for e in events if e.time_s <= length_s(motion)])
 
 
 class Study:
@@ -169,7 +169,7 @@ class Study:
         while used < self.count:
             generator = np.random.default_rng(200_000 + used)
             motion = strokes(100, generator)
-            ramp_s = 2 * float(motion.edges_s[-1])
+            ramp_s = 2 * length_s(motion)
             fault = TensionLoss(loss=0.02, ramp_s=ramp_s)
             watcher, first = monitor(self.machine), None
             for block in run(axis(motion, 200_000 + used, faults=(fault,)))():
@@ -179,7 +179,7 @@ class Study:
             time_s = first.time_s if first else float("inf")
             lost.append(2 * time_s / ramp_s)
             named += bool(first and first.details["what"] == "stiffness")
-            used += int(np.searchsorted(motion.edges_s, min(time_s, motion.edges_s[-1])))
+            used += int(np.searchsorted(motion.edges_s(RATE_HZ), min(time_s, length_s(motion))))
         self.numbers["ramp"] = row = {
             "ramps": len(lost),
             "named_stiffness": named,
@@ -239,7 +239,8 @@ class Study:
             row = {}
             for way, ends in (("forward", (LOW_M, HIGH_M)), ("return", (HIGH_M, LOW_M))):
                 watcher, kept = monitor(self.machine), []
-                for block in run(axis(RandomStrokes((speed,), *ends), seed))():
+                motion = StrokeSequence(turning_points_m=ends, speeds_m_per_s=(speed,))
+                for block in run(axis(motion, seed))():
                     watcher.process(block, kept.append)
                 seen = Evidence.join(kept)
                 seen = seen.rows(seen.judged)

@@ -13,11 +13,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from examples import closed_loop
 from livebode import Block, Lines, Response, Settings, Tracker, multisine
 from livebode.excitation import odd_lines
 from livebode.fitting import mean_response
-from livebode.simulation import Backlash, BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill
+from livebode.simulation import (
+    Backlash,
+    BeltAxis,
+    Friction,
+    Mechanics,
+    Sensor,
+    SimulatedAxis,
+    Standstill,
+    two_mass_loop,
+)
 from studies.common import RATE_HZ, Complex, Floats
 
 TARGET = (0.60, 0.95)
@@ -40,7 +48,7 @@ class Case:
     noise: Noise | None = None
     lines: Lines = ODD
     options: dict[str, str] = field(default_factory=dict)
-    damping: float = closed_loop.BS
+    damping: float = two_mass_loop.BS
     silent: int = 0  # periods without excitation at the beginning
 
 
@@ -142,7 +150,7 @@ def truth_of(case: Case) -> Complex:
     f = case.lines.frequency_hz
     if case.axis is not None:
         return np.asarray(case.axis.linear(POSITION_M).sampled(RATE_HZ).response(f))
-    return closed_loop.Plant(bs=case.damping).response(f)
+    return two_mass_loop.TwoMassPlant(bs=case.damping).response(f)
 
 
 def recorded(case: Case, seed: int) -> Block:
@@ -158,7 +166,7 @@ def recorded(case: Case, seed: int) -> Block:
 
 
 def _of_loop(case: Case, period: Floats, seed: int) -> Block:
-    drive = closed_loop.Drive(closed_loop.Plant(bs=case.damping))
+    drive = two_mass_loop.TwoMassLoop(two_mass_loop.TwoMassPlant(bs=case.damping))
     samples = LEAD_OF_LOOP + PERIODS * period.size
     assert case.noise is not None
     noise = case.noise(np.random.default_rng(1000 + seed), samples)[:, np.newaxis]

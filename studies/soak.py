@@ -32,12 +32,12 @@ import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from examples.closed_loop import RATE_HZ, Drive
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
 from livebode.runtime import Audience, Destination, Relay, Session, segmented
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
 
@@ -109,7 +109,7 @@ def machines(listeners: list[socket.socket], done: list[Synchronized[int]], batc
     page = threading.Thread(target=look_on, args=(url, end))
     page.start()
     w = 0.3 * multisine(LINES)
-    u, y = Drive().run(w, 160, sigma=0.1, seed=0)
+    u, y = TwoMassLoop().run(w, 160, sigma=0.1, seed=0)
     data = np.array([np.resize(w, u.shape[1]), u[0], y[0]])
     links = [listener.accept()[0] for listener in listeners]
     for link in links:

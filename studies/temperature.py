@@ -18,7 +18,7 @@ import numpy as np
 from livebode.core import Block, Channel, Event
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
 from livebode.simulation import Friction, Mechanics, TensionLoss
-from studies.healthy import ASKED, NAMES, AnyStart
+from studies.healthy import ASKED, NAMES, any_start
 from studies.monitoring_axis import HIGH_M, LINES, LOW_M, RADIUS_M, axis, run
 
 PER_KELVIN, MEAN_C, DRIFT_K, SENSOR_K = 0.002, 22.0, 0.3, 0.05
@@ -31,7 +31,7 @@ def at_temperature(
 ) -> Run:
     """A run that far off the mean temperature, with a sensor, in which it rises a little."""
     generator = np.random.default_rng([seed, 7])
-    motion = AnyStart(float(generator.uniform(LOW_M, HIGH_M)), seed, seconds=seconds)
+    motion = any_start(float(generator.uniform(LOW_M, HIGH_M)), seed, seconds=seconds)
     healthy = Mechanics()
     mechanics = dataclasses.replace(
         healthy,

@@ -1,1 +1,1 @@
-"""Programs for those who work on livebode."""
+"""Programs for those who work on livebode, and what its tests, studies and benchmarks share."""

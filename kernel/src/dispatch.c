@@ -22,7 +22,9 @@ static const lb_kernel *kernel_of(lb_instruction_set set)
 lb_status LB(choose)(LB_DFT *t, lb_instruction_set set)
 {
     t->set = set == LB_BEST ? lb_best_instruction_set() : set;
+    LB_ASSERT(t->set != LB_BEST);
     t->kernel = kernel_of(t->set);
+    LB_ASSERT(set != LB_BEST || t->kernel); /* what the machine has, the build has */
     return t->kernel ? LB_OK : LB_ERROR_INSTRUCTION_SET;
 }
 

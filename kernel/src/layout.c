@@ -47,6 +47,8 @@ typedef struct {
 
 static void *take(cursor *at, uint64_t bytes)
 {
+    LB_ASSERT(at->bytes % LB_ALIGN == 0 && (uintptr_t)at->base % LB_ALIGN == 0);
+    LB_ASSERT(bytes <= UINT64_MAX - LB_ALIGN - at->bytes);
     unsigned char *here = at->base ? at->base + at->bytes : at->base;
     at->bytes += (bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN;
     return here;
@@ -62,6 +64,8 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     const uint64_t blocks = (inner + LB_BLOCK - 1u) / LB_BLOCK;
     const uint64_t line = (c->window * bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN / bytes;
     const uint64_t row = blocks * 2u * LB_BLOCK, rows = (c->window + 1u) / 2u + 1u;
+    LB_ASSERT(inner >= c->bin_count && line >= c->window);
+    LB_ASSERT(!at->base || at->bytes); /* the object itself comes first */
 
     t->compact = c->table == LB_TABLE_COMPACT;
     t->row_length = (size_t)row;
@@ -101,7 +105,9 @@ lb_status LB(size)(const lb_config *config, size_t *bytes)
 /* The place of bin k among the inner bins, appended if new; place[k] is 1 + that place, 0 if unknown. */
 static uint32_t place_of(LB_DFT *t, uint32_t *place, uint32_t k)
 {
+    LB_ASSERT(k < t->window && place[k] <= t->inner_count);
     if (!place[k]) {
+        LB_ASSERT(t->inner_count < t->window);
         t->bins[t->inner_count++] = k;
         place[k] = t->inner_count;
     }
@@ -113,6 +119,7 @@ static lb_status fill_bins(LB_DFT *t, const lb_config *c)
     /* The table is filled later and larger than this: room to find duplicates without searching. */
     uint32_t *place = (uint32_t *)(void *)t->table;
     const uint32_t N = t->window, reach = lb_reach(c->variant);
+    LB_ASSERT((t->compact ? 2u * (size_t)N : (t->half + 1u) * t->row_length) * sizeof(real) >= N * sizeof *place);
     for (uint32_t k = 0; k < N; ++k) {
         place[k] = 0;
     }
@@ -129,6 +136,7 @@ static lb_status fill_bins(LB_DFT *t, const lb_config *c)
         taps[2] = reach < 2u ? i : place_of(t, place, (k + 2u * N - 2u) % N);
         taps[3] = reach < 2u ? i : place_of(t, place, (k + 2u) % N);
     }
+    LB_ASSERT(t->inner_count >= c->bin_count && t->inner_count <= t->blocks * LB_BLOCK);
     t->blocks = (t->inner_count + LB_BLOCK - 1u) / LB_BLOCK;
     t->row_length = t->blocks * 2u * LB_BLOCK;
     return LB_OK;
@@ -151,6 +159,7 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     cursor at = {0, (unsigned char *)memory + (LB_ALIGN - (uintptr_t)memory % LB_ALIGN) % LB_ALIGN};
     LB_DFT *t = (LB_DFT *)take(&at, sizeof(LB_DFT));
     lay_out(t, &at, config);
+    LB_ASSERT(at.base + at.bytes <= (unsigned char *)memory + bytes);
     status = LB(choose)(t, config->instruction_set);
     if (status != LB_OK) {
         return status;
@@ -168,6 +177,7 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     }
     t->radius = (real)t->damping;
     t->radius_window = (real)power;
+    LB_ASSERT(power >= 0.0 && power <= 1.0);
     status = fill_bins(t, config);
     if (status != LB_OK) {
         return status;
@@ -182,6 +192,7 @@ lb_status LB(reset)(LB_DFT *t)
     if (!t) {
         return LB_ERROR_NULL;
     }
+    LB_ASSERT(lb_laid_out(t));
     t->count = 0;
     t->index = 0;
     t->queued = 0;
@@ -191,5 +202,6 @@ lb_status LB(reset)(LB_DFT *t)
     for (size_t i = 0; i < t->channels * t->line_length; ++i) {
         t->line[i] = 0;
     }
+    LB_ASSERT(lb_sound(t));
     return LB_OK;
 }

@@ -14,6 +14,8 @@ LB_RARELY void last(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
     const real *row = lb_table_row(t, 1u), *end = row + t->row_length;
     real *line = t->line, *sums = t->sums;
+    LB_ASSERT(t->window > 3u && t->index == t->window - 1u);
+    LB_ASSERT(t->row_length == 2u * t->inner_count);
     for (uint32_t c = 0; c < t->channels; ++c, line += t->line_length, samples += stride) {
         const real even = *samples + line[1], odd = *samples - line[1];
         line[t->index] = *samples;
@@ -27,6 +29,7 @@ LB_RARELY void last(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 /* Windows of up to three samples, where a sample may be the first of the second half and the last. */
 LB_RARELY void tiny(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
+    LB_ASSERT(t->window <= 3u && lb_renews(t->variant));
     if (t->window == 1u) {
         for (uint32_t c = 0; c < t->channels; ++c, samples += stride) {
             t->sums[4u * c + 2u] = t->line[c * t->line_length] = *samples;
@@ -57,6 +60,7 @@ LB_RARELY void unrenewed(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 
 static void step(LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
+    LB_ASSERT(lb_sound(t));
     const uint32_t index = t->index, next = index + 1u < t->window ? index + 1u : 0u;
     if (!lb_renews(t->variant)) {
         unrenewed(t, samples, stride);
@@ -105,6 +109,7 @@ void LB(skip)(LB_DFT *t, lb_input *in, size_t length)
 
 void LB(row)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
+    LB_ASSERT(lb_sound(t) && !t->queued);
     const real *sums = lb_sums(t, channel), *end = out + 2u * (size_t)t->inner_count;
     if (phase == LB_PHASE_FIXED) {
         for (; out != end; out += 2, sums += 4) {

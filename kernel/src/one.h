@@ -45,6 +45,7 @@ LB_OFTEN twiddles first_of(const LB_DFT *t, uint32_t number, int compact)
 /* cos, sin of the next bin. */
 LB_OFTEN const real *next_of(twiddles *w, const real *table, uint32_t window, int compact)
 {
+    LB_ASSERT(!compact || *w->bin < window);
     if (compact) {
         return table + 2u * (*w->bin++ * w->number % window);
     }
@@ -55,6 +56,7 @@ LB_OFTEN const real *next_of(twiddles *w, const real *table, uint32_t window, in
 /* First half of a period. Two channels at a time share the loaded part of the row. */
 LB_OFTEN void go_out(const LB_DFT *t, const real *samples, ptrdiff_t stride, int compact)
 {
+    LB_ASSERT(t->index < t->half && (t->compact || !compact));
     const twiddles row = first_of(t, t->index, compact);
     const uint32_t N = t->window;
     const real *table = t->table;
@@ -113,6 +115,8 @@ LB_OFTEN void go_back(const LB_DFT *t, const real *samples, ptrdiff_t stride, in
     const twiddles row = first_of(t, opposite, compact);
     const real *table = t->table;
     const size_t own = 4u * t->blocks;
+    LB_ASSERT(begins ? t->index == t->half : t->index > t->half && (t->compact || !compact));
+    LB_ASSERT(opposite >= 1u && opposite <= t->index);
     const ptrdiff_t image = (ptrdiff_t)opposite - (ptrdiff_t)t->index;
     real *line = t->line + t->index, *sums = t->sums;
     uint32_t left = t->channels;

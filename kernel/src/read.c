@@ -11,6 +11,7 @@ static const real window_taps[3][3] = {
 /* out *= e^(−jθ), θ of the next sample: from the window's phase to that of the fixed grid. */
 static void turn_back(const LB_DFT *t, real *out)
 {
+    LB_ASSERT(t->variant != LB_MODULATED); /* whose rows have either phase */
     int backwards;
     const real *row = lb_next_row(t, &backwards);
     for (size_t b = 0; b < t->bin_count; ++b) {
@@ -24,9 +25,13 @@ static void turn_back(const LB_DFT *t, real *out)
 
 static void apply_taps(const LB_DFT *t, real *out)
 {
+    LB_ASSERT(lb_is_windowed(t->variant));
+    LB_ASSERT(t->spectrum && t->taps && out != t->spectrum);
     const real *w = window_taps[t->variant - LB_HANN];
     for (size_t i = 0; i < 2 * (size_t)t->bin_count; ++i) {
         const uint32_t *taps = t->taps + i / 2 * 4;
+        LB_ASSERT(taps[0] < t->inner_count && taps[1] < t->inner_count);
+        LB_ASSERT(taps[2] < t->inner_count && taps[3] < t->inner_count);
         const real *x = t->spectrum + i % 2;
         const real near = x[2 * (size_t)taps[0]] + x[2 * (size_t)taps[1]];
         const real far = x[2 * (size_t)taps[2]] + x[2 * (size_t)taps[3]];
@@ -36,6 +41,8 @@ static void apply_taps(const LB_DFT *t, real *out)
 
 void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
+    LB_ASSERT(lb_sound(t) && channel < t->channels);
+    LB_ASSERT(!t->queued); /* the sums contain every sample */
     if (t->variant == LB_MODULATED) {
         LB(row)(t, channel, phase, out);
         return;
@@ -59,6 +66,7 @@ lb_status LB(read)(LB_DFT *t, lb_phase phase, real *out)
     if (phase != LB_PHASE_WINDOW && phase != LB_PHASE_FIXED) {
         return LB_ERROR_PHASE;
     }
+    LB_ASSERT(lb_sound(t));
     LB(catch_up)(t);
     for (size_t c = 0; c < t->channels; ++c) {
         LB(emit)(t, c, phase, out + c * 2 * t->bin_count);
@@ -71,6 +79,7 @@ lb_status LB(count)(const LB_DFT *t, uint64_t *count)
     if (!t || !count) {
         return LB_ERROR_NULL;
     }
+    LB_ASSERT(lb_sound(t));
     *count = t->count + t->queued;
     return LB_OK;
 }

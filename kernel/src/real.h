@@ -2,6 +2,7 @@
 #ifndef LB_REAL_H
 #define LB_REAL_H
 
+#include "lb_assert.h"
 #include "livebode/sdft.h"
 
 #if LB_BITS == 64

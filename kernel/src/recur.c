@@ -6,6 +6,8 @@ void LB(recur)(const LB_DFT *t, size_t channel, const real *delta, size_t length
 {
     real *sums = lb_sums(t, channel);
     const real *row = lb_table_row(t, 1u);
+    LB_ASSERT(!lb_renews(t->variant));
+    LB_ASSERT(lb_apart(delta, length * sizeof(real), sums, t->blocks * 4 * LB_BLOCK * sizeof(real)));
     for (size_t i = 0; i < length; ++i) {
         for (size_t b = 0; b < t->inner_count; ++b) {
             real *x = sums + lb_sum_at(b);

@@ -55,6 +55,7 @@ static header header_of(const LB_DFT *t)
 
 static size_t length_of(const LB_DFT *t)
 {
+    LB_ASSERT(lb_laid_out(t));
     const size_t per_channel = t->window + 4u * (size_t)t->inner_count;
     return sizeof(header) + t->bin_count * sizeof(uint32_t) + t->channels * per_channel * sizeof(real) +
            sizeof(uint32_t);
@@ -77,6 +78,8 @@ lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
     if (bytes != length_of(t)) {
         return LB_ERROR_SNAPSHOT_LENGTH;
     }
+    LB_ASSERT(lb_sound(t));
+    LB_ASSERT(lb_apart(out, bytes, t->table, (size_t)((unsigned char *)t->bins - (unsigned char *)t->table)));
     LB(catch_up)(t);
     const header h = header_of(t);
     unsigned char *at = (unsigned char *)out;
@@ -92,6 +95,7 @@ lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
             copy(at, (const unsigned char *)sum, sizeof(real));
         }
     }
+    LB_ASSERT((size_t)(at - (unsigned char *)out) == bytes - sizeof(uint32_t));
     const uint32_t crc = crc32((unsigned char *)out, bytes - sizeof(uint32_t));
     copy(at, (const unsigned char *)&crc, sizeof crc);
     return LB_OK;
@@ -138,6 +142,7 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
     if (status != LB_OK) {
         return status;
     }
+    LB_ASSERT(h.window == t->window && h.bin_count == t->bin_count && h.channels == t->channels);
     at += sizeof h + t->bin_count * sizeof(uint32_t);
     t->count = h.count;
     t->index = (uint32_t)(h.count % t->window);
@@ -150,5 +155,7 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
             copy((unsigned char *)sum, at, sizeof(real));
         }
     }
+    LB_ASSERT((size_t)(at - (const unsigned char *)snapshot) == bytes - sizeof(uint32_t));
+    LB_ASSERT(lb_sound(t));
     return LB_OK;
 }

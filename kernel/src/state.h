@@ -35,6 +35,32 @@ struct LB_DFT {
 static inline int lb_renews(lb_variant v) { return v != LB_PLAIN && v != LB_DAMPED; }
 static inline int lb_is_windowed(lb_variant v) { return v > LB_DAMPED; }
 
+/* Whether the parts of the memory agree with each other: what init laid out and nothing changes. */
+static inline int lb_laid_out(const LB_DFT *t)
+{
+    const int limited = t->window >= 1u && t->window <= LB_WINDOW_MAX && t->half == (t->window + 1u) / 2u &&
+                        t->channels >= 1u && t->channels <= LB_CHANNELS_MAX;
+    const int lengths = t->bin_count >= 1u && t->bin_count <= t->inner_count && t->inner_count <= t->window &&
+                        t->blocks == (t->inner_count + LB_BLOCK - 1u) / LB_BLOCK &&
+                        t->row_length == t->blocks * 2u * LB_BLOCK && t->line_length >= t->window;
+    return limited && lengths && t->table && t->sums && t->line && t->delta && t->queue && t->bins;
+}
+
+/* Whether an object is as every call leaves it. */
+static inline int lb_sound(const LB_DFT *t)
+{
+    const uint32_t waiting_max = LB_TILE ? LB_TILE - 1u : 0u;
+    return lb_laid_out(t) && t->index == t->count % t->window && t->queued <= waiting_max &&
+           (unsigned)t->variant <= LB_BLACKMAN && t->radius >= 0 && t->radius <= 1 && t->radius_window <= t->radius;
+}
+
+/* Whether two regions have no byte in common. */
+static inline int lb_apart(const void *a, size_t a_bytes, const void *b, size_t b_bytes)
+{
+    const uintptr_t first = (uintptr_t)a, second = (uintptr_t)b;
+    return !a_bytes || !b_bytes || (first < second ? second - first >= a_bytes : first - second >= b_bytes);
+}
+
 /* Neighbours on each side that a variant's taps need. */
 static inline uint32_t lb_reach(lb_variant v) { return v == LB_BLACKMAN ? 2u : lb_is_windowed(v) ? 1u : 0u; }
 
@@ -51,12 +77,14 @@ const real *LB(gathered)(const LB_DFT *t, uint32_t number, size_t place);
 
 static inline const real *lb_table_row(const LB_DFT *t, uint32_t number)
 {
+    LB_ASSERT(number <= t->half);
     return t->compact ? LB(gathered)(t, number, 0) : t->table + (size_t)number * t->row_length;
 }
 
 /* The table row of the index, and whether it must be conjugated. */
 static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards)
 {
+    LB_ASSERT(index < t->window);
     *backwards = index >= t->half;
     return lb_table_row(t, *backwards ? t->window - index : index);
 }
@@ -65,12 +93,17 @@ static inline const real *lb_row(const LB_DFT *t, uint32_t index, int *backwards
  * directions meet it is the same row as lb_row's, but with another sign of its zeros. */
 static inline const real *lb_next_row(const LB_DFT *t, int *backwards)
 {
+    LB_ASSERT(t->index < t->window);
     const uint32_t last = (t->index ? t->index : t->window) - 1u;
     *backwards = last >= t->half;
     return lb_table_row(t, *backwards ? t->window - last - 1u : last + 1u);
 }
 
-static inline real *lb_sums(const LB_DFT *t, size_t channel) { return t->sums + channel * t->blocks * 4 * LB_BLOCK; }
+static inline real *lb_sums(const LB_DFT *t, size_t channel)
+{
+    LB_ASSERT(channel < t->channels);
+    return t->sums + channel * t->blocks * 4 * LB_BLOCK;
+}
 
 /* The instruction set, where this machine and this build have it. */
 lb_status LB(choose)(LB_DFT *t, lb_instruction_set set);
@@ -80,6 +113,24 @@ typedef struct {
     const real *samples;
     ptrdiff_t channel_stride, sample_stride;
 } lb_input;
+
+/* Where samples are: the lowest address and the number of bytes. */
+typedef struct {
+    uintptr_t first, bytes;
+} lb_region;
+
+static inline lb_region lb_region_of(const LB_DFT *t, const lb_input *in, size_t length)
+{
+    const ptrdiff_t steps[2] = {in->channel_stride * (ptrdiff_t)(t->channels - 1u),
+                                in->sample_stride * (ptrdiff_t)(length - 1u)};
+    lb_region r = {(uintptr_t)in->samples, sizeof(real)};
+    for (int i = 0; i < 2; ++i) {
+        const uintptr_t reach = (uintptr_t)(steps[i] < 0 ? -steps[i] : steps[i]) * sizeof(real);
+        r.first -= steps[i] < 0 ? reach : 0u;
+        r.bytes += reach;
+    }
+    return r;
+}
 
 /* Rows that are due. */
 typedef struct {

@@ -6,6 +6,7 @@ lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
     if (!t || !rows) {
         return LB_ERROR_NULL;
     }
+    LB_ASSERT(lb_sound(t));
     *rows = hop ? (size_t)(((t->count + t->queued) % hop + length) / hop) : 0;
     return LB_OK;
 }
@@ -13,6 +14,7 @@ lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
 /* Rows read one by one. */
 static void read_rows(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
 {
+    LB_ASSERT(!t->queued && due.hop);
     while (due.first < length) {
         LB(skip)(t, in, due.first + 1);
         length -= due.first + 1;
@@ -21,7 +23,9 @@ static void read_rows(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
             LB(emit)(t, c, due.phase, due.out + c * due.channel_reals);
         }
         due.out += 2 * t->bin_count;
+        LB_ASSERT(due.out <= due.end);
     }
+    LB_ASSERT(due.out == due.end);
     LB(skip)(t, in, length);
 }
 
@@ -40,6 +44,7 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
         return LB_ERROR_ROWS;
     }
     lb_input in = {samples, channel_stride, sample_stride};
+    LB_ASSERT(lb_sound(t));
     LB(catch_up)(t);
     if (!rows) {
         LB(skip)(t, &in, length);
@@ -52,6 +57,9 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
     due.out = out;
     due.channel_reals = rows * 2 * t->bin_count;
     due.end = out + due.channel_reals;
+    LB_ASSERT(due.first < length);
+    LB_ASSERT(lb_apart((void *)lb_region_of(t, &in, length).first, lb_region_of(t, &in, length).bytes, out,
+                       t->channels * due.channel_reals * sizeof(real)));
 #ifndef LB_SCALAR
     if (t->variant == LB_MODULATED) {
         LB(fused_rows)(t, &in, length, due);

@@ -131,6 +131,7 @@ LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
     }
     real whole[2 * LB_BLOCK];
     emit(whole, a, next, u.phase, u.backwards, u.n);
+    LB_ASSERT(u.valid <= 2 * LB_BLOCK && u.out_end - u.out >= (ptrdiff_t)u.valid);
     for (size_t i = 0; i < u.valid; ++i) {
         u.out[i] = whole[i];
     }
@@ -138,6 +139,7 @@ LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
 
 LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
 {
+    LB_ASSERT(u.out < u.out_end);
     if (u.valid) {
         emit_tail(u, a, next);
     } else {
@@ -273,6 +275,8 @@ LB_INLINE void run(const lb_tile *t, int backwards)
 {
     /* The last block first: its surplus belongs to the others. */
     const size_t whole = t->bins / LB_BLOCK;
+    LB_ASSERT(t->length >= 1 && t->length <= LB_TILE);
+    LB_ASSERT(t->blocks - whole <= 1);
     size_t block = 0;
     if (whole < t->blocks) {
         run_blocks(t, whole, backwards, 1, 1);
@@ -293,6 +297,7 @@ static void fold(const lb_tile *t, size_t channel)
     real *restrict even = t->delta + (channel * 3 + 1) * LB_TILE;
     real *restrict odd = even + LB_TILE;
     const ptrdiff_t length = (ptrdiff_t)t->length;
+    LB_ASSERT(t->backwards && t->image <= 0 && t->middle == (t->image == 0));
     for (ptrdiff_t i = 0; i < length; ++i) {
         even[i] = here[i] + image[-i];
         odd[i] = here[i] - image[-i];
@@ -333,6 +338,9 @@ static void read_row(const lb_tile *t)
 static void take_in(real *restrict delta, real *restrict line, const real *restrict samples, ptrdiff_t stride,
                     size_t length)
 {
+    LB_ASSERT(length && length <= LB_TILE);
+    LB_ASSERT(delta + length <= line || line + length <= delta);
+    LB_ASSERT(stride != 1 || samples + length <= line || line + length <= samples);
     if (stride == 1) { /* a separate loop, so that it is vectorised */
         for (size_t i = 0; i < length; ++i) {
             delta[i] = samples[i] - line[i];

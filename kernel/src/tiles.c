@@ -7,6 +7,8 @@ static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
 /* The differences and the delay line of one channel's next samples. */
 static void take_in(LB_DFT *t, size_t channel, const real *samples, ptrdiff_t stride, size_t length)
 {
+    LB_ASSERT(channel < t->channels);
+    LB_ASSERT(length <= LB_TILE && t->index + length <= t->window);
     real *line = t->line + channel * t->line_length + t->index;
     real *delta = t->delta + channel * 3 * LB_TILE;
     if (t->variant != LB_DAMPED) {
@@ -35,6 +37,7 @@ static void seed(LB_DFT *t, size_t channel)
 /* Positions of the table rows of the tile, one for each sample and the next one's after them. */
 static void find_rows(const LB_DFT *t, uint32_t start, lb_tile *tile)
 {
+    LB_ASSERT(start + tile->length <= (start < t->half ? t->half : t->window));
     tile->row = lb_row(t, start, &tile->backwards);
     tile->row_step = tile->backwards ? -(ptrdiff_t)t->row_length : (ptrdiff_t)t->row_length;
     if (!t->compact) {
@@ -50,6 +53,8 @@ static void find_rows(const LB_DFT *t, uint32_t start, lb_tile *tile)
  * `offset`, and the rows due among them. */
 static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length, const lb_rows_due *due)
 {
+    LB_ASSERT(length && offset + length <= LB_TILE);
+    LB_ASSERT(!due->out || (due->hop && due->out <= due->end));
     lb_tile tile;
     tile.channels = t->channels;
     tile.blocks = t->blocks;
@@ -78,6 +83,7 @@ static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length
 /* Moves on to the rows due after `length` further samples. */
 static void passed(lb_rows_due *due, size_t length, size_t row_reals)
 {
+    LB_ASSERT(length && due->hop);
     if (due->first >= length) {
         due->first -= length;
         return;
@@ -86,11 +92,13 @@ static void passed(lb_rows_due *due, size_t length, size_t row_reals)
     const uint32_t rows = due->hop > beyond ? 1u : 1u + beyond / (uint32_t)due->hop;
     due->out += rows * row_reals;
     due->first += rows * due->hop - length;
+    LB_ASSERT(due->out <= due->end && due->first < due->hop);
 }
 
 /* The sums of the last `length` stored samples, which end at the index. */
 static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 {
+    LB_ASSERT(length <= t->index && t->index <= t->window);
     const uint32_t longest = due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
     uint32_t start = t->index - length;
     if (!lb_renews(t->variant)) {
@@ -110,6 +118,7 @@ static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
         start += part;
         offset += part;
     }
+    LB_ASSERT(start == t->index);
     t->index = t->index == t->window ? 0 : t->index;
 }
 
@@ -117,6 +126,7 @@ static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due)
 {
     const size_t n = smaller(length, smaller(LB_TILE, t->window - t->index));
+    LB_ASSERT(n && n <= length);
     for (size_t c = 0; c < t->channels; ++c) {
         take_in(t, c, in->samples + (ptrdiff_t)c * in->channel_stride, in->sample_stride, n);
     }
@@ -124,6 +134,7 @@ static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due
     t->count += n;
     t->index += (uint32_t)n;
     run(t, (uint32_t)n, due);
+    LB_ASSERT(lb_laid_out(t) && t->index == t->count % t->window);
     return n;
 }
 
@@ -150,6 +161,7 @@ lb_status LB(queue)(LB_DFT *t, const real *samples)
     if (!t || !samples) {
         return LB_ERROR_NULL;
     }
+    LB_ASSERT(lb_sound(t));
     for (size_t c = 0; c < t->channels; ++c) {
         t->queue[c * LB_TILE + t->queued] = samples[c];
     }
@@ -164,6 +176,7 @@ lb_status LB(push)(LB_DFT *t, const real *samples)
     if (!t || !samples) {
         return LB_ERROR_NULL;
     }
+    LB_ASSERT(lb_sound(t));
     LB(catch_up)(t);
     lb_input in = {samples, 1, 1};
     LB(skip)(t, &in, 1);
@@ -176,6 +189,7 @@ void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due)
     while (length) {
         length -= next_tile(t, in, length, &due);
     }
+    LB_ASSERT(due.out == due.end);
 }
 
 /* The same computation as the inner kernels' rows, and so the same bits. */

@@ -1,3 +1,4 @@
+#include "lb_assert.h"
 #include "twiddle.h"
 
 /* Taylor sums on [0, π/4]; the truncation error is below 1e-19. */
@@ -31,6 +32,7 @@ static double small_cos(double a)
 
 void lb_twiddle(uint32_t r, uint32_t N, double *cosine, double *sine)
 {
+    LB_ASSERT(N > 0 && r < N);
     /* Reduced in integers, so that no angle is rounded before it is in [0, π/4]. */
     const int mirrored = (uint64_t)r * 2u > N;
     const uint64_t eighths = 8u * (uint64_t)(mirrored ? N - r : r);
@@ -40,6 +42,8 @@ void lb_twiddle(uint32_t r, uint32_t N, double *cosine, double *sine)
     const double angle = 0.78539816339744830962 * ((double)near_axis / (double)N);
     const double c = small_cos(angle);
     const double s = small_sin(angle);
+    LB_ASSERT(octant <= 4u && near_axis <= N);
+    LB_ASSERT(c * c + s * s > 1.0 - 1e-15 && c * c + s * s < 1.0 + 1e-15);
 
     switch (octant) {
     case 0: *cosine = c, *sine = s; break;

@@ -19,7 +19,7 @@ from livebode.records import Run
 from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode, write_parquet
-from tests.support.structured_text import Machine
+from tools.structured_text import Machine
 
 ROOT = Path(__file__).parents[2]
 BELT = """

@@ -14,17 +14,13 @@ import pytest
 
 from livebode.core import BaselineError, Block, Channel, Lines
 from livebode.excitation import multisine
-from livebode.monitoring import Baseline, Machine, Rows, learn_table
-from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.between_runs import BetweenRuns
-from livebode.monitoring.covariates import Covariates
-from livebode.motion import Curve, MovingModel
+from livebode.monitoring import Baseline
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import Batch
 from livebode.sources.live.ndjson import encode_line
 from tests.support.command import Result, livebode, write_parquet
 from tests.support.errors import refused
-from tests.support.monitored import recorded
+from tests.support.monitored import recorded, small_baseline
 
 SIGNALS = ["--excitation", "w", "--input", "u", "--output", "velocity"]
 OPTIONS = [*SIGNALS, "--lines", "20:140:20", "--window", "400", "--noise", "quiet"]
@@ -226,7 +222,7 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path: Path) -> None:
 def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: str) -> None:
     """One sentence with the file, the key, the value and the remedy."""
     path = tmp_path / "x.json"
-    _small().save(path)
+    small_baseline().save(path)
     whole = Baseline.load(path).machine
     assert whole is not None
     assert whole.covariates.slope.tolist() == [[-0.002], [0.0], [0.0], [0.0]]
@@ -245,26 +241,3 @@ def test_a_damaged_part_is_named(tmp_path: Path, at: str, value: object, words: 
         Baseline.load(path)
     assert (found.value.code, found.value.key) == ("baseline.damaged", at)
     assert str(found.value) == f"the baseline {str(path)!r} is damaged: {words}; learn it again"
-
-
-def _small() -> Baseline:
-    lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
-    generator = np.random.default_rng(1)
-    noise = generator.standard_normal((2, 40, len(lines)))
-    rows = Rows(
-        1 + 0.01 * (noise[0] + 1j * noise[1]), np.full(noise[0].shape, 2e-4), np.zeros(40), np.zeros(40),
-        0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
-    )  # fmt: skip
-    table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], [rows])
-    curve, known = Curve(0.2, 1.6, np.zeros(12)), Accuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
-    machine = Machine(
-        MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
-        0.1, 0.4, np.full(28, 9),
-        covariates=Covariates(
-            ("temperature",), np.array([20.0]), np.array([15.0]), np.array([25.0]),
-            np.array([[-0.002], [0.0], [0.0], [0.0]]), np.zeros((4, 1, 1)),
-        ),
-        between=BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.5),
-    )  # fmt: skip
-    signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
-    return Baseline(lines, 20, signals, "joint", "plant", (table,), machine)

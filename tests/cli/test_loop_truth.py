@@ -11,55 +11,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from examples.closed_loop import RATE_HZ, Drive
 from livebode.analysis.loop_report import loop_of_run
-from livebode.core import Lines
-from livebode.excitation import multisine
 from livebode.fitting import mean_response
 from livebode.margins import margins
 from livebode.records import Run
 from livebode.records.summary_file import to_document
-from tests.margins.test_margins_truth import read
-from tests.support.command import livebode, write_parquet
-from tests.support.loops import BELT, Case, parameters, values
-
-LINES = Lines.parse("20:140:10", RATE_HZ, 400)
-AXIS = """
-[source]
-log = "log.parquet"
-rate_hz = 4000
-[signals]
-output = "y"
-input = "u"
-excitation = "w"
-[lines]
-frequencies = "20:140:10"
-window = 400
-[tracking]
-hop = 200
-[loop.velocity]
-gain = {gain}
-integral_time_s = 0.2
-rate_hz = 4000
-delay_ticks = {delay}
-[loop.position]
-gain = 1.0
-rate_hz = 2000
-held_ticks = 2
-[fit]
-model = "two-mass"
-output = "velocity"
-radius_m = 0.019
-"""
-
-
-def record(path: Path, seed: int, late: int = 0) -> Path:
-    """Two seconds of the closed loop, with a gap in it; u acts `late` ticks after it was logged."""
-    w = 0.3 * multisine(LINES)
-    u, y = Drive().run(w, 20, sigma=0.1, seed=seed)
-    columns = {"w": np.resize(w, u.size), "u": np.roll(u[0], -late), "y": y[0]}
-    columns["y"][700] = np.nan
-    return write_parquet(path, columns)
+from livebode.simulation.two_mass_loop import RATE_HZ
+from tests.support.belt_loops import read
+from tests.support.command import livebode
+from tests.support.loop_runs import AXIS, LINES, record
+from tools.loops import BELT, Case, parameters, values
 
 
 @pytest.fixture(scope="module")

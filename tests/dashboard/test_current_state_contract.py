@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from examples.closed_loop import RATE_HZ
 from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
+from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.browser import Tab, chromium
 from tests.support.dashboards import LINES, SETTINGS, UNITS, begin, data

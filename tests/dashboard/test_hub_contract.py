@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from examples.closed_loop import RATE_HZ
 from livebode.configuration.axis import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
@@ -24,6 +23,7 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, Rows, Trend
+from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.dashboards import LINES, LOOP, Watched
 from tests.support.errors import refused

@@ -17,10 +17,10 @@ from PIL import Image
 from playwright.sync_api import Browser
 from scipy.io import loadmat
 
-from examples.closed_loop import RATE_HZ
 from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.records import Run
+from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import TABLET, Tab, chromium, until
 from tests.support.dashboards import LINES, Watched, begin, whole_run
 from tests.support.responses import made

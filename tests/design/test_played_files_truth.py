@@ -11,11 +11,10 @@ from livebode.core import ConfigError
 from livebode.design import Bearable, Wish, belt_machine, choose, worst, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import Run
-from livebode.simulation import BeltAxis, SimulatedAxis
+from livebode.simulation import BeltAxis, SimulatedAxis, extremes
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
-from tests.support.experiments import extremes
-from tests.support.structured_text import Machine
+from tools.structured_text import Machine
 
 RATE_HZ = 4000
 LOOP = """

@@ -7,69 +7,13 @@ from livebode.core import Lines
 from livebode.design import Bearable, Wish, accuracy_of, belt_machine, choose, measured_machine, peaks, worst
 from livebode.design.waveform import Waveform
 from livebode.estimation import Settings, Tracker
-from livebode.excitation import chirp, chirp_lines, multisine, prbs
-from livebode.simulation import BeltAxis, Drive, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
-from tests.support.experiments import RUN_IN_S, extremes
+from livebode.excitation import multisine
+from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, extremes
 
 LINES = Lines.parse("20:140:20", 4000, 400)
 FINE = Lines.parse("10:150:5", 4000, 1600)
 ALONE = Lines.parse("40", 4000, 400)
 NOISE = Sensor(noise_rad_per_s=0.1)
-STANDING = {
-    "Schroeder": (BeltAxis(), LINES, multisine(LINES)),
-    "with noise, low crest": (BeltAxis(sensor=NOISE), LINES, multisine(LINES, 1.0, "low crest")),
-    "a line alone": (BeltAxis(), ALONE, multisine(ALONE)),
-    "three masses, chirp": (
-        BeltAxis(mechanics=Mechanics(masses=3)), chirp_lines(5, 250, 4000, 8000), chirp(5, 250, 4000, 8000, 2.0),
-    ),
-    "PRBS near the end": (
-        BeltAxis(motion=Standstill(position_m=1.6)), Lines(tuple(range(6, 90)), 2555, 4000.0),
-        prbs(9, 2.0, held_ticks=5),
-    ),
-    "late and stiff": (
-        BeltAxis(drive=Drive(velocity_rate_hz=2000, position_rate_hz=1000, position_gain_per_s=10, delay_ticks=2)),
-        FINE, multisine(FINE, 0.4, "random", seed=2),
-    ),
-    "differenced velocity": (
-        BeltAxis(sensor=Sensor(velocity_differenced=True)), FINE, multisine(FINE, 0.4, "random", seed=3),
-    ),
-}  # fmt: skip
-MOVING = {
-    "the paper's strokes with friction and noise": (
-        BeltAxis(motion=Strokes(), friction=Friction(load_coulomb_n=15.0), sensor=NOISE), LINES, multisine(LINES),
-    ),
-    "fast S-curves": (
-        BeltAxis(motion=Strokes(speed_m_per_s=1.5, acceleration_m_per_s2=10, jerk_m_per_s3=200)),
-        FINE, multisine(FINE, 0.3, "random"),
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", STANDING)
-def test_peaks_of_a_standing_axis(case):
-    axis, lines, samples = STANDING[case]
-    _within_ten_percent(axis, lines, samples, extremes(axis, samples))
-
-
-@pytest.mark.parametrize("case", MOVING)
-def test_peaks_on_top_of_a_motion(case):
-    """Simulated: the largest over twelve alignments of excitation and motion, and two cycles; the first is smaller."""
-    axis, lines, samples = MOVING[case]
-    cycle_s = len(axis.motion.cycle(4000)[0]) / 4000
-    _within_ten_percent(axis, lines, samples, extremes(axis, samples, alignments=12, seconds=2 * cycle_s))
-
-
-def _within_ten_percent(axis, lines, samples, simulated):
-    predicted = worst(peaks(Waveform(lines, samples), belt_machine(axis)))
-    at_m = axis.motion.cycle(4000)[0]
-    for name, (low, high) in simulated.items():
-        # Of the travel what comes beyond each end of the way; of the rest each extreme.
-        ends = (at_m.min(), at_m.max()) if name == "travel" else (0.0, 0.0)
-        beyond = np.array([ends[0] - low, high - ends[1]])
-        told = np.array([ends[0] - predicted[name].low, predicted[name].high - ends[1]])
-        if at_m.size == 1:  # the smaller end of a standing axis is as the noise has it
-            told, beyond = np.max(told), np.max(beyond)
-        assert np.all(np.abs(told - beyond) <= 0.1 * np.max(beyond)), (name, told, beyond)
 
 
 def test_the_room_is_what_the_simulation_leaves():
@@ -103,7 +47,7 @@ def test_sigma_is_that_of_the_tracker_and_the_recording_reaches_the_accuracy():
     truth = axis.linear(0.8).sampled(4000).response(lines.frequency_hz)
     singles, means = [], []
     for seed in range(64):
-        run = BeltAxis(sensor=NOISE, excitation_n_m=design.waveform.samples, run_in_s=RUN_IN_S, seed=seed,
+        run = BeltAxis(sensor=NOISE, excitation_n_m=design.waveform.samples, run_in_s=10.0, seed=seed,
                        seconds=design.windows * lines.window / 4000)  # fmt: skip
         block, _ = SimulatedAxis(run).run()
         tracker = Tracker(_settings(lines, hop=lines.window, average=True, forgetting=1.0))

@@ -13,6 +13,7 @@ from livebode.core import Block, Lines, Responses, UsageError
 from livebode.estimation import RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
 from tests.support.errors import refused
+from tests.support.responses import assert_same
 
 WINDOW, RATE_HZ, SAMPLES = 60, 1000.0, 700
 LINES = Lines((4, 8, 13), WINDOW, RATE_HZ, quiet=(5, 6, 7, 9, 10, 11, 12))
@@ -28,7 +29,6 @@ OPTIONS = [
     {"dtype": "float32"},
     {"dtype": "float32", "differenced": ("y",), "hann": True},
 ]
-ARRAYS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
 
 
 def record(seed: int) -> Block:
@@ -63,11 +63,6 @@ def cut(block: Block, at: list[int], jump: int) -> list[Block]:
 def new(options: dict) -> Tracker:
     names = {"lines": LINES, "output": "y", "input": "u", "excitation": "w", "schedule": "x"}
     return Tracker(Settings(**(names | options)))
-
-
-def assert_same(one: Responses, other: Responses) -> None:
-    for name in ARRAYS:
-        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)

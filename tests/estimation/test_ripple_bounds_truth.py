@@ -17,11 +17,11 @@ from livebode.monitoring import Baseline, Rows, learn_table
 from livebode.monitoring.ripple import Ripple
 from livebode.motion import MotionCorrection
 from livebode.preparation.plan import live_follower
-from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes
-from studies.monitoring_axis import LINES, RADIUS_M, RandomStrokes
-from studies.motion import SETTINGS, cruising, truth_at
+from livebode.simulation import BeltAxis, Drive, Motion, Sensor, SimulatedAxis, Strokes
+from tests.support.axes import LINES
 from tests.support.errors import refused
-from tests.support.monitored import ideal
+from tests.support.monitored import CHANNELS, RADIUS_M, ideal, strokes
+from tests.support.moving import SETTINGS, cruising, truth_at
 
 COGGING_PER_M = 24 / (2 * np.pi * RADIUS_M)
 MEETING_M_PER_S = 0.2985  # 24 a turn are 60.01 Hz there
@@ -29,14 +29,13 @@ AT = LINES.frequency_hz.tolist().index(60.0)
 TOLD = replace(SETTINGS, ripple=(RippleOrder(COGGING_PER_M, 0.05),))
 
 
-def recorded(motion: Strokes | RandomStrokes, seconds: float) -> tuple[BeltAxis, Block]:
+def recorded(motion: Motion, seconds: float) -> tuple[BeltAxis, Block]:
     axis = BeltAxis(
         motion=motion, excitation_n_m=multisine(LINES), sensor=Sensor(noise_rad_per_s=0.1), seconds=seconds,
         drive=Drive(torque_ripple_n_m=0.05), seed=1,
     )  # fmt: skip
     block, _ = SimulatedAxis(axis).run()
-    names = ("w", "u", "velocity", "x")
-    return axis, Block(block.data[[block.index(name) for name in names]], names, block.rate_hz)
+    return axis, Block(block.data[[block.index(name) for name in CHANNELS]], CHANNELS, block.rate_hz)
 
 
 @cache
@@ -77,13 +76,14 @@ def test_a_corrected_line_that_a_known_ripple_meets_has_a_bound_that_holds() -> 
 
 
 def test_a_correction_finds_the_ripple_in_strokes_that_differ() -> None:
-    motion = RandomStrokes((0.38, 0.36, 0.34, 0.32, 0.37, MEETING_M_PER_S), start_m=0.6, end_m=1.3)
-    axis, block = recorded(motion, float(motion.edges_s[-1]))
+    motion = strokes((0.38, 0.36, 0.34, 0.32, 0.37, MEETING_M_PER_S), ends=(0.6, 1.3))
+    *_, last_s, end_s = motion.edges_s(4000).tolist()
+    axis, block = recorded(motion, end_s)
     responses, correction = corrected(block, SETTINGS)
     strongest, *others = correction.found()["motion"]["ripple"]
     assert strongest == {"cycles": pytest.approx(COGGING_PER_M, abs=0.4), "amplitude": pytest.approx(0.05, rel=0.25)}
     assert all(order["amplitude"] < 0.01 for order in others)
-    assert covered(axis, responses, after_s=float(motion.edges_s[-2])) > 0.95
+    assert covered(axis, responses, after_s=last_s) > 0.95
 
 
 def test_speed_that_changes_within_a_window_counts_where_it_is_nearest() -> None:

@@ -10,8 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive
-from examples.kernel_drive import KernelDrive
 from livebode.core import (
     PID,
     Block,
@@ -28,7 +26,9 @@ from livebode.core import (
 )
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop
 from livebode.sources.live import FrameDecoder, encode_spectra, encode_spectra_layout
+from livebode.sources.live.kernel_drive import KernelDrive
 from tests.support.errors import refused
 
 WINDOW, PERIODS = 400, 12
@@ -49,7 +49,7 @@ def record() -> Block:
     """The loop of the examples under noise, and a position that moves."""
     rng = np.random.default_rng(3)
     w = multisine(LINES)
-    u, y = Drive().run(w, periods=PERIODS)
+    u, y = TwoMassLoop().run(w, periods=PERIODS)
     n = w.size * PERIODS
     noise = rng.standard_normal((2, n)) * 1e-3
     return Block(

@@ -12,10 +12,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
 from livebode.core import PID, Block, Cascade, Lines, Loop, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
 
 RUNS, SIGMA = 1000, 0.1
 PERIODS = 10
@@ -31,7 +31,7 @@ def records(window: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Excitation, input and output of all runs, from the state in which the noise has been there for long."""
     w = multisine(lines_of(window))
     settled = 4 * window
-    u, y = Drive().run(w, 4 + PERIODS, SIGMA, RUNS, seed=20)
+    u, y = TwoMassLoop().run(w, 4 + PERIODS, SIGMA, RUNS, seed=20)
     return np.tile(w, PERIODS), u[:, settled:], y[:, settled:]
 
 
@@ -57,7 +57,7 @@ def responses(
 
 
 def errors(window: int, found: list[Responses], periods: int) -> np.ndarray:
-    truth = Plant().response(lines_of(window).frequency_hz)
+    truth = TwoMassPlant().response(lines_of(window).frequency_hz)
     return np.array([np.abs(r.value[periods - 1] - truth) for r in found])
 
 
@@ -82,7 +82,7 @@ def test_coverage_from_four_periods_on(window: int, estimator: str) -> None:
 @pytest.mark.parametrize("estimator", ["joint", "indirect"])
 def test_variance_against_the_cramer_rao_bound(window: int, estimator: str) -> None:
     # N·σ²/|U|² for one period, with U of the noise-free periodic state.
-    u, _ = Drive().run(multisine(lines_of(window)), 1)
+    u, _ = TwoMassLoop().run(multisine(lines_of(window)), 1)
     bound = window * SIGMA**2 / np.abs(np.fft.fft(u[0])[list(lines_of(window).bins)]) ** 2
     away = lines_of(window).frequency_hz != 60.0  # the resonance is at 61 Hz
     found = responses(window, estimator)
@@ -129,9 +129,9 @@ def test_direct_is_biased_in_closed_loop_and_joint_is_not() -> None:
     # Noise of 3 rad/s: feedback then makes much of u, and direct sees much of −1/C instead of G.
     lines, periods = lines_of(400), 10
     w = multisine(lines)
-    u, y = Drive().run(w, 4 + periods, sigma=3.0, runs=200, seed=21)
+    u, y = TwoMassLoop().run(w, 4 + periods, sigma=3.0, runs=200, seed=21)
     record = (np.tile(w, periods), u[:, 1600:], y[:, 1600:])
-    truth = Plant().response(lines.frequency_hz)
+    truth = TwoMassPlant().response(lines.frequency_hz)
     bias = {}
     for estimator in ("direct", "joint"):
         options = Settings(
@@ -158,7 +158,7 @@ def test_direct_is_biased_in_closed_loop_and_joint_is_not() -> None:
 def test_coherence_is_that_of_the_noise() -> None:
     # γ² = 1/(1 + n/s) with n/s the noise-to-signal power of one window at the output.
     _, _, y = records(400)
-    y0 = Drive().run(multisine(lines_of(400)), 1)[1][0]
+    y0 = TwoMassLoop().run(multisine(lines_of(400)), 1)[1][0]
     bins = list(lines_of(400).bins)
     signal = np.abs(np.fft.fft(y0)[bins]) ** 2
     noisy = np.fft.fft(y.reshape(RUNS, -1, 400), axis=2)[:, :, bins]

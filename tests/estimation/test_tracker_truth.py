@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.closed_loop import KPC, KVC, RATE_HZ, TI, Drive, Plant
-from examples.loop_costs import costs
 from livebode.core import PID, Block, Cascade, Lines, Loop, Response
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
+from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
-TRUTH = Plant().response(LINES.frequency_hz)
+TRUTH = TwoMassPlant().response(LINES.frequency_hz)
 VELOCITY = PID(gain=KVC, integral_time_s=TI, rate_hz=RATE_HZ)
 POSITION = PID(gain=KPC, rate_hz=RATE_HZ / 2, held_ticks=2)
 LOOP = Loop(Cascade(VELOCITY, POSITION))
@@ -21,7 +20,7 @@ LOOP = Loop(Cascade(VELOCITY, POSITION))
 @pytest.fixture(scope="module")
 def record() -> Block:
     w = multisine(LINES)
-    u, y = Drive().run(w, periods=4)
+    u, y = TwoMassLoop().run(w, periods=4)
     return Block(np.array([np.tile(w, 4), u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
 
 
@@ -59,13 +58,6 @@ def test_indirect_is_the_sampled_plant(record: Block) -> None:
     assert error(last(record, estimator="indirect", loop=LOOP)) < 5e-6
 
 
-def test_every_wrong_word_about_the_loop_costs() -> None:
-    cost = costs()
-    assert cost.pop("as it is") < 5e-6
-    assert min(cost.values()) > 1e-4
-    assert cost["one tick of delay too many"] > 0.05
-
-
 @pytest.mark.parametrize("estimator", ["joint", "indirect"])
 def test_logging_before_or_after_the_update_is_put_right(record: Block, estimator: str) -> None:
     late = Block(
@@ -92,7 +84,7 @@ def test_excitation_at_the_velocity_reference() -> None:
     # Seen from the plant, a multisine v at the velocity reference is the multisine Cvel·v at the plant input.
     spectrum = np.zeros(201, dtype=complex)
     spectrum[list(LINES.bins)] = np.fft.rfft(w)[list(LINES.bins)] * inner
-    u, y = Drive().run(np.fft.irfft(spectrum, 400), periods=2)
+    u, y = TwoMassLoop().run(np.fft.irfft(spectrum, 400), periods=2)
     block = Block(np.array([np.tile(w, 2), u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
     loop = Loop(LOOP.feedback, entry=VELOCITY)
     assert error(last(block, estimator="indirect", loop=loop)) < 5e-6

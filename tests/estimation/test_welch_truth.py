@@ -11,30 +11,30 @@ import numpy as np
 import pytest
 from scipy.signal import chirp
 
-from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode.core import Block, LivebodeError, SignalError
 from livebode.estimation import welch
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
 from tests.support.errors import refused
 
 
 @cache
 def record(sigma: float) -> Block:
     w = np.random.default_rng(5).standard_normal(400_000)
-    u, y = Drive().run(w, periods=1, sigma=sigma, seed=6)
+    u, y = TwoMassLoop().run(w, periods=1, sigma=sigma, seed=6)
     return Block(np.array([w, u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
 
 
 def test_joint_bounds_hold_in_closed_loop_where_the_response_is_smooth() -> None:
     found = welch(record(0.1), input="u", output="y", excitation="w", window=1000)
     smooth = (found.lines.frequency_hz > 250) & (found.lines.frequency_hz < 1900)
-    error = np.abs(found.value - Plant().response(found.lines.frequency_hz))[smooth]
+    error = np.abs(found.value - TwoMassPlant().response(found.lines.frequency_hz))[smooth]
     assert np.mean(error <= found.bound(1)[smooth]) == pytest.approx(0.632, abs=0.06)
     assert np.mean(error <= found.bound(2)[smooth]) == pytest.approx(0.982, abs=0.02)
 
 
 def test_h1_is_biased_in_closed_loop() -> None:
     smooth = slice(100, 400)
-    truth = Plant().response(np.arange(1, 500) * RATE_HZ / 1000)[smooth]
+    truth = TwoMassPlant().response(np.arange(1, 500) * RATE_HZ / 1000)[smooth]
     joint, h1 = (
         np.mean(welch(record(0.1), input="u", output="y", excitation=w, window=1000).value[smooth] / truth)
         for w in ("w", None)
@@ -45,11 +45,11 @@ def test_h1_is_biased_in_closed_loop() -> None:
 def test_a_chirp_offline() -> None:
     t = np.arange(20_000) / RATE_HZ
     w = 2.0 * chirp(t, 5.0, t[-1], 250.0)
-    u, y = Drive().run(w, periods=1)
+    u, y = TwoMassLoop().run(w, periods=1)
     block = Block(np.array([w, u[0], y[0]]), ("w", "u", "y"), RATE_HZ)
     found = welch(block, input="u", output="y", excitation="w", window=4000, overlap=0.75)
     band = (found.lines.frequency_hz > 15) & (found.lines.frequency_hz < 200)
-    truth = Plant().response(found.lines.frequency_hz[band])
+    truth = TwoMassPlant().response(found.lines.frequency_hz[band])
     db = 20 * np.log10(np.abs(found.value[band] / truth))
     assert np.median(np.abs(db)) < 0.2
     assert np.median(found.coherence[band]) > 0.99

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.firmware import KERNEL, ROOT, run
 from livebode import Lines, multisine
 from livebode.design import Waveform, write
+from tools.firmware import KERNEL, ROOT, run
 
 FOLDER = ROOT / "examples" / "drive"
 N, RAMP = 20, 3 * 20

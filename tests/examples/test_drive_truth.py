@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.firmware import M4F, ROOT, run
 from livebode import Lines, SlidingDFT, multisine
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.spectra_batch import SpectraBatch
-from tests.runtime.test_live_run_truth import started, table
 from tests.support.command import livebode, write_parquet
+from tests.support.live_runs import started, table
 from tests.support.peers.peer import PATIENCE_S, free_port
 from tests.support.targets import need_tools
+from tools.firmware import M4F, ROOT, run
 
 FOLDER = ROOT / "examples" / "drive"
 LINES = Lines.parse("20:220:10", rate_hz=4000, window=400)

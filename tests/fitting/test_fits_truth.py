@@ -10,33 +10,13 @@ from livebode.estimation import Settings, Tracker
 from livebode.fitting import Fitter, Grid, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
 from livebode.fitting.problem import Measured, Problem
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill
-from studies.fits import AFTER_S, least_variance, moving, standing
-from tests.estimation.test_real_machines_reference import bench_responses, motorbench
-from tests.fitting.test_hold_truth import Pendulum
 from tests.support.axes import MULTISINE
 from tests.support.errors import refused
+from tests.support.fitted import LINES, TRUTH, Pendulum, noisy
+from tests.support.motor_bench import bench_responses, motorbench
 
-LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
 FINE = Lines.parse("20:120:5", rate_hz=4000, window=800)
 BELT = TwoMass(radius_m=0.019)
-TRUTH = np.array([0.0028, 6.7, 5.0e5, 130.0, 0.0, 0.0, 0.0])
-
-
-def noisy(
-    value: np.ndarray, lines: Lines, relative: float, rows: int, seed: int = 0, dof: float = np.inf, said: float = 1.0
-) -> Responses:
-    """`rows` times the same response with noise of `relative`·|G|, whose sigma is `said` times that, from dof."""
-    rng = np.random.default_rng(seed)
-    shape = (rows, len(lines))
-    sigma = np.broadcast_to(relative * np.abs(value), shape)
-    noise = sigma * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
-    judged = said * sigma * (np.sqrt(rng.gamma(dof, 1 / dof, shape)) if np.isfinite(dof) else 1.0)
-    n = np.arange(rows)
-    return Responses(
-        lines=lines, value=value + noise, sigma=judged, dof=np.full(rows, dof), coherence=np.ones(shape),
-        valid=np.ones(shape, dtype=bool), first=20 * n, sample=20 * n + lines.window - 1, time_s=n / 200,
-        schedule=np.full(rows, np.nan),
-    )  # fmt: skip
 
 
 def bound_of(model, values, lines: Lines, relative: float) -> np.ndarray:
@@ -69,26 +49,6 @@ def test_a_thousand_fits_reach_the_cramer_rao_bound_and_their_bounds_hold(lines:
     assert of_derived.min() >= 0.92
 
 
-def test_at_standstill_through_simulation_and_tracker() -> None:
-    found = standing(120)
-    assert found.ok.all()
-    ratio = np.mean(np.log(found.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance()
-    cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)
-    print(f"over the Cramér–Rao bound {ratio.round(2)}, coverage {cover.round(3)}")
-    assert ratio.max() <= 1.2 + 3 * np.sqrt(2 / 120)
-    assert cover.min() >= 0.95 - 3 * np.sqrt(0.05 * 0.95 / 120)
-
-
-def test_along_a_stroke_with_the_motion_taken_off() -> None:
-    found, axis = moving(1)
-    assert AFTER_S < 0.2
-    assert found.ok.all()
-    keff = found["Keff"] / axis.mechanics.stiffness_at(found.schedule) - 1
-    js = found["Js"] / axis.mechanics.inertia_kg_m2 - 1
-    assert np.sqrt(np.mean(keff**2)) <= 0.0065
-    assert np.sqrt(np.mean(js**2)) <= 0.004
-
-
 CASES = {
     "rigid": (Rigid(), [0.0028, 0.0, 0.0], ()),
     "rigid with friction": (Rigid(output="position"), [0.0028, 0.5, 0.0], ("B",)),
@@ -107,7 +67,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_every_model_finds_itself_from_no_start(case: str) -> None:
     model, values, free = CASES[case]
-    exact = noisy(model.at(values, Grid.of(FINE)), FINE, 1e-6, 2, said=1.0)
+    exact = noisy(model.at(values, Grid.of(FINE)), FINE, 1e-6, 2, reported=1.0)
     found = fit(exact[0], model, free=free)
     assert found.status == "ok", found.sentence
     assert np.allclose(found.parameters.value[0], values, rtol=1e-3, atol=1e-7)
@@ -123,7 +83,7 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
 
 def test_sigmas_that_are_far_too_small_are_made_good_by_epsilon() -> None:
     """Noise of 3 % that is said to be 0.1 %: ε finds the 3 %, and the bounds hold."""
-    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, said=1 / 30))
+    found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
     assert np.median(found.epsilon) == pytest.approx(0.03, rel=0.05)
     cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)
     assert cover.min() >= 0.92

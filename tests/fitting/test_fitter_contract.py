@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from livebode.core import FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
 from livebode.fitting.weighing import epsilon_for
-from tests.fitting.test_fits_truth import LINES, TRUTH, noisy
 from tests.support.errors import refused
+from tests.support.fitted import LINES, TRUTH, noisy
 
 BELT = TwoMass(radius_m=0.019)
 ROWS = 70

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import FitError, UsageError
-from livebode.fitting import Grid, Parameter, PhysicalModel, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
+from livebode.fitting import Grid, Parameter, Rigid, ThreeMass, TwoMass, TwoMassGain, two_masses
 from livebode.fitting.hold import to_continuous, to_discrete
 from livebode.fitting.modal import chain_of
 from livebode.fitting.transfer import Transfer, roots
 from livebode.simulation import BeltAxis, Mechanics
 from tests.support.errors import refused
+from tests.support.fitted import Pendulum
 
 RATE_HZ = 4000.0
 F_HZ = np.arange(20.0, 141.0, 20.0)
@@ -193,21 +194,6 @@ def test_what_follows_from_the_parameters() -> None:
     values[3:5] = found["antiresonance_damping"], found["resonance_damping"]
     assert np.allclose(gained.at(values, GRID), model.at(BELT, GRID), rtol=1e-9)
     assert gained.derived(np.array(values))[-1] == pytest.approx(load / js)
-
-
-class Pendulum(PhysicalModel):
-    """A user's model: torque to angle of a pendulum."""
-
-    name = "pendulum"
-    parameters = (
-        Parameter("J", "kg m²", start=0.1, low=1e-6, high=1e3),
-        Parameter("c", "N m s/rad", start=1.0, low=1e-6, high=1e3),
-        Parameter("k", "N m/rad", start=1e3, low=1e-3, high=1e7),
-        Parameter("delay", "s", start=0.0, low=-0.01, high=0.01),
-    )
-
-    def transfer(self, inertia, damping, stiffness):
-        return [1.0], [inertia, damping, stiffness]
 
 
 def test_a_users_model_is_sampled_and_derived_like_the_others() -> None:

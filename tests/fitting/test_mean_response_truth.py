@@ -13,17 +13,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode.core import Block, Lines, Response, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import mean_response
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
 from tests.support.errors import refused
 from tests.support.responses import any_responses, cut, made
 
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=400)
 RUNS, PERIODS, SIGMA = 400, 20, 0.1
-TRUTH = Plant().response(LINES.frequency_hz)
+TRUTH = TwoMassPlant().response(LINES.frequency_hz)
 
 
 @cache
@@ -34,7 +34,7 @@ def runs(hop: int, louder: float) -> list[Responses]:
     total = (4 + PERIODS) * LINES.window
     noise = np.full(total, SIGMA)
     noise[settled + PERIODS * LINES.window // 2 :] *= louder
-    u, y = Drive().under(w, noise[:, np.newaxis] * np.random.default_rng(31).standard_normal((total, RUNS)))
+    u, y = TwoMassLoop().under(w, noise[:, np.newaxis] * np.random.default_rng(31).standard_normal((total, RUNS)))
     blocks = (Block(np.array([np.tile(w, PERIODS), u[i, settled:], y[i, settled:]]), ("w", "u", "y"), RATE_HZ)
               for i in range(RUNS))  # fmt: skip
     return [Tracker(settings).process(block) for block in blocks]

@@ -9,8 +9,8 @@ import pytest
 from livebode.core import FitError, Lines, Responses, UsageError
 from livebode.fitting import Grid, Rational, TwoMass, fit_rational, rational_of
 from livebode.fitting.hold import to_discrete
-from tests.fitting.test_fits_truth import TRUTH, noisy
 from tests.support.errors import refused
+from tests.support.fitted import TRUTH, noisy
 
 RATE_HZ = 2000.0
 LINES = Lines.parse("20:120:5", rate_hz=RATE_HZ, window=400)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.firmware import M4F, M7
 from livebode import open_log
 from tests.support.real_recordings import recording
 from tests.support.targets import VARIANTS, Job, need_tools, on_host, on_target, replay
+from tools.firmware import M4F, M7
 
 SHAPES = [
     (1, (0,)),

@@ -10,18 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from livebode.core import PID, FitError, Lines, LivebodeError, Loop, Responses, UsageError
+from livebode.core import PID, FitError, LivebodeError, Loop, Responses, UsageError
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import Margins, OpenLoop, against_lines, margins
+from tests.support.belt_loops import BAND_HZ, LINES, read, responses_of
 from tests.support.errors import refused
-from tests.support.loops import BELT, MODEL, Case, parameters, values
-
-LINES = Lines.parse("20:140:5", rate_hz=4000, window=800)
-BAND_HZ = (20.0, 140.0)
-
-
-def read(case: Case) -> Margins:
-    return margins(parameters(case.belt[np.newaxis]), case.open, BAND_HZ)
+from tools.loops import BELT, MODEL, Case, parameters, values
 
 
 @st.composite
@@ -80,17 +74,6 @@ def test_peak_and_bandwidth_are_those_of_a_fine_comb(case: Case) -> None:
     below = np.flatnonzero(np.abs(value / (1 + value)) < 10 ** (-3 / 20))
     true = f[below[0]] if below.size else np.nan
     assert found.of("bandwidth")[0] == pytest.approx(true, rel=3e-4, nan_ok=True)
-
-
-def responses_of(truth: np.ndarray, sigma: float, runs: int, seed: int) -> Responses:
-    """As many noisy responses with this truth at LINES, with known sigma."""
-    rng = np.random.default_rng(seed)
-    shape = (runs, len(LINES))
-    noise = sigma * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
-    row, ones, zeros = np.arange(runs), np.ones(shape), np.zeros(runs)
-    return Responses(
-        LINES, truth + noise, sigma * ones, zeros + np.inf, ones, ones > 0, row, row, zeros, zeros + np.nan
-    )
 
 
 @pytest.mark.parametrize("case", [Case(BELT, gain=4 * 0.2308, delay_ticks=4), Case(BELT, delay_ticks=8)])

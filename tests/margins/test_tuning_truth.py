@@ -13,9 +13,9 @@ from livebode.core import PID, Loop, UsageError
 from livebode.fitting import Fitter, Grid, Rigid
 from livebode.margins import OpenLoop, low_pass, notch, peak_sensitivity_at_lines, tuning, worst
 from livebode.margins.filters import notch_over
-from tests.margins.test_margins_truth import BAND_HZ, LINES, responses_of
+from tests.support.belt_loops import BAND_HZ, LINES, responses_of
 from tests.support.errors import refused
-from tests.support.loops import BELT, MODEL, Case, parameters
+from tools.loops import BELT, MODEL, Case, parameters
 
 RATE_HZ = 4000.0
 PLACES_M = np.linspace(0.3, 1.5, 9)

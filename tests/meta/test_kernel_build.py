@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -127,7 +128,7 @@ def test_same_bits_from_every_compiler_level_and_width(tmp_path, tmp_path_factor
     builds = {name: build_once(name, tmp_path_factory) for name in ("gcc", "clang")}
     for name, flags in {
         "gcc one by one": ["-O2", "-DLB_SCALAR"],
-        "clang one by one": ["-O1", "-DLB_SCALAR"],
+        "clang one by one, with assertions": ["-O1", "-DLB_SCALAR", "-DLB_DEBUG"],
     }.items():
         compiler = needed(name.split()[0])
         builds[name] = compiler, tmp_path, build(tmp_path / name, compiler, *flags, dispatch=False)
@@ -143,9 +144,54 @@ def test_sanitizers_find_nothing(tmp_path):
     sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     compiler = needed("gcc")
     # The same statements, and every check in each of them, but no object repeats a function wherever it is called.
-    objects = build(tmp_path / "objects", compiler, "-O0", "-DLB_INLINE=static inline", *sanitize)
+    objects = build(tmp_path / "objects", compiler, "-O0", "-DLB_DEBUG", "-DLB_INLINE=static inline", *sanitize)
     program(tmp_path, compiler, objects, "misuse", *sanitize)
     program(tmp_path, compiler, objects, "bits", *sanitize)
+
+
+VIOLATIONS = {
+    "index": "t->index == t->count",
+    "count": "t->index == t->count",
+    "blocks": "t->blocks ==",
+    "table": "t->half ==",
+    "queued": "t->queued <=",
+    "radius": "t->radius_window <=",
+    "overlap": "lb_apart",
+}
+
+
+def violating(directory: Path, *flags: str) -> Path:
+    """A program that violates what its argument names, with a debug build of the kernel."""
+    compiler = needed("gcc")
+    objects = build(directory, compiler, "-O0", "-DLB_SCALAR", "-DLB_DEBUG", *flags, dispatch=False)
+    include = [f"-I{KERNEL / folder}" for folder in ("include", "src")]
+    define = ["-DLB_BITS=64", "-DLB_SCALAR", "-DLB_DEBUG", *flags]
+    run(compiler, *WARNINGS, *define, *include, KERNEL / "tests/violation.c", *objects, "-o", directory / "violation")
+    return directory / "violation"
+
+
+def test_a_debug_build_traps_where_an_invariant_is_violated(tmp_path):
+    program = violating(tmp_path / "trap")
+    assert subprocess.run([program, "none"], check=False).returncode == 0
+    for what in VIOLATIONS:
+        assert -subprocess.run([program, what], check=False).returncode in (signal.SIGILL, signal.SIGTRAP), what
+
+
+def test_a_handler_receives_the_condition_that_is_violated(tmp_path):
+    program = violating(tmp_path / "handler", "-DLB_ASSERT_HANDLER=violated")
+    for what, condition in VIOLATIONS.items():
+        done = subprocess.run([program, what], capture_output=True, text=True, check=False)
+        assert done.returncode == 42, what
+        assert "lb_sound(t)" in done.stdout or condition in done.stdout, what
+
+
+def test_a_release_has_no_code_for_assertions(tmp_path):
+    flags = ["-O2", "-DLB_SCALAR"]
+    with_them = build(tmp_path / "with", needed("gcc"), *flags, dispatch=False)
+    none = ["-DLB_ASSERT_H", "-DLB_ASSERT(condition)=((void)0)"]
+    without = build(tmp_path / "without", needed("gcc"), *flags, *none, dispatch=False)
+    for one, other in zip(with_them, without):
+        assert one.read_bytes() == other.read_bytes(), one.name
 
 
 def test_the_documented_example_compiles_and_runs(built, tmp_path):

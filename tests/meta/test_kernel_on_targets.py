@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from bench.firmware import KERNEL, M4F, M7, ROOT, kept, run, undefined
 from bench.mcu import LIMIT, TABLES, count
 from tests.support.targets import need_tools
+from tools.firmware import KERNEL, M4F, M7, ROOT, kept, run, undefined
 
 STEP = ("push", "queue", "read", "count", "instruction_set")
 # What libgcc has for a processor: divisions of 64 bits, and the double precision that a Cortex-M4F does without.

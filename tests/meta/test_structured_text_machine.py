@@ -1,11 +1,11 @@
-"""The test's own evaluator of Structured Text: right where it computes, and strict where controllers differ."""
+"""The evaluator of Structured Text: right where it computes, and strict where controllers differ."""
 
 from __future__ import annotations
 
 import pytest
 
-from tests.support.structured_text import Machine, RefusedError
-from tests.support.structured_text.types import ULINT
+from tools.structured_text import Machine, RefusedError
+from tools.structured_text.types import ULINT
 
 VARIABLES = (
     "a : LREAL; b : LREAL; n : UDINT; m : UDINT; i : DINT; big : ULINT; yes : BOOL; t : ARRAY [0..1, 0..2] OF LREAL;"

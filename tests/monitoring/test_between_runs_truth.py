@@ -16,10 +16,9 @@ from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.run_offset import RunOffset
 from livebode.simulation import TensionLoss
-from studies.healthy import ASKED, NAMES
-from studies.monitoring_axis import LINES
-from studies.temperature import at_temperature, judged
-from tests.support.monitored import ideal
+from tests.support.axes import LINES
+from tests.support.monitored import NAMES, ideal
+from tests.support.warm import ASKED, at_temperature, judged
 
 SMALLEST = np.array([0.005, 0.005, 0.05, 0.01])
 MEAN_S = seconds_between(ASKED)

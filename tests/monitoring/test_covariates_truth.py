@@ -16,12 +16,11 @@ from livebode.monitoring import Baseline, Machine, MachineMonitor
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.runtime import Destination, run
 from livebode.simulation import TensionLoss
-from studies.healthy import NAMES
-from studies.monitoring_axis import LINES
-from studies.temperature import MEAN_C, PER_KELVIN, Run, at_temperature, judged
+from tests.support.axes import LINES
 from tests.support.command import write_parquet
 from tests.support.errors import refused
-from tests.support.monitored import ideal
+from tests.support.monitored import NAMES, ideal
+from tests.support.warm import MEAN_C, PER_KELVIN, Run, at_temperature, judged
 
 SHORT_S = 6.0
 

@@ -12,7 +12,7 @@ from livebode.core import BaselineError, Block, LivebodeError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.simulation import TensionLoss
-from studies.monitoring_axis import LINES
+from tests.support.axes import LINES
 from tests.support.errors import refused
 from tests.support.monitored import machine, pieces, recorded, told
 

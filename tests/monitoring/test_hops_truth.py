@@ -12,8 +12,9 @@ from livebode.core import BaselineError, Block, Event
 from livebode.estimation import Settings, Tracker
 from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
 from livebode.simulation import Fault, SimulatedAxis, Strokes, TensionLoss
-from studies.monitoring_axis import HIGH_M, LINES, LOW_M, SPEED_M_PER_S, axis
+from tests.support.axes import LINES
 from tests.support.errors import refused
+from tests.support.monitored import HIGH_M, LOW_M, SPEED_M_PER_S, axis
 
 SETTINGS = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", noise="quiet", hop=20)
 LEARNED_S, JUDGED_S = 120.0, 24.0

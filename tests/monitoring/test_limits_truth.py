@@ -6,8 +6,8 @@ from functools import cache
 
 from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
 from livebode.simulation import SimulatedAxis, TensionLoss
-from studies.monitoring_axis import CHANNELS, LINES, RADIUS_M, axis
-from tests.support.monitored import NAMES, THERE, pieces, recorded, strokes, told, watcher
+from tests.support.axes import LINES
+from tests.support.monitored import CHANNELS, NAMES, RADIUS_M, THERE, axis, pieces, recorded, strokes, told, watcher
 
 SPEED_M_PER_S = 0.3
 
@@ -16,7 +16,7 @@ SPEED_M_PER_S = 0.3
 def one_way() -> Machine:
     """From the strokes there alone, all of one speed."""
     simulated = axis(strokes((SPEED_M_PER_S,) * 2, THERE), 80)
-    half = int(simulated.motion.edges_s[1] * 4000)
+    half = int(simulated.motion.edges_s(4000)[1] * 4000)
     runs = []
     for seed in range(80, 88):
         block, _ = SimulatedAxis(axis(strokes((SPEED_M_PER_S,) * 2, THERE), seed)).run()

@@ -7,7 +7,6 @@ import pytest
 
 from livebode.monitoring import Evidence, MachineDetector
 from livebode.simulation import DampingGrowth, LoadChange, Mechanics, Sensor, SoftSpot, TensionLoss
-from studies.monitoring import trial
 from tests.support.monitored import BACK, changed, machine, recorded, told, watcher
 
 
@@ -48,13 +47,6 @@ def test_a_soft_spot_is_placed_and_stands(ends: tuple[float, float]) -> None:
     assert told(events) == [("change", "stiffness")]
     assert abs(events[0].details["place_m"] - 1.1) < 0.02
     assert "around position 1.1" in events[0].message
-
-
-def test_the_study_in_short() -> None:
-    """As `python -m studies.monitoring` does it, a few strokes of each."""
-    for i in range(4):
-        assert trial(machine(), 100_000 + i, lambda _: TensionLoss(loss=0.005)).found("stiffness")
-        assert trial(machine(), 500_000 + i, lambda _: LoadChange(load_kg=0.134)).found("load")
 
 
 def test_a_ramp_is_found_early() -> None:

@@ -12,8 +12,8 @@ import pytest
 from livebode import MotionCorrection, Responses, Tracker
 from livebode.core import Block
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Standstill, Strokes
-from studies.motion import SETTINGS, axis, corrected, truth_at
 from tests.support.axes import MULTISINE
+from tests.support.moving import SETTINGS, axis, corrected, truth_at
 
 
 def hits(run: BeltAxis, found: Responses) -> np.ndarray:

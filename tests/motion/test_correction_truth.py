@@ -11,9 +11,9 @@ from livebode.core import PID, Block, LivebodeError, Loop, Responses, SignalErro
 from livebode.estimation import Settings, Tracker
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
-from studies.motion import LINES, SETTINGS, corrected, judge
-from tests.support.axes import MULTISINE
+from tests.support.axes import LINES, MULTISINE
 from tests.support.errors import refused
+from tests.support.moving import SETTINGS, corrected, errors
 
 
 def stroke(sigma: float = 0.0, seed: int = 1, seconds: float = 4.15, **options: object) -> tuple[BeltAxis, Block]:
@@ -25,12 +25,12 @@ def stroke(sigma: float = 0.0, seed: int = 1, seconds: float = 4.15, **options: 
 
 def test_without_noise_motion_is_removed() -> None:
     axis, block = stroke()
-    raw, ours = judge(axis, Tracker(SETTINGS).process(block)).rms(), judge(axis, corrected(axis, block)).rms()
-    assert raw["db"] > 0.5
-    assert raw["keff"] > 1.0
-    assert ours["db"] < 0.05
-    assert ours["keff"] < 0.1
-    assert ours["js"] < 0.1
+    raw, ours = errors(axis, Tracker(SETTINGS).process(block)), errors(axis, corrected(axis, block))
+    assert raw.db > 0.5
+    assert raw.keff > 1.0
+    assert ours.db < 0.05
+    assert ours.keff < 0.1
+    assert ours.js < 0.1
 
 
 @pytest.mark.parametrize(
@@ -47,10 +47,10 @@ def test_without_noise_motion_is_removed() -> None:
 )
 def test_with_noise_parameters_of_single_windows(options: dict[str, object]) -> None:
     axis, block = stroke(0.1, **options)
-    found = judge(axis, corrected(axis, block)).rms()
-    assert found["db"] < 0.18  # white noise alone makes 0.15
-    assert found["keff"] < 0.65
-    assert found["js"] < 0.4
+    found = errors(axis, corrected(axis, block))
+    assert found.db < 0.18  # white noise alone makes 0.15
+    assert found.keff < 0.65
+    assert found.js < 0.4
 
 
 def test_the_fitted_model_is_the_machine() -> None:
@@ -70,9 +70,9 @@ def test_the_fitted_model_is_the_machine() -> None:
 def test_driven_by_the_excitation_it_is_as_good_once_the_acceleration_has_rung_out() -> None:
     axis, block = stroke()
     settings = Settings(lines=LINES, output="velocity", input="u", excitation="w", schedule="x", loop=axis.drive.loop())
-    found = judge(axis, corrected(axis, block, settings, driven_by="excitation"), after_s=1.0).rms()
-    assert found["db"] < 0.02
-    assert found["keff"] < 0.05
+    found = errors(axis, corrected(axis, block, settings, driven_by="excitation"), after_s=1.0)
+    assert found.db < 0.02
+    assert found.keff < 0.05
 
 
 def test_the_cutting_into_blocks_changes_nothing() -> None:
@@ -103,7 +103,7 @@ def test_a_gap_and_a_bad_sample_cost_their_windows_alone() -> None:
     assert np.array_equal(responses.valid, expected.valid)
     far = (responses.sample < 9000) | (responses.sample > 9500 + 2400)
     rows = np.flatnonzero(far)
-    assert judge(axis, Responses.join([responses[int(i) : int(i) + 1] for i in rows])).rms()["db"] < 0.1
+    assert errors(axis, Responses.join([responses[int(i) : int(i) + 1] for i in rows])).db < 0.1
 
 
 def test_standstill_and_too_little_to_fit() -> None:

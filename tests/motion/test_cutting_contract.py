@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from livebode import Lines, LivebodeError, MotionCorrection, Responses, Settings, Tracker, multisine
 from livebode.core import Block
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
-from tests.estimation.test_cutting_property import assert_same
+from tests.support.responses import assert_same
 
 RATE_HZ, WINDOW, CHUNK, JUMP = 4000.0, 200, 2400, 7000
 LINES = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=WINDOW)

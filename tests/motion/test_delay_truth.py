@@ -8,8 +8,8 @@ import pytest
 from livebode.core import Block
 from livebode.motion import MotionCorrection
 from livebode.simulation import SimulatedAxis
-from studies.monitoring_axis import RADIUS_M, RATE_HZ
-from studies.motion import SETTINGS, axis
+from tests.support.axes import RATE_HZ
+from tests.support.moving import SETTINGS, axis
 
 NAMES = ("w", "u", "velocity", "x")
 
@@ -21,7 +21,7 @@ def test_a_late_velocity_is_a_delay_and_no_other_mass() -> None:
     block, _ = SimulatedAxis(run).run()
     data = block.data[[block.index(name) for name in NAMES]]
     data[2, ticks:] = data[2, : data.shape[1] - ticks].copy()
-    correction = MotionCorrection(SETTINGS, radius_m=RADIUS_M, chunk_samples=16000)
+    correction = MotionCorrection(SETTINGS, radius_m=run.mechanics.radius_m, chunk_samples=16000)
     correction.process(Block(data, NAMES, block.rate_hz))
     correction.finish()
     model = correction.model

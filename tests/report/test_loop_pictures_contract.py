@@ -13,8 +13,8 @@ from livebode.fitting import Fit, Grid, fit
 from livebode.margins import Margins, OpenLoop, margins
 from livebode.report import save_loop_picture, save_validation_picture
 from livebode.validation import validate
-from tests.margins.test_margins_truth import LINES, responses_of
-from tests.support.loops import BELT, MODEL, Case, parameters
+from tests.support.belt_loops import LINES, responses_of
+from tools.loops import BELT, MODEL, Case, parameters
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from livebode.report.figures import drawn
 from livebode.report.svg import inline_svg
 from livebode.reporting.compare_report import Comparison
 from livebode.reporting.run_report import run_report
-from tests.cli.test_loop_truth import AXIS, record
 from tests.support.command import livebode
+from tests.support.loop_runs import AXIS, record
 from tests.support.reports import LINES, Page, measured, plant, strokes, write_run
 
 MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)

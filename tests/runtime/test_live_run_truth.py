@@ -6,22 +6,20 @@ import json
 import signal
 import socket
 import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from livebode.core import Channel, Event
-from livebode.records import Run
 from livebode.runtime import Audience
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
+from tests.support.live_runs import started, table
 from tests.support.live_session import LiveSession
 from tests.support.peers.peer import PATIENCE_S, batches, free_port, until
 from tests.support.peers.plain import TcpPeer
@@ -42,16 +40,6 @@ def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
     path = folder / "axis.toml"
     path.write_text(f"[source]\n{source}\n{rest}")
     return path
-
-
-def started(path: Path, out: Path) -> subprocess.Popen[bytes]:
-    command = [Path(sys.executable).with_name("livebode"), "run", str(path), "--out", str(out), "--json"]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-
-def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
-    table = pa.concat_tables(Run.open(out).tables(what))
-    return {name: np.array(column) for name, column in table.to_pydict().items()}
 
 
 def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from examples.kernel_drive import KernelDrive
 from livebode.configuration.axis import Axis
 from livebode.core import Block, Channel, ConfigError, GridError, Lines, SpectraLayout
 from livebode.estimation import Settings
@@ -25,13 +24,13 @@ from livebode.records import Run
 from livebode.runtime.watching import make_watching
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
-from tests.cli.test_learn_truth import _small
-from tests.runtime.test_live_run_truth import started, table
-from tests.sources.test_live_contract import fed
+from livebode.sources.live.kernel_drive import KernelDrive
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
+from tests.support.live_runs import started, table
+from tests.support.monitored import small_baseline
 from tests.support.peers.broker import MqttPeer
-from tests.support.peers.peer import PATIENCE_S, Peer
+from tests.support.peers.peer import PATIENCE_S, Peer, fed
 from tests.support.peers.plain import TcpPeer, UdpPeer
 
 LINES = Lines.parse("20:140:20", rate_hz=4000, window=400)
@@ -246,7 +245,7 @@ def test_a_baseline_learned_from_samples_tells_a_change_in_spectra(tmp_path: Pat
 
 
 def test_the_model_of_the_machine_is_left_out_and_said_to_be(tmp_path: Path) -> None:
-    _small().save(tmp_path / "baseline.json")
+    small_baseline().save(tmp_path / "baseline.json")
     axis = configured(REST + f'[monitoring]\nbaseline = "{tmp_path / "baseline.json"}"\n')
     tracker_settings = settings()
     told = make_watching(axis, tracker_settings, samples=False).finish(lambda _: None)

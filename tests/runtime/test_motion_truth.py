@@ -11,9 +11,9 @@ import pytest
 
 from livebode import Block, MotionCorrection, Responses
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
-from studies.motion import SETTINGS
 from tests.support.axes import MULTISINE
 from tests.support.command import livebode, write_parquet
+from tests.support.moving import SETTINGS
 
 NAMES = ("w", "u", "velocity", "x")
 AXIS = """

@@ -17,9 +17,9 @@ from livebode.runtime.fits import Fits
 from livebode.runtime.tracking import Outcome, record
 from livebode.runtime.watching import Watching
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
-from studies.motion import SETTINGS
 from tests.support.axes import MULTISINE
 from tests.support.monitored import machine
+from tests.support.moving import SETTINGS
 from tests.support.recorded import same
 
 AXIS = BeltAxis(

@@ -6,8 +6,6 @@ import control
 import numpy as np
 import pytest
 
-from examples.closed_loop import Drive as Example
-from examples.closed_loop import Plant
 from livebode.core import Block, as_model
 from livebode.estimation import Settings, Tracker
 from livebode.simulation import (
@@ -20,6 +18,8 @@ from livebode.simulation import (
     SimulatedAxis,
     Spans,
     Truth,
+    TwoMassLoop,
+    TwoMassPlant,
     linear,
 )
 from livebode.simulation._axis import Engine
@@ -79,12 +79,12 @@ def test_indirect_is_the_sampled_plant_through_the_loop_that_the_drive_describes
 
 def test_the_standstill_loop_of_the_examples_is_the_same_machine() -> None:
     block, _ = settled()
-    u, y = Example().run(MULTISINE, periods=1)
+    u, y = TwoMassLoop().run(MULTISINE, periods=1)
     for name, values in (("u", u[0]), ("velocity", y[0])):
         expected = np.fft.rfft(values)[list(LINES.bins)]
         assert np.max(np.abs(spectrum(block, name) / expected - 1)) < 1e-8
     at = BeltAxis().linear(0.8).sampled(RATE_HZ)
-    assert np.allclose(at.response(F_HZ), Plant().response(F_HZ), rtol=1e-10)
+    assert np.allclose(at.response(F_HZ), TwoMassPlant().response(F_HZ), rtol=1e-10)
 
 
 def test_plants_in_python_control() -> None:

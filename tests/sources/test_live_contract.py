@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,12 +11,22 @@ import numpy as np
 import pytest
 
 from livebode.core import SourceError
-from livebode.sources.live import KINDS, LiveBlock, LiveSource, SourceSettings, open_source
+from livebode.sources.live import KINDS, LiveBlock, LiveSource
 from livebode.sources.live.opening import MODULES
 from tests.support.errors import refused
 from tests.support.peers.broker import MqttPeer
 from tests.support.peers.opcua import OpcUaPeer
-from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, SAMPLES, Feeding, Peer, batches, send_all
+from tests.support.peers.peer import (
+    CHANNELS,
+    PATIENCE_S,
+    RATE_HZ,
+    SAMPLES,
+    Peer,
+    batches,
+    fed,
+    opened,
+    send_all,
+)
 from tests.support.peers.plain import StdinPeer, TcpPeer, UdpPeer
 from tests.support.peers.plc import NotifyPeer, RingPeer
 
@@ -36,18 +45,6 @@ PEERS = {
 def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Peer]:
     with PEERS[request.param](tmp_path) as found:
         yield found
-
-
-def opened(peer: Peer, **more: object) -> LiveSource:
-    return open_source(SourceSettings(**(peer.settings | {"timeout_s": PATIENCE_S} | more)))
-
-
-@contextmanager
-def fed(peer, script, **more):
-    """A source that is open until the script has ended, for a peer that still sends to a closed one fails."""
-    with Feeding(script) as feeding, opened(peer, **more) as source:
-        yield source
-        feeding.join()
 
 
 def received(source: LiveSource, last: int) -> list[LiveBlock]:

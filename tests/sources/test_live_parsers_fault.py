@@ -35,11 +35,11 @@ from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_lin
 from livebode.sources.live.said import Said
 from livebode.sources.live.settings import check_keys
 from livebode.sources.live.spectra_frame import read_spectra_text, spectra_text
+from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_LIVE_FUZZ", "10000"))
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
-ODD = [0, 1, 2**7, 2**8 - 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1, 2**62, 2**63, 2**64 - 1]
 
 
 def batch(first: int = 100, samples: int = 8) -> Batch:
@@ -53,32 +53,6 @@ def with_crc(raw: bytes) -> bytes:
     if len(body) >= HEADER.size:
         body[8:12] = struct.pack("<I", len(raw))
     return bytes(body) + struct.pack("<I", zlib.crc32(body))
-
-
-def damaged(raw: bytes, rng: random.Random) -> bytes:
-    out = bytearray(raw)
-    for _ in range(rng.choice([1, 1, 2, 5])):
-        at = rng.randrange(len(out)) if out else 0
-        what = rng.randrange(5)
-        if what == 0:
-            out[at : at + 1] = rng.randbytes(1)
-        elif what == 1 and out:
-            out[at] ^= 1 << rng.randrange(8)
-        elif what == 2:
-            size = rng.choice([1, 2, 4, 8])
-            out[at : at + size] = (rng.choice(ODD) % 256**size).to_bytes(size, "little")
-        elif what == 3:
-            del out[at : at + rng.randrange(1, 20)]
-        else:
-            out[at:at] = rng.randbytes(rng.randrange(1, 9))
-    return bytes(out)
-
-
-def one_sentence(error: LivebodeError) -> None:
-    assert error.message
-    json.dumps(error.as_dict())  # its facts are plain data
-    assert "\n" not in str(error)
-    assert len(str(error)) < 1000
 
 
 def test_damaged_frames_give_batches_or_a_sentence():

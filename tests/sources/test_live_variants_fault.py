@@ -16,7 +16,7 @@ from livebode.core import Channel, SourceError
 from livebode.sources.live.numbered import Numbered
 from livebode.sources.live.opcua import INCOMPLETE_MAX, Gathered
 from livebode.sources.live.ring import FILETIME_1970, HEADER, MAGIC, Ring, new_rows, read_ring, ring_batch
-from tests.sources.test_live_parsers_fault import damaged, one_sentence
+from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
 
 CASES = int(os.environ.get("LIVEBODE_LIVE_FUZZ", "10000"))

@@ -14,6 +14,7 @@ from livebode.core import Channel
 from livebode.sources.live import Batch, LiveBlock, Position, Sequencer
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.said import BURST, Said
+from tests.support.displaced import displaced
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
 RATE_HZ = 4000.0
@@ -43,18 +44,6 @@ def passed(batches: list[Batch], said: Said | None = None, **options: int) -> li
 
 def content(blocks: list[LiveBlock]) -> list[tuple[int, bool, bytes]]:
     return [(block.start, block.gap, block.data.tobytes()) for block in blocks]
-
-
-def displaced(batches: list[Batch], bound: int, draw: st.DataObject) -> list[Batch]:
-    """An order in which no batch is more than `bound` places late."""
-    left, order = list(range(len(batches))), []
-    for place in range(len(batches)):
-        due = [i for i in left if place - i >= bound]
-        pick = due[0] if due else left[draw.draw(st.integers(0, min(bound, len(left) - 1)))]
-        left.remove(pick)
-        order.append(pick)
-    assert max(order.index(i) - i for i in range(len(batches))) <= bound
-    return [batches[i] for i in order]
 
 
 @settings(deadline=None)

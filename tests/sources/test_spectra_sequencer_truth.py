@@ -14,7 +14,7 @@ from livebode.sources.live import Batch, Sequencer, SpectraBatch
 from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import JUMP_S
 from livebode.sources.live.spectra_batch import LiveSpectra
-from tests.sources.test_sequencer_truth import displaced
+from tests.support.displaced import displaced
 
 WINDOW, RATE_HZ = 60, 4000.0
 SIGNALS, VALUES = (Channel("w", "N m"), Channel("y")), (Channel("x", "m"),)

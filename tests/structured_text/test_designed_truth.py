@@ -17,7 +17,7 @@ from livebode.experiments.designed import read_designed
 from livebode.structured_text import multisine as block_text
 from tests.support.command import livebode
 from tests.support.errors import refused
-from tests.support.structured_text import Machine
+from tools.structured_text import Machine
 
 LINES = Lines((1, 3, 7), 20, rate_hz=1000.0)
 PERIOD = multisine(LINES, [0.3, 0.2, 0.1], "random", seed=3)

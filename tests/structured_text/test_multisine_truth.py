@@ -10,7 +10,7 @@ import pytest
 from livebode.core import Lines
 from livebode.excitation import multisine as multisine_period
 from livebode.structured_text import multisine
-from tests.support.structured_text import Instance, Machine
+from tools.structured_text import Instance, Machine
 
 WINDOW, LIMIT = 40, 2.0
 PERIOD = multisine_period(Lines((1, 3, 7), WINDOW, rate_hz=1000.0), 0.5)

@@ -12,8 +12,8 @@ from livebode.configuration.axis import Axis
 from livebode.sources.live.ring import FILETIME_1970, HEADER, read_ring
 from livebode.structured_text import ring_block, ring_type
 from tests.support.command import livebode
-from tests.support.structured_text import Instance, Machine
-from tests.support.structured_text.types import ULINT
+from tools.structured_text import Instance, Machine
+from tools.structured_text.types import ULINT
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/plc"

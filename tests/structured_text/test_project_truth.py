@@ -18,8 +18,8 @@ from livebode.sources.live.settings import named_channels
 from livebode.structured_text import Project
 from tests.support.peers.peer import PATIENCE_S, Feeding
 from tests.support.peers.plc import AdsPeer
-from tests.support.structured_text import Instance, Machine
-from tests.support.structured_text.types import ULINT
+from tools.structured_text import Instance, Machine
+from tools.structured_text.types import ULINT
 
 LINES = Lines((1, 3, 4), 20, rate_hz=1000.0)
 PROJECT = Project(multisine(LINES, 0.3), 2.0, LINES, ["w", "u", "y"], "w", ["w", "u", "y"], ring_length=512)

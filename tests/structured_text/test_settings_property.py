@@ -25,7 +25,7 @@ from livebode.structured_text import (
     twincat,
 )
 from livebode.structured_text.names import NAME_LENGTH_MAX
-from tests.support.structured_text import Machine, parse
+from tools.structured_text import Machine, parse
 
 EXAMPLES = int(os.environ.get("LIVEBODE_PLC_EXAMPLES", "2"))
 """A text of the sliding DFT takes blark two seconds; `make fuzz` takes more of them."""

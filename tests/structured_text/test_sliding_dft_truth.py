@@ -8,7 +8,7 @@ import pytest
 from livebode.core import Lines
 from livebode.kernel import SlidingDFT
 from livebode.structured_text import sliding_dft
-from tests.support.structured_text import Instance, Machine
+from tools.structured_text import Instance, Machine
 
 
 def block(window: int, bins: list[int], channels: list[str], phase: str = "fixed") -> Instance:

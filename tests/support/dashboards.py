@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from examples.closed_loop import RATE_HZ, Drive
 from livebode.configuration.axis import FitSection, LoopSection, RecordSection
 from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
@@ -20,6 +19,7 @@ from livebode.excitation import multisine
 from livebode.records import Run
 from livebode.runtime.fits import Fits
 from livebode.runtime.tracking import record
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.browser import until
 from tests.support.responses import made
 
@@ -39,7 +39,7 @@ BAD = 5000  # a sample that is not finite: an event, and responses that are not 
 def data() -> np.ndarray:
     """w, u, y and a position that goes there and back, shape (4, samples)."""
     w = 0.3 * multisine(LINES)
-    u, y = Drive().run(w, SAMPLES // LINES.window, sigma=0.1, seed=1)
+    u, y = TwoMassLoop().run(w, SAMPLES // LINES.window, sigma=0.1, seed=1)
     x = 0.9 + 0.6 * np.sin(2 * np.pi * np.arange(SAMPLES) / 8000)
     found = np.array([np.resize(w, SAMPLES), u[0], y[0], x])
     found[2, BAD] = np.nan

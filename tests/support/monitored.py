@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
-from livebode.core import Block, Event
-from livebode.monitoring import Machine, MachineMonitor, learn_machine, seconds_between
+from livebode.core import Block, Event, Lines
+from livebode.monitoring import Baseline, Machine, MachineMonitor, Rows, learn_machine, learn_table, seconds_between
 from livebode.monitoring.accuracy import Accuracy
+from livebode.monitoring.between_runs import BetweenRuns
+from livebode.monitoring.covariates import Covariates
 from livebode.motion import Curve, MovingModel
 from livebode.motion.model import basis
-from livebode.simulation import Mechanics, SimulatedAxis
-from studies.monitoring_axis import CHANNELS, HIGH_M, LINES, LOW_M, RADIUS_M, RandomStrokes, axis, healthy_runs
+from livebode.simulation import (
+    BeltAxis,
+    Friction,
+    Mechanics,
+    Motion,
+    Sensor,
+    SimulatedAxis,
+    StrokeSequence,
+)
+from tests.support.axes import LINES, MULTISINE, RATE_HZ
 
 NAMES = ("u", "velocity", "x")
+CHANNELS = ("w", *NAMES)
+LOW_M, HIGH_M, SPEED_M_PER_S = 0.25, 1.6, 0.38
+RADIUS_M = Mechanics().radius_m
 THERE, BACK = (LOW_M, HIGH_M), (HIGH_M, LOW_M)
 
 
@@ -30,8 +43,36 @@ def watcher(asked: str = "one in 30 days of motion") -> MachineMonitor:
     return MachineMonitor(machine(), LINES, NAMES, seconds_between(asked))
 
 
-def strokes(speeds: Sequence[float], ends: tuple[float, float] = THERE) -> RandomStrokes:
-    return RandomStrokes(tuple(speeds), *ends)
+def strokes(speeds: Sequence[float], ends: tuple[float, float] = THERE) -> StrokeSequence:
+    """Forth and back between the ends, each at its speed."""
+    points = tuple(ends[i % 2] for i in range(len(speeds) + 1))
+    return StrokeSequence(turning_points_m=points, speeds_m_per_s=tuple(speeds))
+
+
+def axis(motion: Motion, seed: int, **options: Any) -> BeltAxis:
+    """σ = 0.1 rad/s, friction of 15 N, 20-bit encoder; a sequence of strokes in whole, with two windows after it."""
+    if isinstance(motion, StrokeSequence):
+        options.setdefault("seconds", float(motion.edges_s(RATE_HZ)[-1]) + 2 * LINES.window / RATE_HZ)
+    given: dict[str, Any] = {
+        "friction": Friction(load_coulomb_n=15.0),
+        "sensor": Sensor(noise_rad_per_s=0.1, encoder_counts_per_turn=1 << 20),
+        "seconds": 10.0,
+    }
+    return BeltAxis(motion=motion, excitation_n_m=MULTISINE, seed=seed, **(given | options))
+
+
+def blocks(machine: BeltAxis) -> Iterator[Block]:
+    return iter(SimulatedAxis(machine).blocks(CHANNELS, block_samples=40000))
+
+
+def healthy_runs(count: int, each: int, seed: int = 5000) -> list[Callable[[], Iterable[Block]]]:
+    """Recordings to learn from, of strokes at 0.3 to 1 times 0.38 m/s, the first in a random direction."""
+    generator, runs = np.random.default_rng(seed), []
+    for i in range(count):
+        speeds = SPEED_M_PER_S * generator.uniform(0.3, 1.0, each)
+        motion = strokes(speeds.tolist(), THERE if generator.uniform() < 0.5 else BACK)
+        runs.append(partial(iter, list(blocks(axis(motion, seed + i)))))
+    return runs
 
 
 def recorded(
@@ -40,7 +81,7 @@ def recorded(
     """One block with all samples."""
     simulated = SimulatedAxis(axis(strokes(speeds, ends), seed, faults=faults, **options))
     block, _ = simulated.run()
-    return Block(block.data[[block.index(n) for n in CHANNELS]], tuple(CHANNELS), block.rate_hz)
+    return Block(block.data[[block.index(n) for n in CHANNELS]], CHANNELS, block.rate_hz)
 
 
 def pieces(block: Block, sizes: Iterable[int]) -> Iterable[Block]:
@@ -94,3 +135,26 @@ def ideal() -> Machine:
         0.4,
         np.full(28, 10),
     )
+
+
+def small_baseline() -> Baseline:
+    lines = Lines.parse("20:140:20", rate_hz=4000, window=400)
+    generator = np.random.default_rng(1)
+    noise = generator.standard_normal((2, 40, len(lines)))
+    rows = Rows(
+        1 + 0.01 * (noise[0] + 1j * noise[1]), np.full(noise[0].shape, 2e-4), np.zeros(40), np.zeros(40),
+        0.1 * np.arange(40), 400 * np.arange(40) + 399, np.ones(40, dtype=bool),
+    )  # fmt: skip
+    table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], [rows])
+    curve, known = Curve(0.2, 1.6, np.zeros(12)), Accuracy(np.ones(4), np.zeros(4), np.full(4, 0.01))
+    machine = Machine(
+        MovingModel(0.003, 7.0, 1.0, curve, curve), np.ones(len(lines)), np.ones(len(lines.quiet)), known, known,
+        0.1, 0.4, np.full(28, 9),
+        covariates=Covariates(
+            ("temperature",), np.array([20.0]), np.array([15.0]), np.array([25.0]),
+            np.array([[-0.002], [0.0], [0.0], [0.0]]), np.zeros((4, 1, 1)),
+        ),
+        between=BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.5),
+    )  # fmt: skip
+    signals = {"output": "velocity", "input": "u", "excitation": "w", "schedule": "x"}
+    return Baseline(lines, 20, signals, "joint", "plant", (table,), machine)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from livebode.core import Lines, Responses
 
+ARRAYS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
 UNITS = ("", "rad/s/A", "µm/(N m)", 'a,b "c"')
 
 
@@ -52,3 +53,8 @@ def cut(responses: Responses, *at: int) -> list[Responses]:
     """The same in parts."""
     edges = [0, *sorted(at), len(responses)]
     return [responses[a:b] for a, b in pairwise(edges)]
+
+
+def assert_same(one: Responses, other: Responses) -> None:
+    for name in ARRAYS:
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bench.firmware import ROOT, Core, missing, run
 from livebode.kernel import SlidingDFT
+from tools.firmware import ROOT, Core, missing, run
 
 VARIANTS = ("modulated", "plain", "damped", "hann", "hamming", "blackman")
 

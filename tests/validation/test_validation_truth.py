@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from examples.closed_loop import RATE_HZ, Drive, Plant
 from livebode.core import Block, Lines, Loop, Response, SignalError
 from livebode.excitation import multisine
 from livebode.fitting import Fit, fit
 from livebode.fitting.transfer import Transfer
+from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop, TwoMassPlant
 from livebode.validation import validate
 from livebode.validation.chain import respond
 from livebode.validation.correlation import correlation, own_correlation
@@ -26,9 +26,9 @@ CHANNELS = ("w", "u", "y")
 
 
 @cache
-def fitted(sigma: float, seed: int | None = None, plant: Plant | None = None) -> Fit:
+def fitted(sigma: float, seed: int | None = None, plant: TwoMassPlant | None = None) -> Fit:
     """Two masses fitted to lines with this sigma; without a seed to exact ones."""
-    truth, ones = (plant or Plant()).response(LINES.frequency_hz), np.ones(len(LINES))
+    truth, ones = (plant or TwoMassPlant()).response(LINES.frequency_hz), np.ones(len(LINES))
     if seed is not None:
         rng = np.random.default_rng(seed)
         noise = rng.standard_normal((2, len(LINES))) / np.sqrt(2)
@@ -42,7 +42,7 @@ def loop(runs: int, amplitude: float = 1.0, colour: float = 0.0, seed: int = 0) 
     """Many runs of the closed loop, shape (runs, 3, SAMPLES): w, u, y with noise of 0.1 rad/s on y."""
     rng, total = np.random.default_rng(seed), SAMPLES + 1000
     noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.standard_normal((total, runs)), axis=0) * 0.1
-    u, y = Drive().under(amplitude * W, noise)
+    u, y = TwoMassLoop().under(amplitude * W, noise)
     return np.stack([np.broadcast_to(np.resize(amplitude * W, total), u.shape), u, y], axis=1)[..., 1000:]
 
 
@@ -105,23 +105,23 @@ def test_the_limits_make_room_for_a_fit_that_is_itself_uncertain() -> None:
 
 def test_a_wrong_model_fails_and_a_slightly_wrong_one_is_told_so() -> None:
     columns = loop(20)
-    wrong = [judged(fitted(1e-6, plant=Plant(keff=4.5e5)), c) for c in columns]
+    wrong = [judged(fitted(1e-6, plant=TwoMassPlant(keff=4.5e5)), c) for c in columns]
     assert all(v.verdict == "fails" for v in wrong)
     # Resonance 0.07 % off: seen, and of no account.
-    slight = [judged(fitted(1e-6, plant=Plant(keff=4.993e5)), c) for c in columns]
+    slight = [judged(fitted(1e-6, plant=TwoMassPlant(keff=4.993e5)), c) for c in columns]
     assert {v.verdict for v in slight} <= {"small error", "passes"}
     assert any(v.verdict == "small error" for v in slight)
 
 
 def test_hardly_any_noise_makes_no_failure_of_a_fit_of_99_percent() -> None:
     """Resonance 0.07 % off and a hundredth of the noise: r is near 1, and the model misses 1 % all the same."""
-    a, b = Plant().discrete()
+    a, b = TwoMassPlant().discrete()
     u, state, y = np.resize(W, 2000), np.zeros(4), np.empty(2000)
     for n in range(2000):
         y[n] = state[1]
         state = a @ state + b * u[n]
     y += 0.001 * np.random.default_rng(6).standard_normal(2000)
-    found = judged(fitted(1e-6, plant=Plant(keff=4.993e5)), np.stack([u, u, y]))
+    found = judged(fitted(1e-6, plant=TwoMassPlant(keff=4.993e5)), np.stack([u, u, y]))
     assert found.fit_percent > 98
     assert max(c.largest for c in found.correlations) > 0.3
     assert found.driven_by.missed == pytest.approx(1 - found.fit_percent / 100, rel=0.2)
@@ -131,7 +131,7 @@ def test_hardly_any_noise_makes_no_failure_of_a_fit_of_99_percent() -> None:
 @pytest.mark.parametrize("drift", [0.05, 0.5, 5.0])
 def test_a_drift_that_rules_the_residual_neither_hides_a_wrong_machine_nor_makes_one(drift: float) -> None:
     """A random walk on y. Keff 30 % wrong fails or cannot be judged, never less; the true model never fails."""
-    true, wrong = fitted(1e-6), fitted(1e-6, plant=Plant(keff=3.5e5))
+    true, wrong = fitted(1e-6), fitted(1e-6, plant=TwoMassPlant(keff=3.5e5))
     for seed, columns in enumerate(loop(20)):
         moved = columns.copy()
         moved[2] += drift * np.cumsum(np.random.default_rng(seed).standard_normal(SAMPLES))
@@ -157,7 +157,7 @@ def test_the_missed_share_is_the_error_of_the_response() -> None:
 def test_the_simulation_is_the_machine_whatever_its_start_and_load() -> None:
     """From an unknown state and under a constant torque that no channel shows, without noise: nothing is left."""
     model = fitted(1e-9)
-    a, b = Plant().discrete()
+    a, b = TwoMassPlant().discrete()
     rng = np.random.default_rng(3)
     u, state, y = rng.standard_normal(2000), np.array([0.3, -2.0, 0.01, 0.05]), np.empty(2000)
     for n in range(2000):
@@ -199,7 +199,7 @@ def test_a_long_record_of_torque_to_position_is_the_state_space_truth(hold: str,
 @pytest.mark.parametrize("delay", [-1.5, 0.0, 0.3, 2.0])
 def test_a_delay_of_the_model_is_simulated(delay: float) -> None:
     """Once it has settled, the simulation has the spectrum that the model's response says, whatever the delay."""
-    truth, ones = Plant().response(LINES.frequency_hz), np.ones(len(LINES))
+    truth, ones = TwoMassPlant().response(LINES.frequency_hz), np.ones(len(LINES))
     late = truth * np.exp(-2j * np.pi * LINES.frequency_hz * delay / RATE_HZ)
     measured = Response(LINES, late, 1e-6 * ones, np.inf, ones, ones > 0, 0, 799, 0.1)
     model = fit(measured, "two-mass", radius_m=0.019, free=["delay"])

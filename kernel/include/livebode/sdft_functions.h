@@ -31,7 +31,7 @@ lb_status LB_FN(rows)(const LB_TYPE *dft, size_t length, size_t hop, size_t *row
 
 /* `length` samples of every channel, samples[c·channel_stride + i·sample_stride], strides in elements.
  * out[channels][rows][bins][2] receives the spectra, re and im; `rows` must be the result of rows().
- * hop = 0 gives no output (out may be null). */
+ * hop = 0 gives no output (out may be null). The regions of samples and out do not overlap. */
 lb_status LB_FN(process)(LB_TYPE *dft, const LB_REAL *samples, ptrdiff_t channel_stride, ptrdiff_t sample_stride,
                          size_t length, size_t hop, lb_phase phase, LB_REAL *out, size_t rows);
 

@@ -2,14 +2,16 @@
 
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.configuration import BeltAxis
+from livebode.simulation.extremes import extremes
 from livebode.simulation.faults import Backlash, DampingGrowth, Fault, FrictionChange, LoadChange, SoftSpot, TensionLoss
 from livebode.simulation.fmu import FmuAxis
 from livebode.simulation.linear import BeltResponse, Sampled, StateSpace, linear
 from livebode.simulation.mechanics import Mechanics, Spans
-from livebode.simulation.motion import Motion, Standstill, Strokes
+from livebode.simulation.motion import Motion, Standstill, Strokes, StrokeSequence
 from livebode.simulation.settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.source import SimulatedAxis
 from livebode.simulation.truth import Truth
+from livebode.simulation.two_mass_loop import TwoMassLoop, TwoMassPlant
 
 __all__ = [
     "Backlash",
@@ -33,8 +35,12 @@ __all__ = [
     "Spans",
     "Standstill",
     "StateSpace",
+    "StrokeSequence",
     "Strokes",
     "TensionLoss",
     "Truth",
+    "TwoMassLoop",
+    "TwoMassPlant",
+    "extremes",
     "linear",
 ]

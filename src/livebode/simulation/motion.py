@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import ceil, inf, isnan, sqrt
 from typing import Any, Protocol
 
@@ -128,6 +130,71 @@ class Strokes:
                     value=value,
                     high=most,
                 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StrokeSequence:
+    """Strokes one after the other from turning point to turning point, each at its own speed.
+
+    The cycle begins again at the first turning point, where the cart is only if it is also the last one.
+
+    Parameters
+    ----------
+    turning_points_m
+        Where the strokes begin and end: one more than there are speeds.
+    speeds_m_per_s
+        Of each stroke; acceleration, jerk and dwell are those of `Strokes` by default.
+
+    Raises
+    ------
+    UsageError
+        If there is no stroke, the numbers of points and speeds do not match, or a stroke is not one of `Strokes`.
+
+    Examples
+    --------
+    >>> there_and_back = StrokeSequence(turning_points_m=(0.4, 1.2, 0.4), speeds_m_per_s=(0.5, 0.2))
+    >>> there_and_back.edges_s(1000)
+    array([0.   , 1.975, 6.275])
+    """
+
+    turning_points_m: tuple[float, ...]
+    speeds_m_per_s: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.speeds_m_per_s or len(self.turning_points_m) != len(self.speeds_m_per_s) + 1:
+            points, speeds = len(self.turning_points_m), len(self.speeds_m_per_s)
+            raise UsageError(
+                "wrong-shape",
+                f"{points} turning points do not belong to {speeds} speeds",
+                "give one point more than speeds, and at least one speed",
+                argument="turning_points_m",
+                value=points,
+            )
+        _ = self._strokes
+
+    @cached_property
+    def _strokes(self) -> tuple[Strokes, ...]:
+        legs = zip(pairwise(self.turning_points_m), self.speeds_m_per_s)
+        return tuple(Strokes(start_m=start, end_m=end, speed_m_per_s=speed) for (start, end), speed in legs)
+
+    def cycle(self, rate_hz: float) -> tuple[Floats, Floats]:
+        position, speed = (np.concatenate(rows) for rows in zip(*self._legs(rate_hz)))
+        return position, speed
+
+    def edges_s(self, rate_hz: float) -> Floats:
+        """When each stroke begins with its dwell, and when the last one ends."""
+        samples = [position.size for position, _ in self._legs(rate_hz)]
+        return np.concatenate([[0], np.cumsum(samples)]) / rate_hz
+
+    def check(self, limits: Limits) -> None:
+        for strokes in self._strokes:
+            strokes.check(limits)
+
+    def _legs(self, rate_hz: float) -> Iterator[tuple[Floats, Floats]]:
+        """The forward half of each pair of strokes."""
+        for strokes in self._strokes:
+            position, speed = strokes.cycle(rate_hz)
+            yield position[: position.size // 2], speed[: speed.size // 2]
 
 
 def within(name: str, position_m: float, limits: Limits) -> None:

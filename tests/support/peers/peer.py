@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 from livebode.core import Channel
-from livebode.sources.live import Batch
+from livebode.sources.live import Batch, LiveSource, SourceSettings, open_source
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
 RATE_HZ = 4000.0
@@ -135,3 +136,15 @@ def program(name: str) -> str:
             pytest.fail(message)
         pytest.skip(message)
     return path
+
+
+def opened(peer: Peer, **more: object) -> LiveSource:
+    return open_source(SourceSettings(**(peer.settings | {"timeout_s": PATIENCE_S} | more)))
+
+
+@contextmanager
+def fed(peer, script, **more):
+    """A source that is open until the script has ended, for a peer that still sends to a closed one fails."""
+    with Feeding(script) as feeding, opened(peer, **more) as source:
+        yield source
+        feeding.join()

@@ -15,7 +15,7 @@ from livebode.sources.live import Batch
 from livebode.sources.live.ring import FILETIME_1970
 from livebode.structured_text import ring_block, ring_type
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, free_port, until
-from tests.support.structured_text import Machine
+from tools.structured_text import Machine
 
 LENGTH = 2048
 NET_ID = "127.0.0.1.1.1"

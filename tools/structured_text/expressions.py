@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from blark import transform as tf
 
-from tests.support.structured_text import types
-from tests.support.structured_text.types import ANY_INT, BOOL, LREAL, SCALARS, Array, Kind, Named, RefusedError, Scalar
+from tools.structured_text import types
+from tools.structured_text.types import ANY_INT, BOOL, LREAL, SCALARS, Array, Kind, Named, RefusedError, Scalar
 
 COMPARED = {"<": "<", ">": ">", "<=": "<=", ">=": ">=", "=": "==", "<>": "!="}
 RUNTIME = {name: getattr(types, name) for name in ("at", "at2", "quotient", "remainder", "divided", "to_lreal")}

@@ -1,4 +1,4 @@
-"""A drive that runs the kernel in float32 and sends spectra: its firmware, in Python (docs/how-to/live.md)."""
+"""What the firmware of a drive does that runs the kernel and sends spectra (docs/how-to/live.md)."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode import Block, SlidingDFT
-from livebode.core import NOT_WHOLE, SpectraLayout
+from livebode.core import NOT_WHOLE, Block, SpectraLayout
 from livebode.estimation.centre import Centre
-from livebode.sources.live import SpectraBatch
+from livebode.kernel import SlidingDFT
+from livebode.sources.live.spectra_batch import SpectraBatch
 
 
 class KernelDrive:
-    """Turns samples, from number 0 on and without gaps, into spectra.
+    """Turns samples, from number 0 on and without gaps, into spectra: for a sender in Python, and to try a layout.
 
     Parameters
     ----------
     layout
-        What is sent.
+        Signals, bins, window and hop of the spectra.
     dtype
-        Of the kernel.
+        Number type of the kernel, `float32` or `float64`.
     """
 
     def __init__(self, layout: SpectraLayout, dtype: str = "float32") -> None:
@@ -30,9 +30,10 @@ class KernelDrive:
         self._centres = [Centre(layout.window) for _ in layout.values]
         self._next, self._last_bad = 0, -1
         self._before: NDArray[np.float64] | None = None
+        self._missing: NDArray[np.intp] = np.empty(0, dtype=np.intp)
 
     def spectra(self, blocks: Iterable[Block], epoch: int = 0) -> Iterator[SpectraBatch]:
-        """Spectra of these samples; with each Block those that it completes."""
+        """Spectra of these samples, a batch for each Block that completes some; `epoch` is the sender's start."""
         for block in blocks:
             if (batch := self._push(block, epoch)) is not None:
                 yield batch
@@ -67,10 +68,10 @@ class KernelDrive:
         if differenced.any():
             before = x[:, 0] if self._before is None else self._before
             steps = np.diff(x, axis=1, prepend=before[:, np.newaxis])
-            # The first sample has none before it, and belongs to no whole window.
+            # The first sample has no predecessor, so no window with it is whole.
             self._last_bad = max(self._last_bad, 0)
             self._before, x = x[:, -1], np.where(differenced[:, np.newaxis], steps, x)
         x = (x - np.array(layout.subtracted)[:, np.newaxis]).astype(self._dtype).astype(np.float64)
         self._missing = np.flatnonzero(~np.isfinite(x).all(axis=0))
         x[:, self._missing] = 0.0
-        return x
+        return np.asarray(x, dtype=np.float64)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from blark import transform as tf
 
-from tests.support.structured_text.expressions import Scope, Typed, assignable, handler
-from tests.support.structured_text.types import BOOL, Array, Named, RefusedError, Scalar
+from tools.structured_text.expressions import Scope, Typed, assignable, handler
+from tools.structured_text.types import BOOL, Array, Named, RefusedError, Scalar
 
 
 class Body:

@@ -12,9 +12,9 @@ from blark import transform as tf
 from blark.parse import parse_source_code
 
 from livebode.structured_text.names import KEYWORDS
-from tests.support.structured_text.expressions import RUNTIME, Scope, assignable
-from tests.support.structured_text.statements import Body
-from tests.support.structured_text.types import SCALARS, Array, Kind, Named, RefusedError, Scalar, image, zero
+from tools.structured_text.expressions import RUNTIME, Scope, assignable
+from tools.structured_text.statements import Body
+from tools.structured_text.types import SCALARS, Array, Kind, Named, RefusedError, Scalar, image, zero
 
 SECTIONS = {
     tf.InputDeclarations: "input",

@@ -1,6 +1,6 @@
 """Runs the subset of Structured Text that livebode generates, from blark's parse tree: what is parsed is what runs."""
 
-from tests.support.structured_text.machine import Instance, Machine, parse
-from tests.support.structured_text.types import RefusedError
+from tools.structured_text.machine import Instance, Machine, parse
+from tools.structured_text.types import RefusedError
 
 __all__ = ["Instance", "Machine", "RefusedError", "parse"]

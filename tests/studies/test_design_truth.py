@@ -1,0 +1,36 @@
+"""Short form of `python -m studies.design`: predicted peaks are those of the simulated axis within 10 %."""
+
+import numpy as np
+import pytest
+
+from livebode.design import belt_machine, peaks, worst
+from livebode.design.waveform import Waveform
+from livebode.simulation import extremes
+from studies.design import MOVING, STANDING
+
+
+@pytest.mark.parametrize("case", STANDING)
+def test_peaks_of_a_standing_axis(case):
+    axis, lines, samples = STANDING[case]
+    _within_ten_percent(axis, lines, samples, extremes(axis, samples))
+
+
+@pytest.mark.parametrize("case", MOVING)
+def test_peaks_on_top_of_a_motion(case):
+    """Simulated: the largest over twelve alignments of excitation and motion, and two cycles; the first is smaller."""
+    axis, lines, samples = MOVING[case]
+    cycle_s = len(axis.motion.cycle(4000)[0]) / 4000
+    _within_ten_percent(axis, lines, samples, extremes(axis, samples, alignments=12, seconds=2 * cycle_s))
+
+
+def _within_ten_percent(axis, lines, samples, simulated):
+    predicted = worst(peaks(Waveform(lines, samples), belt_machine(axis)))
+    at_m = axis.motion.cycle(4000)[0]
+    for name, (low, high) in simulated.items():
+        # Of the travel what comes beyond each end of the way; of the rest each extreme.
+        ends = (at_m.min(), at_m.max()) if name == "travel" else (0.0, 0.0)
+        beyond = np.array([ends[0] - low, high - ends[1]])
+        told = np.array([ends[0] - predicted[name].low, predicted[name].high - ends[1]])
+        if at_m.size == 1:  # the smaller end of a standing axis is as the noise has it
+            told, beyond = np.max(told), np.max(beyond)
+        assert np.all(np.abs(told - beyond) <= 0.1 * np.max(beyond)), (name, told, beyond)

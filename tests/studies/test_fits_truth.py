@@ -1,0 +1,27 @@
+"""Short form of `python -m studies fits`: at standstill and along a stroke."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from studies.fits import AFTER_S, TRUTH, least_variance, moving, standing
+
+
+def test_at_standstill_through_simulation_and_tracker() -> None:
+    found = standing(120)
+    assert found.ok.all()
+    ratio = np.mean(np.log(found.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance()
+    cover = np.mean(np.abs(found.value - TRUTH)[:, :4] <= found.bound()[:, :4], axis=0)
+    print(f"over the Cramér–Rao bound {ratio.round(2)}, coverage {cover.round(3)}")
+    assert ratio.max() <= 1.2 + 3 * np.sqrt(2 / 120)
+    assert cover.min() >= 0.95 - 3 * np.sqrt(0.05 * 0.95 / 120)
+
+
+def test_along_a_stroke_with_the_motion_taken_off() -> None:
+    found, axis = moving(1)
+    assert AFTER_S < 0.2
+    assert found.ok.all()
+    keff = found["Keff"] / axis.mechanics.stiffness_at(found.schedule) - 1
+    js = found["Js"] / axis.mechanics.inertia_kg_m2 - 1
+    assert np.sqrt(np.mean(keff**2)) <= 0.0065
+    assert np.sqrt(np.mean(js**2)) <= 0.004
