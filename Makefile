@@ -9,7 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 NATIVE  = $(shell find kernel simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt)
 C_SOURCES = $(shell find kernel simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages lock clean
+.PHONY: help demo test lint bench peers studies repeating fit-bounds monitoring healthy temperature fuzz crash damage soak attacks system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -105,6 +105,9 @@ attacks: $(BUILT)  ## attack the dashboard, 45 s for each kind, and print what t
 system-packages: ## Debian packages that some tests use (as root)
 	apt-get update -qq
 	apt-get install -y -qq --no-install-recommends chromium clang gcc-arm-none-eabi mosquitto qemu-system-arm
+
+catalogues: $(BUILT)  ## after a change of a sentence of report or dashboard: update the catalogues, list what lacks a translation
+	$(BIN)/python -m tools.catalogues
 
 lock:            ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/python -m pip install --quiet uv

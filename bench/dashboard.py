@@ -19,8 +19,11 @@ from pathlib import Path
 import numpy as np
 
 from bench.browser import chromium
+from livebode.analysis.overview import Overview
 from livebode.core import Block, Lines, Parameters, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.runtime import RunControl
+from livebode.runtime.documents import Fitted, RunStarted, Tracked
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
 FRAMES_MIN, CPU_MAX = 50.0, 0.10
@@ -65,10 +68,9 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
         )  # fmt: skip
         block = Block(np.zeros((1, 10)), ("y",), RATE_HZ, start=n * 10)
         before = time.perf_counter()
-        hub.write(one)
-        hub.write_parameters(fit)
-        hub.drain_events()
-        hub.followed(block)
+        hub(one)
+        hub(Fitted((fit,)))
+        hub(Tracked(block, 0, None))
         costs.append(time.perf_counter() - before)
         n += 1
         stop.wait(max(0.0, began + n / UPDATES_PER_S - time.perf_counter()))
@@ -84,7 +86,7 @@ def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
     }  # fmt: skip
     loop = {"velocity": {"gain": 0.2, "integral_time_s": 0.2, "rate_hz": RATE_HZ}}
     with tempfile.TemporaryDirectory() as folder, dashboard, chromium() as browser:
-        hub.begin(Path(folder), {"found": found, "configuration": {"loop": loop}}, None)
+        hub(RunStarted(Path(folder), {"found": found, "configuration": {"loop": loop}}, RunControl(), Overview()))
         worker = threading.Thread(target=publish, args=(hub, responses(lines, 64, 0), stop, costs))
         worker.start()
         pages = [browser.new_page(viewport={"width": 1440, "height": 900}) for _ in range(browsers)]

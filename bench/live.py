@@ -2,7 +2,7 @@
 
 Senders in another process send over UDP as drives would: 4 kHz, batches of 25 ms, numbered; the session in this process
 tracks 21 lines in a window of 400 at 20 responses per second and records them, as `livebode run` does. Latency is from
-the arrival of a datagram (`LiveBlock.arrived_s`) until all its results were published (`Audience.followed`), for Blocks
+the arrival of a datagram (`LiveBlock.arrived_s`) until all its results were published (`Tracked`), for Blocks
 that give a response. The first second is excluded, because a UDP source first collects eight batches to put them in
 order.
 """
@@ -26,7 +26,8 @@ from bench.job import LINES, RATE_HZ, WINDOW, signals
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
-from livebode.runtime import Audience, Destination, Relay, Session
+from livebode.runtime import Destination, Document, Session, Subscriber
+from livebode.runtime.documents import Tracked
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
@@ -37,20 +38,20 @@ TARGET_S = 0.020
 CORES = 2
 
 
-class Clock(Relay):
-    """Measures the time of each Block that gives a response, including the audience's work."""
+class Clock:
+    """Measures the time of each Block that gives a response, including the subscribers' work."""
 
-    def __init__(self, audience: Audience) -> None:
-        super().__init__(audience)
+    def __init__(self) -> None:
         self.latency_s: list[float] = []
         self._new = 0
 
-    def write(self, responses: Responses) -> None:
-        super().write(responses)
-        self._new += len(responses)
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Responses):
+            self._new += len(document)
+        elif isinstance(document, Tracked):
+            self._measure(document.block)
 
-    def followed(self, block: Block) -> None:
-        super().followed(block)
+    def _measure(self, block: Block) -> None:
         if self._new and isinstance(block, LiveBlock) and block.start >= RATE_HZ:
             self.latency_s.append(time.monotonic() - block.arrived_s)
         self._new = 0
@@ -134,14 +135,17 @@ def measure(scenario: Scenario, seconds: float) -> dict[str, float]:
     """Latency, losses and processor time of a scenario."""
     names = [f"x{i}" for i in range(scenario.axes)]
     if not scenario.dashboard:
-        return _measured(scenario, seconds, {name: Clock(Audience()) for name in names}, None)
+        return _measured(scenario, seconds, dict.fromkeys(names, ()), None)
     dashboard = Dashboard(Serving("127.0.0.1", 0))
-    clocks = {name: Clock(dashboard.hub(name)) for name in names}
+    hubs = {name: (dashboard.hub(name),) for name in names}
     with dashboard:
-        return _measured(scenario, seconds, clocks, dashboard.url)
+        return _measured(scenario, seconds, hubs, dashboard.url)
 
 
-def _measured(scenario: Scenario, seconds: float, clocks: dict[str, Clock], url: str | None) -> dict[str, float]:
+def _measured(
+    scenario: Scenario, seconds: float, hubs: dict[str, tuple[Subscriber, ...]], url: str | None
+) -> dict[str, float]:
+    clocks = {name: Clock() for name in hubs}  # after the dashboard, so that its work is in the latency
     context = multiprocessing.get_context("spawn")
     ports, end = _free_ports(scenario.axes), context.Event()
     said, say = context.Pipe(duplex=False)
@@ -151,7 +155,7 @@ def _measured(scenario: Scenario, seconds: float, clocks: dict[str, Clock], url:
     with tempfile.TemporaryDirectory() as folder:
         session = Session(
             {name: axis(port, scenario) for name, port in zip(clocks, ports)},
-            lambda name, _: Destination(Path(folder) / name, lambda *_: None, audience=clocks[name]),
+            lambda name, _: Destination(Path(folder) / name, lambda *_: None, subscribers=(*hubs[name], clocks[name])),
             tell=lambda name, event: print(f"  {name}: {event.message}"),
             leave=lambda *_: None,
         )

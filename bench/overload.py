@@ -20,27 +20,28 @@ import numpy as np
 
 from bench.job import LINES, RATE_HZ, WINDOW
 from livebode.configuration import Axis
-from livebode.core import Block, Channel
+from livebode.core import Channel
 from livebode.excitation import multisine
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
-from livebode.runtime import Audience, Destination, Orders, run_live
+from livebode.runtime import Destination, Document, RunControl, run
+from livebode.runtime.documents import Tracked
 from livebode.sources.live import Batch, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "A"), Channel("y", "rad/s"))
 BATCH, PERIODS = 100, 100
 
 
-class Backlog(Audience):
+class Backlog:
     """The longest backlog of a run."""
 
-    def __init__(self, orders: Orders) -> None:
+    def __init__(self, control: RunControl) -> None:
         self.longest_s = 0.0
-        self._orders = orders
+        self._control = control
 
-    def followed(self, _: Block) -> None:
-        if self._orders.source is not None:
-            self.longest_s = max(self.longest_s, self._orders.source.waiting_s)
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Tracked) and self._control.source is not None:
+            self.longest_s = max(self.longest_s, self._control.source.waiting_s)
 
 
 def send(port: int, seconds: float) -> None:
@@ -77,17 +78,18 @@ def measured(seconds: float, folder: Path) -> dict[str, float]:
         },
         "overload",
     )
-    orders = Orders()
-    backlog = Backlog(orders)
-    run = threading.Thread(target=run_live, args=(axis, Destination(folder, lambda *_: None, audience=backlog), orders))
+    control = RunControl()
+    backlog = Backlog(control)
+    to = Destination(folder, lambda *_: None, subscribers=(backlog,))
+    running = threading.Thread(target=run, args=(axis, to, control))
     sender = multiprocessing.get_context("spawn").Process(target=send, args=(port, seconds))
-    run.start()
+    running.start()
     sender.start()
     sender.join()
-    assert orders.source is not None
-    asked, waited_s = time.monotonic(), orders.source.waiting_s
-    orders.end()
-    run.join()
+    assert control.source is not None
+    asked, waited_s = time.monotonic(), control.source.waiting_s
+    control.end()
+    running.join()
     stop_s, found = time.monotonic() - asked, Run.open(folder)
     events = found.events()
     return {

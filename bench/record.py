@@ -17,8 +17,8 @@ from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel
 from livebode.estimation import Settings, Tracker
 from livebode.preparation.checks import ChannelCheck
-from livebode.runtime.segmented import SegmentedRun
-from livebode.runtime.tally import Tally
+from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.segmented import SegmentedRecord
 
 AXES, SECONDS, HOP = 16, 600, 200
 NAMES = ("w", "u", "y")
@@ -50,26 +50,29 @@ def measure() -> dict[str, float]:
 
 def record(data: np.ndarray, samples: bool) -> tuple[float, float, float, int]:
     """Processor seconds of the record and of the tracker, the record's longest pause, and the bytes written."""
-    tracker, tally = tracker_at(HOP), Tally(ChannelCheck(NAMES, "w"), time.perf_counter())
+    tracker, counts = tracker_at(HOP), RunCounts(ChannelCheck(NAMES, "w"), time.perf_counter())
     recording_s = tracking_s = pause_s = 0.0
     with tempfile.TemporaryDirectory() as folder:
-        run = SegmentedRun(
+        run = SegmentedRecord(
             Path(folder) / "run", RecordSection(samples=samples), summary={"configuration": {}, "found": {}},
-            channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ, parts={"tracker": tracker, "tally": tally},
-            force=False, again=True, ends=True, tell=print,
+            channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ, parts={"tracker": tracker, "counts": counts},
+            force=False, again=True, ends=True, publish=print,
         )  # fmt: skip
         size = RATE_HZ // 4
         blocks = (Block(data[:, i : i + size], NAMES, RATE_HZ, start=i) for i in range(0, data.shape[1], size))
         with run as out:
             began, began_cpu = time.perf_counter(), time.process_time()
-            for block in out.feed(blocks):
+            for block in blocks:
+                out.write_samples(block)
                 recording_s += time.process_time() - began_cpu
                 pause_s = max(pause_s, time.perf_counter() - began)
                 began_cpu = time.process_time()
                 responses = tracker.process(block)
                 tracking_s += time.process_time() - began_cpu
                 began, began_cpu = time.perf_counter(), time.process_time()
-                out.write(responses)
+                out.take(responses)
+                out.commit(block)
+            out.commit_last()
             out.finish({}, lambda _: None)
         left = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
     return recording_s, tracking_s, pause_s, left

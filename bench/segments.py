@@ -23,8 +23,8 @@ from livebode.core import Block, Channel
 from livebode.preparation.checks import ChannelCheck
 from livebode.records import Run
 from livebode.records.query import query
-from livebode.runtime.segmented import SegmentedRun
-from livebode.runtime.tally import Tally
+from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.segmented import SegmentedRecord
 
 SEGMENTS, RATE_HZ, HOP = 5000, 4000.0, 400
 FOUND = {
@@ -34,13 +34,13 @@ FOUND = {
 SQL = "SELECT count(*), avg(re) FROM responses"
 
 
-def opened(path: Path) -> SegmentedRun:
+def opened(path: Path) -> SegmentedRecord:
     tracker = tracker_at(HOP)
-    return SegmentedRun(
+    return SegmentedRecord(
         path, RecordSection(segment_s=1.0), summary={"configuration": {}, "found": FOUND},
         channels=[Channel(name) for name in NAMES], rate_hz=RATE_HZ,
-        parts={"tracker": tracker, "tally": Tally(ChannelCheck(NAMES, "w"), time.perf_counter())},
-        force=False, again=False, ends=False, tell=lambda _: None,
+        parts={"tracker": tracker, "counts": RunCounts(ChannelCheck(NAMES, "w"), time.perf_counter())},
+        force=False, again=False, ends=False, publish=lambda _: None,
     )  # fmt: skip
 
 
@@ -50,8 +50,9 @@ def recorded(path: Path, segments: int) -> None:
     tracker = tracker_at(HOP)
     with opened(path) as run:
         blocks = (Block(data, NAMES, RATE_HZ, start=i * data.shape[1]) for i in range(segments))
-        for block in run.feed(blocks):
-            run.write(tracker.process(block))
+        for block in blocks:
+            run.take(tracker.process(block))
+            run.commit(block)
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -62,7 +63,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 def continued(path: Path) -> None:
     with opened(path) as run:
-        for part in run.before():
+        for part in run.previous():
             len(part)
 
 

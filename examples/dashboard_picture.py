@@ -16,6 +16,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from livebode.dashboard import Dashboard, Serving
+from livebode.runtime import Destination
 from livebode.runtime.demo import demo, demo_baseline
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -29,13 +30,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, dashboard, sync_playwright() as playwright:
         running = threading.Thread(
             target=demo,
-            args=(Path(folder) / "demo",),
-            kwargs={
-                "seconds": SECONDS, "seed": 1, "real_time": False, "baseline": demo_baseline(2),
-                "progress": lambda *_: None, "audience": hub,
-                "draw": lambda *_: None,
-            },
-        )  # fmt: skip
+            args=(Destination(Path(folder) / "demo", lambda *_: None, subscribers=(hub,)),),
+            kwargs={"seconds": SECONDS, "seed": 1, "real_time": False, "baseline": demo_baseline(2)},
+        )
         running.start()
         running.join()
         browser = playwright.chromium.launch(

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from livebode import PID, Block, Cascade, Lines, Loop, Settings, Tracker, multisine
 from livebode.simulation.two_mass_loop import KPC, KVC, RATE_HZ, TI, TwoMassLoop, TwoMassPlant

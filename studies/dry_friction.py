@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode import Block, Responses, Settings, Tracker, multisine
+from livebode import Block, Event, Responses, Settings, Tracker, multisine
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from studies.common import RATE_HZ, SIGMA, WINDOW, Local, decibels, lines
@@ -48,5 +48,6 @@ def _corrected(amplitude: float, motion: Strokes, friction: Friction, strokes: i
     )
     block, _ = SimulatedAxis(axis).run()
     correction = MotionCorrection(SETTINGS, radius_m=axis.mechanics.radius_m, chunk_samples=stroke)
-    ours = Responses.join([correction.process(block), correction.finish()])
-    return block, ours, sum(event.kind == "held" for event in correction.drain_events())
+    events: list[Event] = []
+    ours = Responses.join([correction.process(block, events.append), correction.finish(events.append)])
+    return block, ours, sum(event.kind == "held" for event in events)

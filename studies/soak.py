@@ -33,10 +33,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from livebode.configuration import Axis
-from livebode.core import Block, Channel, Lines
+from livebode.core import Channel, Lines
 from livebode.dashboard import Dashboard, Serving
 from livebode.excitation import multisine
-from livebode.runtime import Audience, Destination, Relay, Session, segmented
+from livebode.runtime import Destination, Document, Session, segmented
+from livebode.runtime.documents import Tracked
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from studies.drawing import LIGHT, figure_of
@@ -79,16 +80,15 @@ class Curve:
         return float(np.polyfit(hours[behind], resident[behind], 1)[0])
 
 
-class Followed(Relay):
-    """Says how many samples of an axis were tracked, to the sender in another process."""
+class Progress:
+    """Reports how many samples of an axis were tracked, to the sender in another process."""
 
-    def __init__(self, audience: Audience, done: Synchronized[int]) -> None:
-        super().__init__(audience)
+    def __init__(self, done: Synchronized[int]) -> None:
         self._done = done
 
-    def followed(self, block: Block) -> None:
-        super().followed(block)
-        self._done.value = block.stop
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Tracked):
+            self._done.value = document.block.stop
 
 
 def axis(port: int, *, fitted: bool) -> Axis:
@@ -161,12 +161,12 @@ def measured(hours: float, *, as_live: bool = False) -> Curve:
     ports = [listener.getsockname()[1] for listener in listeners]
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     names = [f"x{i}" for i in range(AXES)]
-    audiences = {name: Followed(dashboard.hub(name), one) for name, one in zip(names, done)}
+    subscribers = {name: (dashboard.hub(name), Progress(one)) for name, one in zip(names, done)}
     with tempfile.TemporaryDirectory() as folder, dashboard:
         beside = context.Process(target=machines, args=(listeners, done, batch, dashboard.url, end))
         session = Session(
             {name: axis(port, fitted=name == names[0]) for name, port in zip(names, ports)},
-            lambda name, _: Destination(Path(folder) / name, lambda *_: None, audience=audiences[name]),
+            lambda name, _: Destination(Path(folder) / name, lambda *_: None, subscribers=subscribers[name]),
             tell=lambda *_: None,
             leave=lambda *_: None,
         )

@@ -26,7 +26,7 @@ def tracked(seed: int, samples: int = 1500) -> Responses:
     return Tracker(_SETTINGS).process(block)
 
 
-def test_two_runs_of_the_same_machine_are_told_apart_no_more_often_than_said() -> None:
+def test_two_runs_of_one_machine_differ_no_more_often_than_the_stated_rate() -> None:
     """400 pairs of tracked recordings: 5 % of them and three deviations of their count are the most."""
     pairs = 400
     means = [mean_response(tracked(seed))[0] for seed in range(2 * pairs)]
@@ -74,7 +74,7 @@ def test_runs_in_motion_are_compared_at_the_same_places(tmp_path: Path) -> None:
     assert all(p.difference.differs.any() for p in high)
 
 
-def test_another_way_or_speed_is_said(tmp_path: Path) -> None:
+def test_runs_of_another_direction_or_speed_are_reported(tmp_path: Path) -> None:
     usual = Run.open(moving(tmp_path / "a", 1))
     shorter = compare(usual, Run.open(moving(tmp_path / "b", 2, high=0.9)))
     assert any("only the common part is compared" in w for w in shorter.warnings)
@@ -88,7 +88,7 @@ def test_another_way_or_speed_is_said(tmp_path: Path) -> None:
     assert any("Only one of the runs has a changing schedule" in w for w in standing.warnings)
 
 
-def test_parameters_and_their_change(tmp_path: Path) -> None:
+def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path: Path) -> None:
     """The belt axis as `run` writes it: 5 % less stiffness halfway is 5 % of Keff between the halves."""
     from livebode.fitting.chains import TwoMass
     from livebode.fitting.physical import Grid
@@ -114,7 +114,7 @@ def test_parameters_and_their_change(tmp_path: Path) -> None:
     assert "changed" in told.out
 
 
-def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
+def test_runs_of_another_unit_or_quantity_or_without_common_lines_are_refused(tmp_path: Path) -> None:
     usual = write_run(tmp_path / "a", measured(50, 1))
     other_unit = write_run(tmp_path / "b", replace(measured(50, 2), unit="rad/s/A"))
     quantity = write_run(tmp_path / "c", replace(measured(50, 2), quantity="sensitivity"))

@@ -26,7 +26,7 @@ def batch(first: int, rows: int) -> Responses:
 
 @settings(max_examples=50, deadline=None)
 @given(sizes=st.lists(st.integers(0, 9000), min_size=1, max_size=12))
-def test_it_keeps_every_nth_row(sizes: list[int]) -> None:
+def test_an_overview_retains_every_nth_row(sizes: list[int]) -> None:
     overview, first = Overview(), 0
     for size in sizes:
         overview.add(batch(first, size))
@@ -40,7 +40,7 @@ def test_it_keeps_every_nth_row(sizes: list[int]) -> None:
 
 
 @pytest.mark.parametrize("rows", [0, 1, 5])
-def test_its_memory_stays_flat_however_many_batches_come(rows: int) -> None:
+def test_memory_of_an_overview_does_not_grow_with_the_batches(rows: int) -> None:
     overview, first = Overview(), 0
     tracemalloc.start()
     held = []

@@ -14,7 +14,7 @@ from livebode.core import Event, UsageError
 from livebode.estimation import Tracker
 from livebode.monitoring import Baseline, Monitor
 from livebode.records import Run
-from livebode.runtime.audience import Audience
+from livebode.runtime import Destination, Document
 from livebode.runtime.demo import LOSS, check_seconds, demo, demo_axis, demo_baseline, demo_settings
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode
@@ -27,16 +27,6 @@ _WINDOW_S = 0.2
 @cache
 def baseline() -> Baseline:
     return demo_baseline(2)
-
-
-class Heard(Audience):
-    """What a page is sent."""
-
-    def __init__(self) -> None:
-        self.events: list[Event] = []
-
-    def write_event(self, event: Event) -> None:
-        self.events.append(event)
 
 
 def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(
@@ -58,12 +48,10 @@ def test_the_alarm_is_the_same_sentence_in_terminal_page_record_and_report(
     assert livebode("report", tmp_path / "run", "--out", tmp_path / "report").code == 0
     page = Page((tmp_path / "report.html").read_text("utf-8"))
     assert re.search(f"ALARM {re.escape(change['message'])}", page.text)
-    heard = Heard()
-    demo(
-        tmp_path / "again", seconds=22, seed=1, real_time=False, baseline=baseline(), progress=lambda *_: None,
-        audience=heard, draw=lambda *_: None,
-    )  # fmt: skip
-    assert change["message"] in [event.message for event in heard.events]
+    published: list[Document] = []
+    to = Destination(tmp_path / "again", lambda *_: None, subscribers=(published.append,))
+    demo(to, seconds=22, seed=1, real_time=False, baseline=baseline())
+    assert change["message"] in [document.message for document in published if isinstance(document, Event)]
     first, again = (Run.open(tmp_path / name).responses() for name in ("run", "again"))
     assert np.array_equal(first.value, again.value, equal_nan=True)
 

@@ -211,7 +211,7 @@ def test_the_seed_in_a_file_makes_the_same_file_again(tmp_path):
     assert b"2" not in (outs[0] / "excitation.mat").read_bytes()[:116], "a time of day"
 
 
-def test_the_table_says_what_was_chosen_and_why(tmp_path):
+def test_the_table_gives_each_choice_with_its_reason(tmp_path):
     shown = livebode("design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv")
     assert shown.code == 0, shown.err
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):

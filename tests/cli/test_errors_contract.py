@@ -93,7 +93,7 @@ def test_facts_that_json_cannot_write_are_texts_or_numbers() -> None:
     assert json.loads(json.dumps(error["facts"])) == {"path": "a", "count": 3, "sizes": [0.5, [0, 1]]}
 
 
-def test_what_export_writes_is_an_object_too(tmp_path: Path) -> None:
+def test_export_with_json_prints_one_object(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", measured(5, 1))
     exported = livebode("export", run, "--to", "csv", "--out", tmp_path / "a.csv", "--json")
     assert json.loads(exported.out) == {"file": str(tmp_path / "a.csv"), "rows": 5, "left_out": 0}

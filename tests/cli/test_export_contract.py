@@ -59,7 +59,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
     assert set(FORMATS) == {"csv", "mat", "netcdf", "uff"}
 
 
-def test_one_response_and_the_mean(run: Path, tmp_path: Path) -> None:
+def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path) -> None:
     batches = Run.open(run).batches
     for options, expected in (
         (("--at", "1.0"), at(batches(), 1.0)),
@@ -77,7 +77,7 @@ def test_one_response_and_the_mean(run: Path, tmp_path: Path) -> None:
     assert abs(at(batches(), 1.0).time_s - 1.0) <= 0.005
 
 
-def test_parameters(run: Path, tmp_path: Path) -> None:
+def test_parameters_of_a_run_are_exported_and_a_run_without_fits_is_refused(run: Path, tmp_path: Path) -> None:
     assert "no model was fitted" in livebode("export", run, "--to", "csv", "--parameters").err
     fitted = tmp_path / "fitted"
     fitted.mkdir()

@@ -92,7 +92,7 @@ def test_a_run_is_fitted_afterwards(machine: Path) -> None:
     assert "the mean of" in mean.out
 
 
-def test_a_model_that_finds_nothing_says_why(machine: Path) -> None:
+def test_a_fit_without_a_result_reports_its_reason(machine: Path) -> None:
     out, _ = run(machine, "nothing", "")
     result = livebode("fit", out, "--model", "rigid")
     assert result.code == 3
@@ -110,7 +110,7 @@ def test_a_model_that_finds_nothing_says_why(machine: Path) -> None:
         (("--model", "two-mass", "--band", "200:300"), "0 lines, too few"),
     ],
 )
-def test_what_cannot_be_is_the_users(machine: Path, options: tuple, says: str) -> None:
+def test_impossible_options_of_fit_are_usage_errors(machine: Path, options: tuple, says: str) -> None:
     out = machine / "plain"
     if not out.exists():
         run(machine, "plain", "")

@@ -73,7 +73,9 @@ def log(tmp_path: Path) -> Path:
     ],
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
 )
-def test_options_that_do_not_fit(log: Path, tmp_path: Path, arguments: tuple, says: tuple) -> None:
+def test_contradictory_options_are_refused_in_one_sentence(
+    log: Path, tmp_path: Path, arguments: tuple, says: tuple
+) -> None:
     sentence = refused(tmp_path, log, *arguments)
     for part in says:
         assert part in sentence
@@ -97,7 +99,7 @@ def spoiled(channel: str, change: object) -> dict[str, np.ndarray]:
     ],
     ids=["constant", "empty", "backwards", "a step back", "jitter", "noise as excitation"],
 )
-def test_recordings_that_cannot_be_used(tmp_path: Path, columns: dict, says: tuple) -> None:
+def test_unusable_recordings_are_refused_in_one_sentence(tmp_path: Path, columns: dict, says: tuple) -> None:
     sentence = refused(tmp_path, write_parquet(tmp_path / "log.parquet", columns), *JOINT, *GRID)
     for part in says:
         assert part in sentence
@@ -108,7 +110,7 @@ def test_lines_are_not_found_in_noise(tmp_path: Path) -> None:
     assert "repeat" in refused(tmp_path, write_parquet(tmp_path / "log.parquet", columns), *JOINT)
 
 
-def test_files_that_are_not_what_they_seem(log: Path, tmp_path: Path) -> None:
+def test_missing_empty_and_damaged_recordings_are_refused(log: Path, tmp_path: Path) -> None:
     assert "no file" in refused(tmp_path, tmp_path / "nothing.csv", *JOINT, *GRID)
     assert "directory" in refused(tmp_path, tmp_path, *JOINT, *GRID)
     empty = tmp_path / "empty.csv"
@@ -148,7 +150,7 @@ def test_files_that_are_not_what_they_seem(log: Path, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.usefixtures("log")
-def test_configurations_that_cannot_be_used(tmp_path: Path, text: str, says: tuple) -> None:
+def test_unusable_configurations_are_refused(tmp_path: Path, text: str, says: tuple) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text(text)
     sentence = refused(tmp_path, axis, *JOINT[:4], *GRID) if "inptu" not in text else refused(tmp_path, axis)
@@ -156,7 +158,7 @@ def test_configurations_that_cannot_be_used(tmp_path: Path, text: str, says: tup
         assert part in sentence
 
 
-def test_an_existing_directory_is_kept(log: Path, tmp_path: Path) -> None:
+def test_an_existing_directory_is_not_overwritten(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     assert livebode("run", log, *JOINT, *GRID, "--out", out).code == 0
     before = {p.name: p.read_bytes() for p in out.iterdir()}
@@ -179,14 +181,14 @@ def test_force_does_not_remove_what_no_run_left(log: Path, tmp_path: Path) -> No
     assert "not the directory of a run" in refused(tmp_path, log, *JOINT, *GRID, "--out", file, "--force")
 
 
-def test_an_output_that_cannot_be_written(log: Path, tmp_path: Path) -> None:
+def test_an_output_that_cannot_be_written_is_reported(log: Path, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
     assert "could not be written" in refused(tmp_path, log, *JOINT, *GRID, "--out", file / "run")
 
 
 @pytest.mark.parametrize("limit", [0, 10_000, 60_000])
-def test_a_disk_that_takes_no_more(log: Path, tmp_path: Path, limit: int) -> None:
+def test_a_full_disk_is_reported_and_leaves_no_partial_file(log: Path, tmp_path: Path, limit: int) -> None:
     # A limit on file size makes write() fail as a full disk does, only with another error number.
     before = sorted(tmp_path.rglob("*"))
     command = [str(Path(sys.executable).with_name("livebode")), "run", str(log), *JOINT, *GRID, "--hop", "1", "--out",
@@ -245,7 +247,9 @@ def test_a_run_that_is_ended_leaves_nothing(tmp_path: Path, number: signal.Signa
         ),
     ],
 )
-def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: str) -> None:
+def test_closed_pipes_and_unusual_terminals_end_without_a_traceback(
+    log: Path, tmp_path: Path, command: str, says: str
+) -> None:
     livebode_path = Path(sys.executable).with_name("livebode")
     line = command.format(livebode=livebode_path, log=log, out=tmp_path / "run")
     done = subprocess.run(["bash", "-o", "pipefail", "-c", line], capture_output=True, text=True, check=False)
@@ -254,7 +258,7 @@ def test_odd_terminals_and_pipes(log: Path, tmp_path: Path, command: str, says: 
     assert says in done.stderr
 
 
-def test_our_own_fault_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:
+def test_an_internal_error_ends_with_1(monkeypatch: pytest.MonkeyPatch, log: Path, tmp_path: Path) -> None:
     monkeypatch.setattr("livebode.runtime.recording.make_follower", lambda *_: 1 / 0)
     result = livebode("run", log, *JOINT, *GRID, "--out", tmp_path / "run")
     assert result.code == 1

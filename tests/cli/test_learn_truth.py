@@ -45,7 +45,7 @@ def events(directory: Path) -> list[dict[str, object]]:
     return [json.loads(line) for line in (directory / "events.jsonl").read_text("utf-8").splitlines()]
 
 
-def test_learn_and_tell(tmp_path: Path) -> None:
+def test_a_learned_baseline_reports_a_fault_in_a_later_run(tmp_path: Path) -> None:
     log, faulty = write(tmp_path / "healthy.parquet", healthy()), tmp_path / "faulty.parquet"
     write(faulty, recorded((0.3, 0.25), TensionLoss(start_s=6.0, loss=0.02), seed=61))
     without = run(log, tmp_path / "one", *MOVING)
@@ -86,7 +86,7 @@ def standing(path: Path, seed: int, *faults: TensionLoss) -> Path:
     return toml
 
 
-def test_fitted_parameters_are_learned_and_told(tmp_path: Path) -> None:
+def test_changes_of_fitted_parameters_are_learned_and_reported(tmp_path: Path) -> None:
     healthy_run, changed_run, base = tmp_path / "one", tmp_path / "two", tmp_path / "healthy.json"
     assert livebode("run", standing(tmp_path / "a.parquet", 1), "--out", healthy_run).code == 0
     learned = livebode("learn", healthy_run, "--out", base)

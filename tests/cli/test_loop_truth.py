@@ -126,7 +126,7 @@ def test_margins_leave_out_the_transient_that_the_run_names(run: Path, tmp_path:
     assert not np.any(found.value == every.value)
 
 
-def test_what_cannot_be_is_refused_with_a_sentence(run: Path, tmp_path: Path) -> None:
+def test_impossible_options_of_margins_and_validate_are_refused_in_one_sentence(run: Path, tmp_path: Path) -> None:
     fresh = run.parent / "fresh.parquet"
     for arguments, sentence in (
         (("validate", run, "--on", fresh, "--samples", 10**7), "clean ones in a row"),

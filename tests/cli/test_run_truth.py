@@ -75,7 +75,7 @@ def test_lines_and_window_are_found(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("log")
-def test_a_configuration_file_and_options_over_it(tmp_path: Path) -> None:
+def test_options_override_the_configuration_file(tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text(
         """
@@ -133,7 +133,7 @@ def test_gaps_and_samples_that_are_not_finite_are_counted_and_invalid(tmp_path: 
     assert {c["name"]: c["not_finite"] for c in inspected["channels"]} == {"t": 0, "w": 0, "u": 0, "y": 1}
 
 
-def test_inspect_says_what_the_excitation_is(log: Path) -> None:
+def test_inspect_describes_the_excitation(log: Path) -> None:
     found = json.loads(livebode("inspect", log, "--excitation", "w", "--output", "y", "--json").out)
     assert (found["samples"], found["rate_hz"], found["duration_s"]) == (2000, 1000, 2)
     excitation = found["excitation"]

@@ -200,7 +200,9 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
     ],
     ids=range(12),
 )  # fmt: skip
-def test_hostile_configurations_are_refused(tmp_path: Path, data: bytes, code: str, facts: dict) -> None:
+def test_hostile_configurations_are_refused_with_their_code(
+    tmp_path: Path, data: bytes, code: str, facts: dict
+) -> None:
     path = tmp_path / "axes.toml"
     path.write_bytes(data)
     with refused(ConfigError, code, **facts), printable():
@@ -215,7 +217,7 @@ def test_brackets_without_an_end_are_refused(tmp_path: Path) -> None:
     assert caught.value.code in ("config.not-toml", "config.nested-too-deeply")
 
 
-def test_the_seed_is_whole() -> None:
+def test_the_configuration_that_is_mutated_is_valid_itself() -> None:
     axes = axes_of(WHOLE.encode(), Path("axes.toml"), {"lines": {"window": 1600}})
     assert axes.keys() == {"x", "y"}
     assert axes["x"].source.url == "tcp://127.0.0.1:5001"

@@ -76,7 +76,9 @@ def test_ranges_are_inclusive_and_commas_join(text: str, bins: tuple[int, ...]) 
         ("25", GridError, "line-off", {"nearest_hz": [20.0, 30.0], "windows": [320, 480]}),
     ],
 )
-def test_what_cannot_be_a_line(text: str, kind: type[LivebodeError], code: str, facts: dict) -> None:
+def test_frequencies_that_are_not_a_line_are_refused(
+    text: str, kind: type[LivebodeError], code: str, facts: dict
+) -> None:
     with refused(kind, code, **facts):
         Lines.parse(text, rate_hz=4000, window=400)
 
@@ -91,12 +93,12 @@ def test_exchanged_parts_of_a_range_are_recognised(text: str, meant: str) -> Non
 
 
 @pytest.mark.parametrize("window", [0, -4, 2, 2.5, True, "400"])
-def test_windows_that_cannot_be(window: object) -> None:
+def test_windows_out_of_range_are_refused(window: object) -> None:
     with refused(GridError, "window-out-of-range", window=window):
         Lines.parse("20", rate_hz=4000, window=window)
 
 
 @pytest.mark.parametrize("rate_hz", [0, -1, float("nan"), float("inf")])
-def test_rates_that_cannot_be(rate_hz: float) -> None:
+def test_rates_out_of_range_are_refused(rate_hz: float) -> None:
     with refused(UsageError, "out-of-range", argument="rate_hz", value=rate_hz):
         Lines.parse("20", rate_hz=rate_hz, window=400)

@@ -55,7 +55,7 @@ def test_a_block_is_immutable_and_cuts_without_a_copy() -> None:
         ((np.zeros((1, 3)), ("u",), 0), "out-of-range", {"argument": "rate_hz", "value": 0}),
     ],
 )
-def test_blocks_that_cannot_be(arguments: tuple, code: str, facts: dict) -> None:
+def test_inconsistent_blocks_are_refused(arguments: tuple, code: str, facts: dict) -> None:
     with refused(UsageError, code, **facts):
         Block(*arguments)
 
@@ -149,7 +149,7 @@ def test_a_pid_is_its_transfer_function() -> None:
     ("rule", "numerator"),
     [("backward", [1, 0]), ("forward", [1]), ("trapezoidal", [0.5, 0.5])],
 )
-def test_integrator_rules(rule: str, numerator: list[float]) -> None:
+def test_each_integrator_rule_has_its_transfer_function(rule: str, numerator: list[float]) -> None:
     truth = 1 + control.tf(np.array(numerator) / RATE_HZ / 0.2, [1, -1], 1 / RATE_HZ)
     pi = PID(gain=1.0, integral_time_s=0.2, rate_hz=RATE_HZ, integrator=rule)
     assert np.allclose(pi.response(F_HZ), as_model(truth).response(F_HZ))
@@ -211,7 +211,7 @@ def test_the_plant_comes_back_from_the_closed_loop(g: complex, f: float, e: floa
         (lambda: Loop().feedback_at(F_HZ), "missing", {"argument": "feedback"}),
     ],
 )
-def test_loops_that_cannot_be(make: object, code: str, facts: dict) -> None:
+def test_inconsistent_loops_are_refused(make: object, code: str, facts: dict) -> None:
     with refused(UsageError, code, **facts):
         make()
 

@@ -27,7 +27,7 @@ SIGNALS = (Channel("y", "rad/s"), Channel("u", "N m"), Channel("w", "N m"))
         ({"subtracted": (1.0, float("nan"), 0.0)}, UsageError, "not-finite", {"argument": "subtracted"}),
     ],
 )
-def test_layouts_that_cannot_be_are_refused(options: dict, kind: type[LivebodeError], code: str, facts: dict) -> None:
+def test_inconsistent_layouts_are_refused(options: dict, kind: type[LivebodeError], code: str, facts: dict) -> None:
     given = {"signals": SIGNALS, "values": (), "window": 400, "hop": 20, "lines": (2, 4)} | options
     with refused(kind, code, **facts):
         SpectraLayout(**given)

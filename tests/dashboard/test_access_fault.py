@@ -87,13 +87,13 @@ def test_other_origins_are_refused(watched: Watched, wrong: str) -> None:
 @pytest.mark.parametrize(
     "host", ["evil.example", "localhost.evil.example", "127.0.0.1@evil.example", "a b", "[::1", ""]
 )
-def test_a_name_that_was_bound_anew_is_refused(watched: Watched, host: str) -> None:
+def test_a_request_for_an_unknown_host_name_is_refused(watched: Watched, host: str) -> None:
     mine = cookie(watched, TOKEN)
     assert ask(watched, "/api/past?axis=0&from=0&to=1", Host=host, Cookie=mine)[0] in (400, 421)
     assert ask(watched, "/", Host=host)[0] in (400, 421)
 
 
-def test_names_that_are_served() -> None:
+def test_only_requests_for_known_host_names_are_served() -> None:
     guard = Guard(lambda *_: None, names=("drive-7.plant",))  # type: ignore[arg-type, return-value]
     for host in ("drive-7.plant", "Drive-7.plant:8765", "localhost:1", "127.0.0.1:8765", "[::1]:8765", "10.1.2.3"):
         assert guard._known(host), host
@@ -111,7 +111,7 @@ def test_no_get_changes_anything(watched: Watched) -> None:
             assert ask(watched, path, method, {}, Origin=origin(watched), Cookie=mine)[0] == 405
 
 
-def test_every_answer_says_what_browsers_must_not_do(watched: Watched) -> None:
+def test_every_answer_has_the_security_headers(watched: Watched) -> None:
     for path in (
         "/",
         "/login",
@@ -142,7 +142,7 @@ def test_code_of_the_page_never_makes_html_of_data() -> None:
         )
 
 
-def test_wrong_tokens_are_refused_slower_and_slower_and_said_once() -> None:
+def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> None:
     now, told = [0.0], list[str]()
     access = Access(Serving("127.0.0.1", 0, token=TOKEN), told.append, clock=lambda: now[0])
     for _ in range(5):
@@ -168,7 +168,7 @@ def test_wrong_tokens_are_refused_slower_and_slower_and_said_once() -> None:
     assert len(access._told) <= 1024
 
 
-def test_sessions_end_and_are_few() -> None:
+def test_login_sessions_expire_and_their_number_is_limited() -> None:
     now = [0.0]
     access = Access(Serving("127.0.0.1", 0, token=TOKEN), lambda _: None, clock=lambda: now[0])
     first = access.login(TOKEN, "::1")
@@ -216,7 +216,9 @@ SERVE = {"token": TOKEN, "short": "short", "viewer": VIEWER, "spaces": "with spa
         ({"certificate_file": __file__, "key_file": __file__}, "file-unusable", "serve.certificate_file"),
     ],
 )
-def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], code: str, key: str) -> None:
+def test_impossible_settings_of_the_server_are_refused(
+    monkeypatch: pytest.MonkeyPatch, section: dict[str, str], code: str, key: str
+) -> None:
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(ConfigError) as caught:
@@ -234,9 +236,7 @@ def test_what_is_not_served(monkeypatch: pytest.MonkeyPatch, section: dict[str, 
         ({"token_env": "token", "token_file": "/no/such"}, "both"),
     ],
 )
-def test_a_token_that_is_not_there_is_not_served(
-    monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str
-) -> None:
+def test_a_missing_token_is_refused(monkeypatch: pytest.MonkeyPatch, section: dict[str, str], word: str) -> None:
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(LivebodeError, match=re.escape(word)) as caught:
@@ -271,7 +271,7 @@ def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_
     assert Serving.of(ServeSection(token_file=path)).token == path.read_text().strip()
 
 
-def test_a_port_that_is_taken_is_said() -> None:
+def test_a_port_in_use_is_reported() -> None:
     with Dashboard(Serving("127.0.0.1", 0)) as first:
         port = int(first.url.rsplit(":", 1)[1].strip("/"))
         with refused(ServerError, "port-taken", port=port), Dashboard(Serving("127.0.0.1", port)):
@@ -312,7 +312,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         assert TOKEN not in tab.page.url
         assert tab.page.evaluate("() => document.cookie") == ""
         assert not any(TOKEN in text for text in tab.wrong)
-        watched.hub.write_event(Event("change", 1, 0.1, "changed", {}))
+        watched.hub(Event("change", 1, 0.1, "changed", {}))
     watched.go(11_000)
     assert any("wrong token from" in line for line in watched.told)
     assert len([line for line in watched.told if "127.0.0.1" in line]) == 1
@@ -334,7 +334,7 @@ def test_the_section_of_a_file_is_not_recorded(tmp_path: Path) -> None:
         Axis.of({"source": {"log": "x"}, "signals": {"output": "y"}, "serve": {"tokenfile": "x"}}, "it")
 
 
-def test_read_only_is_for_everybody() -> None:
+def test_read_only_applies_to_operators_too() -> None:
     access = Access(Serving("127.0.0.1", 0, read_only=True), lambda _: None)
     assert access.role("", "", "::1") == "viewer"
     access = Access(Serving("127.0.0.1", 0, token=TOKEN, read_only=True), lambda _: None)

@@ -51,7 +51,7 @@ def started(folder: Path, *arguments: object) -> Iterator[tuple[subprocess.Popen
         assert "Traceback" not in log.read_text(), log.read_text()
 
 
-def test_the_demo_is_shown_while_it_goes_on_and_behind_it(tmp_path: Path) -> None:
+def test_the_demo_is_served_during_its_run_and_afterwards(tmp_path: Path) -> None:
     out = tmp_path / "demo"
     with started(tmp_path, "demo", "--serve", "--port", 0, "--seconds", 16, "--out", out) as (_, url):
         assert url.startswith("http://127.0.0.1:")
@@ -72,7 +72,7 @@ def test_the_demo_is_shown_while_it_goes_on_and_behind_it(tmp_path: Path) -> Non
         until(lambda: "stiffness is 1" in (tmp_path / "log.txt").read_text(), "the alarm on the terminal")
 
 
-def test_the_demo_is_shown_unasked_and_ends_by_itself(tmp_path: Path) -> None:
+def test_the_demo_is_served_by_default_and_ends_by_itself(tmp_path: Path) -> None:
     with started(tmp_path, "demo", "--seconds", 16, "--out", tmp_path / "demo") as (process, url):
         assert b"livebode" in urllib.request.urlopen(url).read()
         assert process.wait(60) == 0
@@ -117,7 +117,7 @@ def test_view_follows_a_run_that_another_process_records(tmp_path: Path) -> None
             assert tab.wrong == []
 
 
-def test_what_cannot_be_shown_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_view_of_a_directory_without_a_run_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = livebode("view", tmp_path)
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "not the directory of a run" in result.err

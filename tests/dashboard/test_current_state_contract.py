@@ -17,6 +17,7 @@ from playwright.sync_api import Browser
 from livebode.core import Block, Channel, Event, Lines, Parameters
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Tracker
+from livebode.runtime.documents import ClockSet, Fitted, Tracked
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.browser import Tab, chromium
@@ -45,7 +46,8 @@ def axes(browser: Browser, *names: str, **options: object) -> Iterator[tuple[lis
 def now(hub: Hub, *, at_s: float, ago_s: float = 0.0) -> None:
     """A machine has sent the samples up to this time of the run."""
     start = round(at_s * RATE_HZ) - 40
-    hub.followed(LiveBlock(np.zeros((1, 40)), ("y",), RATE_HZ, start=start, arrived_s=time.monotonic() - ago_s))
+    block = LiveBlock(np.zeros((1, 40)), ("y",), RATE_HZ, start=start, arrived_s=time.monotonic() - ago_s)
+    hub(Tracked(block, block.stop, None))
 
 
 def status(tab: Tab) -> tuple[str, str]:
@@ -56,7 +58,7 @@ def status(tab: Tab) -> tuple[str, str]:
 def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Browser) -> None:
     with axes(browser, "y", "z") as (hubs, tab):
         now(hubs[0], at_s=1.0)
-        hubs[0].write_event(Event("change", 1, 0.1, "the belt's stiffness is 9 % less", {"what": "stiffness"}))
+        hubs[0](Event("change", 1, 0.1, "the belt's stiffness is 9 % less", {"what": "stiffness"}))
         tab.page.locator("#events li.alarm").wait_for()
         tab.page.locator("#axis").select_option("1")
         tab.until("page.facts.name === 'z' && !page.facts.begun && page.facts.live")
@@ -71,7 +73,7 @@ def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Brow
         assert not tab.page.locator("#alarm-count").is_visible()
         for key in ("2", "ArrowRight", "f", " ", "d", "Escape", "p", "g", "m"):  # nothing to act on, and no error
             tab.page.keyboard.press(key)
-        hubs[1].write_event(Event("waiting", 0, time.time(), "no samples arrived within 30 s; switch the machine on"))
+        hubs[1](Event("waiting", 0, time.time(), "no samples arrived within 30 s; switch the machine on"))
         waiting = tab.page.locator("#events li.alarm", has_text="switch the machine on")
         assert re.fullmatch(r"\d\d:\d\d:\d\d \S+", waiting.locator("time").inner_text())
         begin(hubs[1], Path("/nowhere"), ONE)  # its machine is switched on
@@ -126,10 +128,10 @@ def test_the_verdict_is_alarm_until_the_change_is_over(browser: Browser) -> None
         word = tab.page.locator("#verdict")
         word.get_by_text("not assessed").or_(word).wait_for()
         assert word.inner_text() in ("not assessed", "check")
-        hub.write_event(Event("change", 1, 0.1, "stiffness is 9 % less", {"what": "stiffness"}))
+        hub(Event("change", 1, 0.1, "stiffness is 9 % less", {"what": "stiffness"}))
         tab.until("document.getElementById('verdict').textContent === 'ALARM'")
         assert "stiffness" in word.get_attribute("title")
-        hub.write_event(Event("change-cleared", 2, 0.2, "stiffness is as learned", {"what": "stiffness"}))
+        hub(Event("change-cleared", 2, 0.2, "stiffness is as learned", {"what": "stiffness"}))
         tab.until("document.getElementById('verdict').textContent === 'check'")  # nobody has acknowledged it
         assert tab.wrong == []
 
@@ -137,8 +139,8 @@ def test_the_verdict_is_alarm_until_the_change_is_over(browser: Browser) -> None
 def test_alarms_of_one_cause_are_one_row_and_acknowledged_at_once(browser: Browser) -> None:
     with axes(browser, "y") as ([hub], tab):
         for i in range(1065):
-            hub.write_event(Event("gap", i, i / 10, f"{i} samples are missing"))
-        hub.write_event(Event("change", 7, 200.0, "stiffness is 9 % less", {"what": "stiffness"}))
+            hub(Event("gap", i, i / 10, f"{i} samples are missing"))
+        hub(Event("change", 7, 200.0, "stiffness is 9 % less", {"what": "stiffness"}))
         tab.until("document.querySelectorAll('#events li.alarm').length === 2")
         assert tab.page.locator("#alarm-count").inner_text() == "⚠ 2 alarms"
         row = tab.page.locator("#events li[data-cause=gap]")
@@ -147,20 +149,21 @@ def test_alarms_of_one_cause_are_one_row_and_acknowledged_at_once(browser: Brows
         assert row.locator("time").inner_text() == "106.40 s"
         row.get_by_role("button", name="Acknowledge all 1065").click()
         tab.until("events.waiting.size === 1")
-        (said,) = _until_said(hub)
-        assert (said.details["cause"], said.details["count"]) == ("gap", 1065)
-        hub.write_event(said)
+        (acknowledged,) = _until_acknowledged(hub)
+        assert (acknowledged.details["cause"], acknowledged.details["count"]) == ("gap", 1065)
+        hub(acknowledged)
         tab.until("document.querySelector('#events li[data-cause=gap]').className.includes('seen')")
         assert tab.page.locator("#alarm-count").inner_text() == "⚠ 1 alarm"
-        hub.write_event(Event("gap", 2000, 300.0, "5 samples are missing"))
+        hub(Event("gap", 2000, 300.0, "5 samples are missing"))
         row.get_by_role("button", name="Acknowledge all 1066: 5 samples").wait_for()
         assert tab.wrong == []
 
 
-def _until_said(hub: Hub) -> list[Event]:
+def _until_acknowledged(hub: Hub) -> list[Event]:
     for _ in range(1000):
-        if said := hub.drain_events():
-            return said
+        assert hub.control is not None
+        if found := hub.control.take_recorded():
+            return found
         time.sleep(0.01)
     raise AssertionError("nothing was acknowledged")
 
@@ -179,12 +182,12 @@ def test_margins_are_those_of_the_moment_that_is_shown(browser: Browser) -> None
         tab.page.keyboard.press("g")
         span = tab.js("timeline.span")
         for share, gain_db in ((0.1, 12.0), (1.0, 7.0)):
-            hub.write_parameters(margins(span["first_s"] + share * (span["last_s"] - span["first_s"]), gain_db))
+            hub(Fitted((margins(span["first_s"] + share * (span["last_s"] - span["first_s"]), gain_db),)))
             tab.page.locator("#pane-margins", has_text=f"{gain_db:g} ± 0.2 dB").wait_for()
         tab.page.locator("#time").focus()
         tab.page.keyboard.press("Home")
         tab.page.locator("#pane-margins", has_text="12 ± 0.2 dB").wait_for()
-        hub.write_parameters(margins(span["last_s"] + 1, 3.0))
+        hub(Fitted((margins(span["last_s"] + 1, 3.0),)))
         tab.page.wait_for_timeout(800)
         assert cell.inner_text() == "12 ± 0.2 dB"
         tab.page.keyboard.press(" ")
@@ -200,7 +203,7 @@ def test_moments_are_times_of_day_where_a_machine_sends(browser: Browser) -> Non
     with axes(browser, "y", timezone_id="Europe/Berlin") as ([hub], tab):
         at = datetime.datetime(2026, 7, 14, 14, 32, 7, tzinfo=BERLIN).timestamp()
         begin(hub, Path("/nowhere"), LINES, from_s=at)
-        hub.write_event(Event("change", 1, at, "stiffness is 9 % less", {"what": "stiffness"}))
+        hub(Event("change", 1, at, "stiffness is 9 % less", {"what": "stiffness"}))
         tab.page.locator("#events li.alarm time", has_text="2026-07-14 14:32:07 CEST").wait_for()
         assert tab.page.locator("#time-from").inner_text().startswith("2026-07-14 14:32:0")
         tab.until("tracking.made.axes[0].label() === 'time, CEST' && tracking.made.axes[0]._values?.length")
@@ -209,7 +212,7 @@ def test_moments_are_times_of_day_where_a_machine_sends(browser: Browser) -> Non
             local = datetime.datetime.fromtimestamp(split + 1e-6, BERLIN)
             assert text == f"{local:%H:%M:%S.%f}"[: len(text)]
         rows = made(30, LINES, hole=0.0, unit="")
-        hub.write(replace(rows, time_s=rows.time_s + at + 3.7))
+        hub(replace(rows, time_s=rows.time_s + at + 3.7))
         tab.until(f"timeline.span.last_s > {at + 3}")
         tab.until(f"tracking.toS > {at + 3}")
         assert tab.js(f"Math.abs(tracking.made.data[0].at(-1) - {at + 3.7}) < 2")
@@ -224,7 +227,7 @@ def test_a_live_run_without_stamps_has_the_time_of_day_and_a_recording_its_own(b
         assert tab.page.locator("#time-from").inner_text().endswith(" s")
         assert tab.js("tracking.made.axes[0].label()") == "time in s"
         now(hub, at_s=0.5, ago_s=0.0)
-        hub.set_clock([(0.0, time.time() - 7200), (10.0, time.time())])
+        hub(ClockSet(((0.0, time.time() - 7200), (10.0, time.time()))))
         tab.page.locator("#time-from", has_text="CE").wait_for()
         tab.until("tracking.made.axes[0].label().startsWith('time, CE')")
         assert tab.wrong == []

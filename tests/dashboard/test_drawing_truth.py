@@ -121,7 +121,7 @@ def test_the_newest_response_with_its_bands(browser: Browser, watched: Watched, 
         assert tab.wrong == []
 
 
-def test_pixels_stand_where_the_numbers_are(browser: Browser, whole: Path) -> None:
+def test_drawn_pixels_are_at_the_positions_of_the_numbers(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -262,7 +262,7 @@ def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Pat
         assert tab.wrong == []
 
 
-def test_neighbouring_ticks_do_not_touch(browser: Browser, whole: Path) -> None:
+def test_labels_of_neighbouring_ticks_do_not_overlap(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard:

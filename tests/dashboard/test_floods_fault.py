@@ -102,7 +102,7 @@ def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_
     assert places.take(operators[-1])
 
 
-def test_one_who_does_not_read_stops_nobody(watched: Watched) -> None:
+def test_a_client_that_does_not_read_delays_no_other(watched: Watched) -> None:
     """A socket that is never read fills up; the machine goes on, another browser sees it, memory stays bounded."""
     mine = cookie(watched, TOKEN)
     request = (
@@ -181,7 +181,7 @@ def test_connections_leave_descriptors_for_the_record(monkeypatch: pytest.Monkey
     assert connections_max() == most
 
 
-def test_faults_of_the_server_are_told_once_a_minute() -> None:
+def test_internal_errors_of_the_server_are_reported_once_a_minute() -> None:
     told = list[str]()
     faults = Faults(told.append)
     for _ in range(1000):

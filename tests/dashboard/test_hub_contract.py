@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.analysis.overview import Overview
 from livebode.configuration.axis import LoopSection
 from livebode.core import Block, Event, Lines, Responses, ServerError
 from livebode.dashboard import Hub
@@ -23,6 +24,8 @@ from livebode.dashboard.quantities import QUANTITIES, Quantities
 from livebode.dashboard.recent import Recent
 from livebode.dashboard.state import State
 from livebode.dashboard.trends import POINTS_MAX, Rows, Trend
+from livebode.runtime import RunControl
+from livebode.runtime.documents import ClockSet, RunEnded, RunStarted, Tracked
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.dashboards import LINES, LOOP, Watched
@@ -97,7 +100,7 @@ def test_responses_of_a_run_before_are_known() -> None:
     assert not Quantities("sensitivity", "", LINES, None).fit(made(1, LINES))
 
 
-def test_what_cannot_be_shown_says_why() -> None:
+def test_a_quantity_that_is_not_available_has_a_reason() -> None:
     quantities = Quantities("plant", "rad/s", LINES, None)
     assert quantities.why_not("plant") == ""
     assert "describe its controllers" in quantities.why_not("open loop")
@@ -105,43 +108,49 @@ def test_what_cannot_be_shown_says_why() -> None:
         quantities.of_responses(made(1, LINES), "sensitivity")
 
 
-def test_nobody_looks_and_memory_stays_bounded() -> None:
+def test_memory_is_bounded_and_losses_are_counted_when_nobody_reads() -> None:
     """A dashboard that never takes anything: the newest is kept, the rest given up, and counted."""
     hub, many = Hub("axis"), made(64, LINES)
     batches = 3 * VALUES_MAX // many.value.size
     for _ in range(batches):
-        hub.write(many)
-        hub.write_event(Event("gap", 0, 0.0, "a gap"))
+        hub(many)
+        hub(Event("gap", 0, 0.0, "a gap"))
     assert hub._values <= VALUES_MAX
     items = hub.take()
     assert sum(isinstance(item, Responses) for item in items) + hub.given_up == batches
     assert sum(isinstance(item, Event) for item in items) <= EVENTS_MAX
     assert hub.take() == []
-    assert all(hub.say(Event("acknowledged", 0, 0.0, "seen")) for _ in range(64))
-    assert not hub.say(Event("acknowledged", 0, 0.0, "seen"))
-    assert len(hub.drain_events()) == 64
-    hub.finish({})
-    assert not hub.say(Event("acknowledged", 0, 0.0, "seen")), "a record that is closed takes nothing"
+    control = RunControl()
+    hub(RunStarted(Path("run"), {}, control, Overview()))
+    assert all(hub.record(Event("acknowledged", 0, 0.0, "seen")) for _ in range(64))
+    assert not hub.record(Event("acknowledged", 0, 0.0, "seen"))
+    assert len(control.take_recorded()) == 64
+    hub(RunEnded({}))
+    assert not hub.record(Event("acknowledged", 0, 0.0, "seen")), "a record that is closed takes nothing"
 
 
 def test_taking_and_publishing_at_once_loses_nothing() -> None:
     hub, one, seen = Hub("axis"), made(1, LINES), 0
-    writing = threading.Thread(target=lambda: [hub.write(one) for _ in range(20_000)])
+    writing = threading.Thread(target=lambda: [hub(one) for _ in range(20_000)])
     writing.start()
     while writing.is_alive():
         seen += len(hub.take())
     assert seen + len(hub.take()) + hub.given_up == 20_000
 
 
+def tracked(block: Block) -> Tracked:
+    return Tracked(block, block.stop, None)
+
+
 def test_delay_is_from_arrival_to_published() -> None:
     hub = Hub("axis")
-    hub.followed(LiveBlock(np.zeros((1, 40)), ("y",), 4000.0, arrived_s=time.monotonic() - 0.25))
-    hub.followed(Block(np.zeros((1, 40)), ("y",), 4000.0, start=40, gap=True))
+    hub(tracked(LiveBlock(np.zeros((1, 40)), ("y",), 4000.0, arrived_s=time.monotonic() - 0.25)))
+    hub(tracked(Block(np.zeros((1, 40)), ("y",), 4000.0, start=40, gap=True)))
     assert list(hub.delays_s) == [pytest.approx(0.25, abs=0.2)]
     assert (hub.samples, hub.gaps) == (80, 1)
 
 
-def test_recent_keeps_the_newest_and_not_too_dense() -> None:
+def test_recent_responses_are_the_newest_and_thinned() -> None:
     recent, hop = Recent(), 20
     for start in range(0, 40_000, 500):
         rows = made(500, Lines((2, 3), 60, 1000.0), hop=hop, seed=start)
@@ -227,17 +236,17 @@ def test_moments_have_a_clock_where_a_machine_sends(tmp_path: Path) -> None:
     hub = Hub("axis")
     state = State("axis", 0, hub)
     for pieces in ([], [(0.0, 1.79e9), (60.0, 1.79e9 + 5)]):
-        hub.begin(tmp_path, dict(summary), None)
-        hub.set_clock(pieces)
+        hub(RunStarted(tmp_path, dict(summary), RunControl(), Overview()))
+        hub(ClockSet(tuple(pieces)))
         state.refresh()
         assert state.span()["clock"] == pieces
     dated = made(5, LINES, hole=0.0)
-    hub.write(Responses(**{**vars(dated), "time_s": dated.time_s + 1.79e9}))
+    hub(Responses(**{**vars(dated), "time_s": dated.time_s + 1.79e9}))
     state.refresh()
     assert state.span()["clock"] == [(0.0, 0.0)]
 
 
-def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Path) -> None:
+def test_a_continued_run_is_not_mixed_with_the_previous_one(tmp_path: Path) -> None:
     """In one piece a run appears when it is done; until then an older one in its place is not read."""
     old = tmp_path / "run"
     with Watched(old) as watched:
@@ -246,30 +255,37 @@ def test_a_run_that_goes_on_is_not_mixed_with_one_that_stood_there(tmp_path: Pat
     state = State("axis", 0, hub)
     summary = dict(watched.record().summary)
     summary.pop("record")
-    hub.begin(old, summary, None)
+    hub(RunStarted(old, summary, RunControl(), Overview()))
     state.refresh()
     with refused(ServerError, "not-begun"):
         Past.of(state).between(0, 1, 10)
     rows = watched.record().responses()[:5]
-    hub.write(rows)
+    hub(rows)
     state.refresh()
     assert len(Past.of(state).between(-10, 10, 1000)) == 5
-    hub.finish(summary)
+    hub(RunEnded(summary))
     state.refresh()
     assert len(next(Past.of(state).all_between(-10, 10))) > 50
 
 
-def test_an_axis_that_begins_anew_has_other_lines(tmp_path: Path) -> None:
+def test_an_axis_that_begins_a_new_run_may_have_other_lines(tmp_path: Path) -> None:
     hub = Hub("axis")
     state = State("axis", 0, hub)
     for lines in (LINES, Lines((2, 5), 60, 1000.0)):
         found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
-        hub.begin(tmp_path, {"found": found | {"quantity": "plant", "unit": ""}, "configuration": {}}, None)
-        hub.write(made(30, lines, hole=0.0, unit=""))
+        hub(
+            RunStarted(
+                tmp_path,
+                {"found": found | {"quantity": "plant", "unit": ""}, "configuration": {}},
+                RunControl(),
+                Overview(),
+            )
+        )
+        hub(made(30, lines, hole=0.0, unit=""))
         state.refresh()
         assert state.facts()["frequency_hz"] == lines.frequency_hz.tolist()
         assert decoded(state.newest_frames("plant"))[0]["magnitude"].shape == (1, len(lines))  # type: ignore[attr-defined]
-        hub.write(made(1, lines, hole=0.0, unit=""))  # that nobody takes before it begins anew
+        hub(made(1, lines, hole=0.0, unit=""))  # that nobody takes before it begins anew
     assert state.runs == 2
 
 

@@ -152,7 +152,7 @@ def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_pat
     begin(hub, tmp_path, LINES)
     rows = made(1, LINES, hole=0.0, unit="")
     size = np.where(np.arange(len(LINES)) == 4, 1e-3, 1.0)[np.newaxis]
-    hub.write(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
+    hub(replace(rows, value=size.astype(complex), sigma=np.full(size.shape, 2e-3), time_s=rows.time_s + 9))
     with dashboard, Tab(browser, dashboard.url) as tab:
         tab.until("bode.curves.measured.frame.timeS[0] > 9 && bode.charts[0].data[1][bode.at[4]] < -59")
         low, high = tab.js("[bode.charts[0].scales.y.min, bode.charts[0].scales.y.max]")
@@ -172,7 +172,7 @@ def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> N
         assert tab.wrong == []
 
 
-def test_the_whole_keyboard(browser: Browser, whole: Path) -> None:
+def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -242,7 +242,7 @@ def test_zooming_with_the_mouse_and_back(browser: Browser, whole: Path) -> None:
         assert tab.wrong == []
 
 
-def test_a_finger_on_a_tablet(browser: Browser, whole: Path) -> None:
+def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url, viewport=TABLET, has_touch=True, is_mobile=True) as tab:
@@ -335,7 +335,7 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
         event = next(e for e in watched.record().events() if e.kind == "non-finite")
         until(lambda: page.locator("#events li", has_text=event.message).count() == 1, "the event on the page")
         alarm = Event("change", 6000, 1.5, "the belt's <b>stiffness</b> is 9 % less", {"share": -0.09})
-        watched.hub.write_event(alarm)
+        watched.hub(alarm)
         button = page.get_by_role("button", name="Acknowledge: the belt's <b>stiffness</b>")
         button.wait_for()
         assert page.locator("#alarm-count").inner_text() == "⚠ 1 alarm"
@@ -380,7 +380,9 @@ def two_axes(browser: Browser, whole: Path, folder: Path) -> Iterator[Tab]:
         yield tab
 
 
-def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_path: Path) -> None:
+def test_an_axis_without_a_loop_shows_the_plant_beside_other_axes(
+    browser: Browser, whole: Path, tmp_path: Path
+) -> None:
     with two_axes(browser, whole, tmp_path) as tab:
         assert tab.page.locator("#axis option").all_inner_texts() == ["run", "other"]
         tab.page.keyboard.press("4")
@@ -398,7 +400,7 @@ def test_several_axes_and_one_without_a_loop(browser: Browser, whole: Path, tmp_
         assert tab.wrong == []
 
 
-def test_an_answer_to_an_earlier_wish_undoes_no_choice_of_an_axis(
+def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
     browser: Browser, whole: Path, tmp_path: Path
 ) -> None:
     with two_axes(browser, whole, tmp_path) as tab:
@@ -412,7 +414,7 @@ def test_an_answer_to_an_earlier_wish_undoes_no_choice_of_an_axis(
             tab.until("page.facts.name === 'run' && bode.curves.measured?.frame.axis === 0")
 
 
-def test_a_link_that_breaks_comes_back(browser: Browser, whole: Path) -> None:
+def test_a_broken_link_is_connected_again(browser: Browser, whole: Path) -> None:
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -445,7 +447,7 @@ CONTRAST = """() => {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_letters_stand_out_from_their_ground(browser: Browser, watched: Watched, scheme: str) -> None:
+def test_text_and_curves_have_the_contrast_of_wcag_2(browser: Browser, watched: Watched, scheme: str) -> None:
     """WCAG 2's contrast, 4.5 for text and 3 for curves; light or dark is what the system says."""
     with Tab(browser, watched.url, color_scheme=scheme) as tab:
         assert tab.js("document.documentElement.dataset.theme") == scheme

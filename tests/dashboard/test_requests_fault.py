@@ -96,7 +96,7 @@ def message(rng: random.Random) -> str:
     return text
 
 
-def test_messages() -> None:
+def test_random_messages_are_understood_or_refused() -> None:
     rng, understood = random.Random(1), 0
     for _ in range(CASES):
         with contextlib.suppress(LivebodeError):
@@ -107,7 +107,7 @@ def test_messages() -> None:
     assert understood > CASES / 20
 
 
-def test_queries() -> None:
+def test_random_queries_are_understood_or_refused() -> None:
     rng, understood = random.Random(2), 0
     usual = {"axis": "0", "quantity": "plant", "from": "0.5", "to": "1.5", "rows": "100", "format": "csv"}
     for _ in range(CASES):
@@ -124,7 +124,7 @@ def test_queries() -> None:
     assert understood > CASES / 20
 
 
-def test_bodies() -> None:
+def test_random_bodies_are_understood_or_refused() -> None:
     rng = random.Random(3)
     for _ in range(CASES):
         data = message(rng).encode("utf-8", "surrogatepass")
@@ -165,7 +165,7 @@ def head(rng: random.Random, port: int) -> bytes:
     return data
 
 
-def test_requests_leave_the_server_standing(watched: Watched, capfd: pytest.CaptureFixture[str]) -> None:
+def test_random_requests_do_not_stop_the_server(watched: Watched, capfd: pytest.CaptureFixture[str]) -> None:
     rng, port, statuses = random.Random(4), port_of(watched), {}
     for _ in range(min(CASES, 20_000) // 10):
         with socket.create_connection(("127.0.0.1", port), timeout=20) as one:

@@ -37,7 +37,7 @@ def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divi
     width=st.floats(10, 1800),
     kind=st.sampled_from(["multisine", "odd", "chirp", "prbs"]),
 )
-def test_more_lines_than_tell_something_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
+def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
     def lines(apart_hz):
         wish = Wish(band_hz=(low, low + width), resolution_hz=apart_hz, kind=kind)
         return len(grid(wish, RATE_HZ).lines)
@@ -53,7 +53,7 @@ def test_more_lines_than_tell_something_are_refused_and_the_named_resolution_pas
 
 
 @pytest.mark.parametrize("order", [14, 17, 20])
-def test_a_prbs_with_more_lines_than_tell_something_names_an_order_that_passes(order):
+def test_a_prbs_with_too_many_useful_lines_is_refused_with_an_order_that_passes(order):
     with pytest.raises(GridError) as caught:
         grid(Wish(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
     assert (caught.value.code, caught.value.lines_max) == ("grid.too-many-lines", 5000)
@@ -61,7 +61,7 @@ def test_a_prbs_with_more_lines_than_tell_something_names_an_order_that_passes(o
     assert len(grid(Wish(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
 
 
-def test_listed_amplitudes_are_told_as_listed_and_refused_with_the_share_that_passes():
+def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_that_passes():
     listed = [1.0, 2.0, 3.0, 2.0, 1.0, 0.5, 0.5]
     wish = {"lines": "20:140:20", "window": 400, "phases": "schroeder"}
     design = choose(Wish(**wish, amplitude_n_m=listed), MACHINE)
@@ -94,7 +94,7 @@ def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step
     choose(Wish(**wish, amplitude_n_m=caught.value.passing), MACHINE, Bearable(torque_n_m_max=limit))
 
 
-def test_the_bound_of_each_line_is_that_of_its_windows_and_the_worst_is_the_wanted_one():
+def test_the_worst_line_has_the_specified_accuracy():
     wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.3, accuracy=0.02)
     told = choose(wish, MACHINE).plain()
     bounds = np.sqrt(np.log(20) / told["windows"]) * np.array(told["sigma_relative"])
@@ -102,7 +102,7 @@ def test_the_bound_of_each_line_is_that_of_its_windows_and_the_worst_is_the_want
     assert 0.02 * np.sqrt(1 - 1 / told["windows"]) < bounds.max() <= 0.02
 
 
-def test_a_recording_of_hours_says_what_an_hour_is_enough_for():
+def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():
     wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05, accuracy=1e-4)
     design = choose(wish, MACHINE)
     (row,) = [choice for choice in design.choices if choice.what == "recording"]

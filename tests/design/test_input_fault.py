@@ -73,7 +73,7 @@ def test_a_motion_that_leaves_no_room_is_named_and_not_the_excitation():
     width=st.floats(0, 5000),
     kind=st.sampled_from(["multisine", "odd", "prbs", "chirp", "stepped"]),
 )
-def test_a_band_that_does_not_end_below_the_nyquist_frequency_is_refused(low, width, kind):
+def test_a_band_up_to_the_nyquist_frequency_is_refused(low, width, kind):
     assume(low + width >= 2000)
     wish = Wish(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0)
     with refused(GridError, "above-nyquist", high_hz=low + width, rate_hz=4000):
@@ -81,7 +81,7 @@ def test_a_band_that_does_not_end_below_the_nyquist_frequency_is_refused(low, wi
 
 
 @pytest.mark.parametrize("band", [(0.0, 100.0), (-5.0, 100.0), (100.0, 20.0), (float("nan"), 100.0)])
-def test_a_band_that_is_none_is_refused(band):
+def test_an_empty_band_is_refused(band):
     with refused(GridError, "band-invalid"):
         choose(Wish(band_hz=band, resolution_hz=10), MACHINE)
 
@@ -223,7 +223,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("excitation", "code", "argument"), WRONG)
-def test_a_wish_that_makes_no_sense_is_refused(excitation, code, argument):
+def test_a_contradictory_specification_is_refused(excitation, code, argument):
     asked = Experiment.of({"excitation": completed(excitation), "belt": {}}, "here")
     error = refusal(lambda: choose(asked.wish(), MACHINE))
     assert (error.code, error.facts.get("argument")) == (code, argument), error
@@ -357,7 +357,7 @@ def test_the_command_refuses_with_2_and_leaves_nothing(experiment, tmp_path):
     assert "is not TOML" in livebode("design", broken).err
 
 
-def test_what_stands_in_the_way_is_replaced_only_where_a_design_left_it(experiment, tmp_path):
+def test_only_the_files_of_a_previous_design_are_replaced(experiment, tmp_path):
     out = tmp_path / "design"
     assert livebode("design", experiment, "--out", out).code == 0
     assert "exists already" in livebode("design", experiment, "--out", out).err

@@ -48,7 +48,7 @@ def test_auto_finds_the_period_the_lines_and_the_detection_lines_of_a_design(win
     assert (found.period, found.lines.bins, found.lines.quiet) == (window, lines.bins, lines.quiet)
 
 
-def test_lines_that_meet_the_mains_are_left_out_and_reported():
+def test_lines_at_the_mains_frequency_are_left_out_and_reported():
     machine = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.1)))
     wish = Wish(band_hz=(20, 200), window=400, amplitude_n_m=0.5)
     avoided = choose(wish, machine)

@@ -107,7 +107,7 @@ def runs(tmp_path_factory):
 EXCITATION = '[excitation]\nlines = "20:140:20"\nwindow = 400\nphases = "schroeder"\namplitude_n_m = 1.0\n'
 
 
-def test_a_design_from_a_run_goes_on_as_the_run_was_described(runs):
+def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
     path = runs / "again.toml"
     path.write_text(f'{EXCITATION}resolution_n_m = 0.001\n[measured]\nrun = "run-speed"\nradius_m = 0.019\n')
     done = livebode("design", path, "--out", runs / "again", "--json")

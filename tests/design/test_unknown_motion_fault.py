@@ -33,7 +33,7 @@ def machine(motion, stroke_s=4.0):
 
 
 @pytest.mark.parametrize("name", QUANTITIES)
-def test_a_limit_on_what_nobody_knows_of_the_motion_is_refused_and_without_it_the_table_says_so(name):
+def test_a_limit_on_an_unknown_part_of_the_motion_is_refused_and_without_it_the_table_notes_it(name):
     known = {key: value for key, value in MOTION.items() if key != name}
     with refused(DesignError, "motion-unknown", quantity=name, key=f"measured.{MOTION_KEYS[name]}"):
         choose(WISH, machine(known), Bearable(**LIMIT[name]))
@@ -49,7 +49,7 @@ def test_a_limit_on_what_nobody_knows_of_the_motion_is_refused_and_without_it_th
     assert told["high"] == pytest.approx(excited["high"] + MOTION[name][1])
 
 
-def test_an_axis_that_stands_moves_not_but_stands_nobody_knows_where():
+def test_an_axis_at_standstill_has_no_motion_but_an_unknown_position():
     standing = machine({}, stroke_s=None)
     limits = {key: value for name in ("torque", "speed", "following error") for key, value in LIMIT[name].items()}
     told = choose(WISH, standing, Bearable(**limits)).plain()["predicted"]
@@ -73,6 +73,6 @@ def test_a_motion_that_makes_no_sense_is_refused(motion, stroke_s, code, argumen
         machine(motion, stroke_s)
 
 
-def test_the_file_says_null_where_nothing_is_given():
+def test_the_file_contains_null_where_nothing_is_specified():
     design = choose(WISH, machine({}))
     assert json.loads(json.dumps(design.plain()))["predicted"]["torque"]["motion_alone"] is None

@@ -68,7 +68,7 @@ def test_every_key_of_the_models_that_names_a_secret_is_known_as_one() -> None:
 
 
 @pytest.mark.parametrize("place", KEYS, ids=".".join)
-def test_a_value_is_kept_exactly_where_its_key_holds_no_secret(tmp_path: Path, place: tuple[str, ...]) -> None:
+def test_only_values_of_secret_keys_are_removed(tmp_path: Path, place: tuple[str, ...]) -> None:
     secrets = Secrets(tmp_path)
     for table in (holding(place, SECRET), {"axes": {"a": holding(place, SECRET)}}):
         kept = secrets.configuration(table)
@@ -113,9 +113,7 @@ def test_no_secret_of_a_configuration_is_in_the_bundle(tmp_path: Path, source: s
     word=st.text(st.characters(categories=("L", "N", "P", "S")), min_size=4, max_size=40).filter(lambda w: w.strip()),
     key=st.sampled_from(sorted(MAY_BE_SECRET - {"url", "username"})),
 )
-def test_what_was_removed_from_a_configuration_is_removed_from_every_other_text(
-    tmp_path: Path, word: str, key: str
-) -> None:
+def test_a_secret_of_the_configuration_is_removed_from_every_text(tmp_path: Path, word: str, key: str) -> None:
     secrets = Secrets(tmp_path)
     section = "source" if key.startswith("password") else "serve"
     secrets.configuration({section: {key: word}})
@@ -125,7 +123,7 @@ def test_what_was_removed_from_a_configuration_is_removed_from_every_other_text(
     assert secrets.plain({"facts": [word]}) == {"facts": [secrets.text(word)]}
 
 
-def test_what_a_password_file_holds_is_removed_from_events_and_log(tmp_path: Path) -> None:
+def test_a_secret_of_a_password_file_is_removed_from_events_and_log(tmp_path: Path) -> None:
     (tmp_path / "p").write_text(SECRET + "\n")
     secrets = Secrets(tmp_path)
     table = {"source": {"url": "mqtt://127.0.0.1:1/t", "password_file": "p", "client_id": "c"}}

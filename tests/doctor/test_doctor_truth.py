@@ -217,7 +217,7 @@ def test_a_full_disk_fails_and_a_small_one_is_a_warning(tmp_path: Path) -> None:
     assert "the disk is full" in full
 
 
-def test_a_budget_that_the_disk_has_no_room_for_is_a_warning(tmp_path: Path) -> None:
+def test_a_budget_larger_than_the_free_disk_is_a_warning(tmp_path: Path) -> None:
     assert check_disk(tmp_path, 1 << 60).verdict == "warning"
 
 

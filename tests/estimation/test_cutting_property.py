@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import Block, Lines, Responses, UsageError
+from livebode.core import Block, Event, Lines, Responses, UsageError
 from livebode.estimation import RippleOrder, Settings, Tracker
 from livebode.excitation import multisine
 from tests.support.errors import refused
@@ -71,16 +71,17 @@ def new(options: dict) -> Tracker:
 def test_any_cut_gives_the_same_bits(options: dict, at: list[int], jump: int, seed: int) -> None:
     block = record(seed)
     whole, pieces = new(options), new(options)
-    expected = Responses.join([whole.process(b) for b in cut(block, [], jump)])
-    assert_same(Responses.join([pieces.process(b) for b in cut(block, at, jump)]), expected)
-    assert pieces.drain_events() == whole.drain_events()
+    events: tuple[list[Event], list[Event]] = [], []
+    expected = Responses.join([whole.process(b, events[0].append) for b in cut(block, [], jump)])
+    assert_same(Responses.join([pieces.process(b, events[1].append) for b in cut(block, at, jump)]), expected)
+    assert events[0] == events[1]
     assert pieces.counts == whole.counts
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 @settings(max_examples=15, deadline=None)
 @given(at=st.lists(st.integers(1, SAMPLES - 1), min_size=1, max_size=6), seed=st.integers(0, 9))
-def test_a_restored_tracker_goes_on_with_the_same_bits(options: dict, at: list[int], seed: int) -> None:
+def test_a_restored_tracker_continues_with_the_same_bits(options: dict, at: list[int], seed: int) -> None:
     block = record(seed)
     expected = Responses.join([new(options).process(block)])
     tracker, parts = new(options), []
@@ -93,7 +94,7 @@ def test_a_restored_tracker_goes_on_with_the_same_bits(options: dict, at: list[i
     assert_same(Responses.join(parts), expected)
 
 
-def test_one_sample_at_a_time() -> None:
+def test_single_samples_give_the_same_as_one_block() -> None:
     block = record(3)
     tracker = new({})
     parts = [tracker.process(block.cut(i, i + 1)) for i in range(len(block))]

@@ -22,6 +22,7 @@ from livebode.estimation.hum import find_hum
 from livebode.excitation import multisine, odd_lines, recognise
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
+from tests.support.found import with_events
 
 RATE_HZ, N = 4000.0, 800
 ODD = odd_lines(20, 140, RATE_HZ, N, seed=1)  # 5 Hz apart: 50 and 60 Hz are even bins
@@ -63,8 +64,8 @@ def test_hum_of_any_size_and_phase_changes_no_line_of_an_odd_design(mains_hz: fl
 
 def _tracked(lines: Lines, w: np.ndarray, y: np.ndarray):
     tracker = Tracker(Settings(lines=lines, output="y", input="u", excitation="w"))
-    responses = tracker.process(Block(np.array([w, w, y]), ("w", "u", "y"), RATE_HZ))
-    assert [event.kind for event in tracker.drain_events()] == []
+    responses, events = with_events(tracker.process, Block(np.array([w, w, y]), ("w", "u", "y"), RATE_HZ))
+    assert events == []
     return responses
 
 
@@ -85,7 +86,7 @@ def test_frequencies_and_amplitudes_of_hum_are_found_in_a_recording_without_exci
     assert three.amplitude == pytest.approx({"y": 0.1}, rel=0.08)
 
 
-def test_noise_of_any_slope_is_no_hum() -> None:
+def test_noise_of_any_slope_is_not_reported_as_hum() -> None:
     """200 recordings of 20 multiples, each taken for hum by chance less than once in 1e8."""
     rng = np.random.default_rng(5)
     for pole in (-0.9, 0.0, 0.9, 0.999):
@@ -170,7 +171,7 @@ def test_hum_is_shown_where_the_excitation_is_not_recognised(tmp_path: Path) -> 
     assert "The excitation is not recognised" in shown.out
 
 
-def test_inspect_says_where_there_is_no_hum_and_what_it_needs(tmp_path: Path) -> None:
+def test_inspect_reports_that_hum_was_not_found_or_could_not_be_judged(tmp_path: Path) -> None:
     quiet = recording(tmp_path / "quiet.parquet", 4.0, 0.0, level=0.0)
     assert "no hum of the mains is visible in 4 s" in livebode("inspect", quiet, *LINES, *SIGNALS).out
     excited = recording(tmp_path / "excited.parquet", 0.5, 3.0)

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from livebode.core import Block, Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
+from tests.support.found import with_events
 
 RATE_HZ, N = 4000.0, 400
 LINES = Lines.of_bins([3, 5, 7, 11, 13], N, RATE_HZ)  # 50 Hz is one of the lines
@@ -36,9 +37,7 @@ def hum(samples: int, level: float) -> np.ndarray:
 
 def tracked(w: np.ndarray, y: np.ndarray) -> tuple[Responses, list[Event]]:
     noise = 1e-3 * np.random.default_rng(2).standard_normal(w.size)
-    tracker = new()
-    responses = tracker.process(Block(np.array([w, w, y + noise]), CHANNELS, RATE_HZ))
-    return responses, tracker.drain_events()
+    return with_events(new().process, Block(np.array([w, w, y + noise]), CHANNELS, RATE_HZ))
 
 
 def new() -> Tracker:
@@ -92,8 +91,7 @@ def test_hum_that_a_later_silence_does_not_show_is_withdrawn(pieces: int) -> Non
         again = new()
         again.restore(tracker.snapshot())
         tracker = again
-        found.append(tracker.process(whole.cut(start, stop)))
-        events += tracker.drain_events()
+        found.append(tracker.process(whole.cut(start, stop), events.append))
     responses = Responses.join(found)
     assert not responses.valid[responses.sample == 41 * N - 1, ON_MAINS].any()
     assert responses.valid[-1, ON_MAINS]

@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.analysis.averaged import averaged
-from livebode.core import Block, Channel
+from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.estimation.movement import Movement
 from livebode.excitation import multisine, odd_lines
 from livebode.records import Run
+from tests.support.found import with_events
 from tests.support.reports import write_run
 
 RATE_HZ, N, PERIODS = 4000.0, 800, 60
@@ -42,33 +43,33 @@ MOVING = {
 PLACES = [(0.0, 1.0), (50.0, 1.0), (-5e4, 1e3)]  # offset and unit
 
 
-def tracked(x: np.ndarray, hop: int = 40) -> tuple[Tracker, np.ndarray]:
+def tracked(x: np.ndarray, hop: int = 40) -> tuple[Tracker, Responses, list[Event]]:
     settings = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="x", hop=hop)
     tracker = Tracker(settings)
     y = W + 0.01 * RNG.standard_normal(W.size)
     block = Block(np.array([W, W, y, x]), (Channel("w"), Channel("u"), Channel("y"), Channel("x")), RATE_HZ)
-    return tracker, tracker.process(block)
+    return tracker, *with_events(tracker.process, block)
 
 
 @pytest.mark.parametrize(("offset", "unit"), PLACES)
 @pytest.mark.parametrize("name", STILL)
 def test_an_axis_that_only_jitters_does_not_move(name: str, offset: float, unit: float) -> None:
-    tracker, responses = tracked(offset + unit * STILL[name])
-    assert tracker.drain_events() == []
+    _, responses, events = tracked(offset + unit * STILL[name])
+    assert events == []
     assert np.isfinite(responses.distortion[-1]).all()  # judged at standstill
 
 
 @pytest.mark.parametrize(("offset", "unit"), PLACES)
 @pytest.mark.parametrize("name", MOVING)
 def test_an_axis_that_moves_is_seen_wherever_it_is(name: str, offset: float, unit: float) -> None:
-    tracker, responses = tracked(offset + unit * MOVING[name])
-    assert [event.kind for event in tracker.drain_events()] == ["noise-from-detection-lines"]
+    tracker, responses, events = tracked(offset + unit * MOVING[name])
+    assert [event.kind for event in events] == ["noise-from-detection-lines"]
     assert tracker.found()["judged"]["noise_from_detection_lines"] > 0.8 * len(responses)
     assert np.isnan(responses.distortion[-1]).all()
 
 
 @pytest.mark.parametrize("hop", [800, 200, 40])
-def test_a_run_says_that_it_moved_where_it_did(hop: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_run_records_whether_the_axis_moved(hop: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     for i, (x, moved) in enumerate([(STILL["sensor noise"], False), (50 + MOVING["strokes"], True)]):
         tracker, responses = tracked(x, hop)
         found = tracker.found() | {"quantity": responses.quantity, "unit": responses.unit}

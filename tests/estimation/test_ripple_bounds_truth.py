@@ -96,7 +96,7 @@ def test_speed_that_changes_within_a_window_counts_where_it_is_nearest() -> None
     assert ripple_power(order, lines, np.full((2, 1), np.nan)).max() == 0.0
 
 
-def test_what_a_ripple_needs_is_reported() -> None:
+def test_a_ripple_without_schedule_or_amplitude_is_refused() -> None:
     with refused(UsageError, "missing", argument="schedule"):
         replace(TOLD, schedule=None)
     with refused(UsageError, "out-of-range", argument="amplitude", value=0):

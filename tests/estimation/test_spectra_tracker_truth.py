@@ -15,6 +15,7 @@ from livebode.core import (
     Block,
     Cascade,
     Channel,
+    Event,
     Lines,
     LivebodeError,
     Loop,
@@ -165,10 +166,11 @@ def test_samples_that_are_not_finite_leave_the_same_windows_out(record: Block) -
     broken = Block(data, record.channels, RATE_HZ)
     what = layout()
     tracker = SpectraTracker(described(20), what)
-    ours = Responses.join([tracker.process(block) for block in sent(broken, what)])
+    found: list[Event] = []
+    ours = Responses.join([tracker.process(block, found.append) for block in sent(broken, what)])
     same(ours, Tracker(described(20, dtype="float32")).process(broken))
     told = ["noise-from-detection-lines", "not-whole", "not-whole"]  # the position moves
-    assert [event.kind for event in tracker.drain_events()] == told
+    assert [event.kind for event in found] == told
     assert tracker.counts["samples"] == len(record)
 
 
@@ -179,10 +181,11 @@ def test_marks_of_the_drive_and_numbers_that_are_none_are_left_out(record: Block
     blocks[7].sums[1, 0, 3] = np.nan
     blocks[9].sums[0, 0, 2] *= 1e12
     tracker = SpectraTracker(described(WINDOW), what)
-    ours = Responses.join([tracker.process(block) for block in blocks])
+    found: list[Event] = []
+    ours = Responses.join([tracker.process(block, found.append) for block in blocks])
     assert np.flatnonzero(~ours.valid.any(axis=1)).tolist() == [5, 7, 9]
     told = [("spike", 2399), ("not-whole", 3199), ("implausible", 3999)]
-    events = [(e.kind, e.sample) for e in tracker.drain_events()]
+    events = [(e.kind, e.sample) for e in found]
     assert [e for e in events if e[0] != "noise-from-detection-lines"] == told
     assert len(events) == len(told) + 1  # the position moves: known from the eighth spectrum on
     assert {kind: tracker.counts[kind] for kind, _ in told} == {kind: 1 for kind, _ in told}
@@ -238,7 +241,7 @@ def test_any_cutting_and_a_restored_tracker_give_the_same(record: Block, cuts: l
         ({"differenced": ("y",)}, {}, "signal.layout-differs"),
     ],
 )
-def test_what_spectra_cannot_give_is_refused(options: dict, what: dict, code: str) -> None:
+def test_settings_that_need_samples_are_refused_for_spectra(options: dict, what: dict, code: str) -> None:
     with pytest.raises(LivebodeError) as caught:
         SpectraTracker(described(**({"hop": 20} | options)), layout(**what))
     assert caught.value.code == code

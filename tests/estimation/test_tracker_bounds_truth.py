@@ -116,7 +116,7 @@ def test_windows_further_apart_are_covered_too() -> None:
     assert hits[1].mean() == pytest.approx(0.98, abs=0.01)
 
 
-def test_quiet_bins_are_safe_if_somewhat_wide() -> None:
+def test_bounds_from_detection_lines_cover_the_truth_and_are_somewhat_wide() -> None:
     # The larger of two estimates, of which one is high near the resonance, so coverage may only be high.
     found = responses(400, "joint", noise="quiet")
     error = errors(400, found, 4)

@@ -9,6 +9,7 @@ from livebode.core import Block, Lines, LivebodeError, Loop, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from tests.support.errors import refused
+from tests.support.found import with_events
 
 WINDOW, RATE_HZ = 100, 1000.0
 LINES = Lines.parse("50,100,200", RATE_HZ, WINDOW)
@@ -42,11 +43,11 @@ def test_nothing_is_valid_before_a_whole_window(start: int) -> None:
 @pytest.mark.parametrize("channel", NAMES)
 def test_a_sample_that_is_not_finite_is_gone_after_one_window(value: float, channel: str) -> None:
     found = tracker()
-    responses = found.process(changed(record(), channel, 333, value))
+    responses, events = with_events(found.process, changed(record(), channel, 333, value))
     n = np.arange(1000)
     assert np.array_equal(responses.valid.all(axis=1), (n >= 99) & ((n < 333) | (n >= 333 + WINDOW)))
     assert np.allclose(responses.value[responses.valid], 2)
-    assert [(e.kind, e.sample, e.time_s) for e in found.drain_events()] == [("non-finite", 333, 0.333)]
+    assert [(e.kind, e.sample, e.time_s) for e in events] == [("non-finite", 333, 0.333)]
     assert found.counts["non-finite"] == 1
 
 
@@ -64,11 +65,11 @@ def test_a_sample_too_large_for_float32_is_missing_there() -> None:
 def test_a_giant_sample_is_gone_after_one_window(size: float, hop: int) -> None:
     # The sums of the kernel remember it until they are renewed, up to a window longer.
     found = tracker(hop=hop)
-    responses = found.process(changed(record(), "y", 333, size))
+    responses, events = with_events(found.process, changed(record(), "y", 333, size))
     whole = (responses.sample >= 99) & ((responses.sample < 333) | (responses.sample >= 333 + WINDOW))
     assert np.array_equal(responses.valid.all(axis=1), whole)
     assert np.allclose(responses.value[whole], 2, rtol=1e-9)
-    assert [(e.kind, e.sample) for e in found.drain_events()] == [("implausible", 333)]
+    assert [(e.kind, e.sample) for e in events] == [("implausible", 333)]
 
 
 @pytest.mark.parametrize("missing", [1, 50, 12345])
@@ -77,10 +78,9 @@ def test_a_gap_is_gone_after_one_window(missing: int) -> None:
     found.process(block.cut(0, 450))
     rest = block.cut(450, 1000)
     later = Block(rest.data, rest.channels, rest.rate_hz, start=450 + missing)
-    responses = found.process(later)
+    responses, (event, *_) = with_events(found.process, later)
     assert np.array_equal(responses.valid.all(axis=1), np.arange(550) >= WINDOW - 1)
     assert np.allclose(responses.value[responses.valid], 2)
-    event = found.drain_events()[0]
     assert (event.kind, event.sample, event.details) == ("gap", 450 + missing, {"missing_samples": missing})
 
 

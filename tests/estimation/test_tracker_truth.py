@@ -78,7 +78,7 @@ def test_quantities_satisfy_their_definitions(record: Block, loop: Loop) -> None
     assert np.allclose(measured["closed loop"] + measured["sensitivity"], 1, atol=1e-12)
 
 
-def test_excitation_at_the_velocity_reference() -> None:
+def test_an_excitation_at_the_velocity_reference_gives_the_plant() -> None:
     w = multisine(LINES)
     inner = VELOCITY.response(LINES.frequency_hz)
     # Seen from the plant, a multisine v at the velocity reference is the multisine Cvel·v at the plant input.
@@ -105,7 +105,7 @@ def test_differencing_is_exact_for_a_position_that_drifts_by_the_same_each_perio
     assert error(last(drifting, differenced=("y",))) < 1e-11
 
 
-def test_a_response_speaks_for_the_centre_of_its_window(record: Block) -> None:
+def test_the_effective_time_of_a_response_is_the_centre_of_its_window(record: Block) -> None:
     position = np.arange(len(record), dtype=float)
     block = Block(np.vstack([record.data, position]), ("w", "u", "y", "x"), RATE_HZ, start=800, origin_s=7.0)
     for window in (400, 401):
@@ -117,7 +117,7 @@ def test_a_response_speaks_for_the_centre_of_its_window(record: Block) -> None:
         assert r.time_s == pytest.approx(7.0 + (r.first + r.sample) / 2 / RATE_HZ)
 
 
-def test_an_average_speaks_for_the_mean_of_its_windows(record: Block) -> None:
+def test_the_effective_time_of_an_average_is_the_mean_of_its_windows(record: Block) -> None:
     block = Block(np.vstack([record.data, np.arange(1600.0)]), ("w", "u", "y", "x"), RATE_HZ)
     r = last(block, schedule="x", average=True, forgetting=1.0, hop=400)
     assert (r.first, r.sample) == (0, 1599)

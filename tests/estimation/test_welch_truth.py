@@ -42,7 +42,7 @@ def test_h1_is_biased_in_closed_loop() -> None:
     assert abs(joint - 1) < 0.02 < abs(h1 - 1)
 
 
-def test_a_chirp_offline() -> None:
+def test_welch_of_a_chirp_in_closed_loop_is_the_plant() -> None:
     t = np.arange(20_000) / RATE_HZ
     w = 2.0 * chirp(t, 5.0, t[-1], 250.0)
     u, y = TwoMassLoop().run(w, periods=1)
@@ -59,7 +59,7 @@ def test_a_chirp_offline() -> None:
     ("change", "code"),
     [({"window": 300_000}, "signal.too-short"), ({"overlap": 1.0}, "usage.out-of-range"), ({"output": "Y"}, "")],
 )
-def test_what_cannot_be_averaged(change: dict, code: str) -> None:
+def test_recordings_and_settings_without_a_welch_average_are_refused(change: dict, code: str) -> None:
     with pytest.raises(LivebodeError) as caught:
         welch(record(0.1), **({"input": "u", "output": "y", "window": 1000} | change))
     assert caught.value.code == code or not code

@@ -68,7 +68,7 @@ def level(switched: list[tuple[int, bool]]) -> np.ndarray:
     return np.array(levels)
 
 
-def test_it_is_brought_in_and_out_over_whole_periods_however_it_is_switched(tmp_path: Path) -> None:
+def test_the_excitation_is_ramped_up_and_down_over_whole_periods_whenever_it_is_switched(tmp_path: Path) -> None:
     compiled(tmp_path, EXCITATION, *OPTIONS)
     drive, rng = Drive(tmp_path), np.random.default_rng(7)
     switched = [(N - 1, False), (N + RAMP + 5 * N, True), (7, False), (2 * RAMP, False)]
@@ -99,7 +99,7 @@ def test_a_header_that_the_drive_cannot_play_does_not_compile(excitation, said: 
         compiled(tmp_path, made(*excitation), "-fsyntax-only")
 
 
-def test_it_compiles_with_what_the_refusals_ask_for(tmp_path: Path) -> None:
+def test_the_drive_compiles_with_the_values_that_its_refusals_name(tmp_path: Path) -> None:
     compiled(tmp_path, made(401, 4000, 0.5), "-DDRIVE_HOP=401", "-DDRIVE_LIMIT_N_M=1.0f", "-fsyntax-only")
 
 

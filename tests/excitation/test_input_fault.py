@@ -28,18 +28,18 @@ GOOD = np.tile(multisine(Lines.parse("20:140:20", 4000, 200)), 5)
         (np.random.default_rng(0).standard_normal(5000), SignalError, "not-periodic"),
     ],
 )
-def test_refused(excitation, kind, code):
+def test_recordings_without_a_periodic_excitation_are_refused(excitation, kind, code):
     with refused(kind, code):
         recognise(excitation, 1000)
 
 
 @pytest.mark.parametrize("rate_hz", [0, -1, np.nan, np.inf])
-def test_rate(rate_hz):
+def test_a_rate_out_of_range_is_refused(rate_hz):
     with refused(UsageError, "out-of-range", argument="rate_hz"):
         recognise(GOOD, rate_hz)
 
 
-def test_output():
+def test_an_output_of_another_length_or_without_signal_is_refused():
     with refused(UsageError, "wrong-shape", samples=999, excitation_samples=1000):
         recognise(GOOD, 4000, GOOD[:-1])
     with refused(SignalError, "channel-constant", role="output", value=0.0):
@@ -55,7 +55,7 @@ def test_output():
         ({"amplitude": np.nan}, "not-finite"),
     ],
 )
-def test_multisine(arguments, code):
+def test_multisines_out_of_range_are_refused(arguments, code):
     with refused(UsageError, code, argument=next(iter(arguments))):
         multisine(Lines.parse("20:140:20", 4000, 200), **arguments)
 

@@ -55,7 +55,7 @@ def test_a_held_prbs_has_the_spectrum_of_its_hold(held):
     width=st.floats(30, 900),
     sweep=st.sampled_from(["linear", "logarithmic"]),
 )
-def test_a_chirp_goes_on_at_its_border_without_a_leap(window, low, width, sweep):
+def test_a_repeated_chirp_is_continuous_at_its_border(window, low, width, sweep):
     rate_hz = 4000.0
     low = max(low, 2 * rate_hz / window)
     period = chirp(low, low + width, rate_hz, window, 2.0, sweep=sweep)
@@ -92,7 +92,7 @@ def test_a_stepped_sine_is_one_line_at_a_time_and_periodic_as_a_whole():
 
 @settings(max_examples=40, deadline=None)
 @given(window=st.integers(200, 4000), group=st.integers(2, 6), seed=st.integers(0, 99))
-def test_odd_lines_are_odd_with_one_of_each_group_quiet(window, group, seed):
+def test_odd_lines_are_odd_and_one_of_each_group_is_a_detection_line(window, group, seed):
     lines = odd_lines(200, 1500, 4000.0, window, group=group, seed=seed)
     assert all(k % 2 for k in lines.bins)
     first, last = lines.frequency_hz[[0, -1]]

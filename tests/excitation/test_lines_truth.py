@@ -17,7 +17,7 @@ def complex_noise(rng, shape):
 
 
 @pytest.mark.parametrize("periods", [2, 3, 5, 20])
-def test_false_alarms_over_all_bins(periods):
+def test_noise_gives_no_more_false_lines_than_the_stated_rate(periods):
     """At 5 % for all bins together, 2,000 noise-only recordings give 100 alarms; at most 150, five sigma, may."""
     rng = np.random.default_rng(periods)
     alarms = sum(significant(complex_noise(rng, (periods, 200)), 0.05).any() for _ in range(2000))
@@ -59,7 +59,7 @@ def test_rounding_of_single_precision_is_not_a_line():
     assert recognise(np.tile(PERIOD, 4).astype(np.float32), 2500).lines.bins == LINES.bins
 
 
-def test_the_floor_is_the_users():
+def test_a_specified_floor_decides_which_lines_count():
     lines = Lines((3, 10, 20), 100, 1000.0)
     x = np.tile(multisine(lines, [1.0, 1.0, 3e-4]), 10)
     assert recognise(x, 1000).lines.bins == (3, 10)
@@ -89,7 +89,7 @@ def test_snr_at_the_output_of_a_recording():
     assert np.median(found.snr_db) == pytest.approx(10 * np.log10(2500 / (4 * 0.25)), abs=0.5)
 
 
-def test_transient_at_the_output_alone():
+def test_a_transient_at_the_output_alone_is_found():
     rng = np.random.default_rng(2)
     x = np.tile(PERIOD, 12)
     y = x + 20 * np.exp(-np.arange(x.size) / 300) + 0.05 * rng.standard_normal(x.size)

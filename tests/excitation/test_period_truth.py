@@ -37,7 +37,9 @@ def test_the_fundamental_and_not_the_window_of_the_design(window):
     slope=st.floats(-5, 5),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_zoo_of_multisines_with_offset_and_drift(period, count, periods, snr_db, offset, slope, seed):
+def test_multisines_with_offset_and_drift_never_give_a_wrong_period(
+    period, count, periods, snr_db, offset, slope, seed
+):
     """From seven lines and 20 dB of SNR on: never a wrong period, and none is refused from three periods on.
 
     Derandomised, since it is a statement about chance. With three lines and two periods in noise another lag may fit
@@ -62,7 +64,7 @@ def test_zoo_of_multisines_with_offset_and_drift(period, count, periods, snr_db,
 @pytest.mark.parametrize(
     ("snr_db", "periods", "least"), [(40, 2, 95), (20, 3, 95), (10, 5, 95), (0, 10, 90), (0, 50, 99)]
 )
-def test_seven_lines_in_noise(snr_db, periods, least):
+def test_the_period_of_seven_lines_is_found_in_noise(snr_db, periods, least):
     """Out of 100 seeded recordings at least so many give 200 samples. At 0 dB ten periods hold 2,000 samples."""
     rng = np.random.default_rng(snr_db + periods)
     right = 0
@@ -84,7 +86,7 @@ def test_prbs_with_and_without_a_held_clock(order, hold):
 
 
 @pytest.mark.parametrize("period", [50, 200, 1000, 1002, 4999])
-def test_square_wave_and_its_odd_lines(period):
+def test_a_square_wave_has_its_period_and_odd_lines(period):
     high = period // 2
     x = np.resize(np.r_[np.full(high, 5.0), np.zeros(period - high)], 12 * period)
     found = recognise(x, 1000)
@@ -95,20 +97,20 @@ def test_square_wave_and_its_odd_lines(period):
         assert found.crest_factor == pytest.approx(1)
 
 
-def test_repeated_chirp():
+def test_the_period_of_a_repeated_chirp_is_found():
     chirp = signal.chirp(np.arange(4000) / 4000, 5, 1, 250)
     assert recognise(noisy(np.random.default_rng(0), np.tile(chirp, 4), 20), 4000).period == 4000
 
 
 @pytest.mark.parametrize("design", [5000, 1000, 4000])
-def test_one_sample_less_than_designed(design):
+def test_a_period_one_sample_shorter_than_designed_is_found(design):
     """A drive that drops a sample each period; at 10 dB and with a slow signal."""
     rng = np.random.default_rng(design)
     period = multisine(Lines(tuple(range(2, 40)), design, 1000.0), phases=rng.uniform(0, 6, 38))[:-1]
     assert recognise(noisy(rng, np.tile(period, 10), 10), 1000).period == design - 1
 
 
-def test_start_up_and_end():
+def test_the_period_is_found_between_silence_at_the_start_and_at_the_end():
     rng = np.random.default_rng(3)
     x = np.r_[np.zeros(7777), np.tile(SEVEN, 60), np.zeros(3333)]
     exact = recognise(x + 2.0, 4000)
@@ -120,7 +122,7 @@ def test_start_up_and_end():
     assert abs(rough.stop - 19777) <= 20
 
 
-def test_a_pause_is_outlying():
+def test_periods_with_a_pause_are_outliers():
     x = np.tile(SEVEN, 50)
     x[4000:5000] = 0.0
     found = recognise(noisy(np.random.default_rng(0), x, 30), 4000)
@@ -133,7 +135,7 @@ def stroke(samples, height):
 
 
 @pytest.mark.parametrize("height", [1, 30, 1000])
-def test_a_trajectory_far_larger_than_the_excitation(height):
+def test_the_period_is_found_under_a_trajectory_far_larger_than_the_excitation(height):
     rng = np.random.default_rng(height)
     x = np.tile(SEVEN, 100) + stroke(20000, height) + 0.1 * rng.standard_normal(20000)
     found = recognise(x, 4000)
@@ -142,7 +144,7 @@ def test_a_trajectory_far_larger_than_the_excitation(height):
     assert set(found.lines.bins) >= {3, 4, 5, 6, 7}
 
 
-def test_closed_loop_with_a_resonant_plant():
+def test_the_period_is_found_in_a_closed_loop_with_a_resonance():
     """The measured input of a loop, from rest: its transient takes many periods."""
     rng = np.random.default_rng(1)
     w = np.tile(SEVEN, 60)
@@ -156,7 +158,7 @@ def test_closed_loop_with_a_resonant_plant():
     assert found.outlying == ()
 
 
-def test_spikes_gaps_and_coarse_quantisation():
+def test_the_period_is_found_through_spikes_gaps_and_coarse_quantisation():
     x = np.tile(SEVEN, 100)
     spiky = noisy(np.random.default_rng(0), x, 40)
     spiky[[300, 5000, 9999]] += [1e6, -1e3, 50]
@@ -197,7 +199,7 @@ def test_no_period_is_claimed_where_there_is_none(kind):
     assert claimed <= 1
 
 
-def test_less_than_two_periods_is_said_so():
+def test_a_recording_shorter_than_two_periods_is_refused_with_its_period():
     """Dense multisines over 1.2 to 1.9 periods: refused, at least 45 of 50 with their true period in the sentence."""
     rng = np.random.default_rng(5)
     named = 0

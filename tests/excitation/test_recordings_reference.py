@@ -21,7 +21,7 @@ def bench():
 
 
 @pytest.mark.parametrize("channel", ["iq_refx", "iq_adx"])
-def test_motorbench(bench, channel):
+def test_the_period_and_lines_of_the_motor_bench_are_found(bench, channel):
     found = recognise(bench[channel].astype(float), 2500, bench["theta_mx"])
     assert (found.period, found.periods, found.start, found.stop) == (2500, 20, 0, 50000)
     assert found.lines.bins == tuple(range(11, 251))
@@ -33,7 +33,7 @@ def test_motorbench(bench, channel):
     assert np.all(found.snr_db > 10)
 
 
-def test_motorbench_reference_and_current(bench):
+def test_the_crest_factors_of_reference_and_current_of_the_motor_bench_are_known(bench):
     reference, current = recognise(bench["iq_refx"], 2500), recognise(bench["iq_adx"], 2500)
     assert reference.crest_factor == pytest.approx(1.39, abs=0.01)
     assert reference.distortion == ()
@@ -42,7 +42,7 @@ def test_motorbench_reference_and_current(bench):
     assert reference.outlying == (19,)  # its last sample is another
 
 
-def test_emps():
+def test_the_pulses_of_emps_are_found_in_input_and_response():
     pulses = loadmat(DATA / "emps/DATA_EMPS_PULSES.mat")
     plain = loadmat(DATA / "emps/DATA_EMPS.mat")
     found = recognise(pulses["pulses_N"].ravel(), 1000, (pulses["qm"] - plain["qm"]).ravel())
@@ -68,7 +68,7 @@ def prbs_records():
         yield np.frombuffer(out, ">f8").astype(float)
 
 
-def test_sinumerik():
+def test_the_prbs_of_a_spindle_is_found_in_both_directions():
     """One period in each direction: each alone is refused; the second with its sign turned is a second period."""
     first, second = (x for x in prbs_records() if np.unique(x).size == 2)
     for record in (first, second):

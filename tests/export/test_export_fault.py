@@ -48,7 +48,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (("--to", "csv", "--parameters"), "has no parameters: no model was fitted"),
     ],
 )
-def test_what_cannot_be(run: Path, tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
+def test_impossible_options_of_export_are_refused_in_one_sentence(
+    run: Path, tmp_path: Path, options: tuple[str, ...], sentence: str
+) -> None:
     done = livebode("export", run, *options, "--out", tmp_path / "a")
     assert (done.code, done.out) == (2, "")
     assert sentence in done.err
@@ -56,7 +58,7 @@ def test_what_cannot_be(run: Path, tmp_path: Path, options: tuple[str, ...], sen
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_run_and_no_file(run: Path, tmp_path: Path) -> None:
+def test_a_missing_run_and_an_unusable_output_path_are_reported(run: Path, tmp_path: Path) -> None:
     assert "is not the directory of a run" in livebode("export", tmp_path, "--to", "csv").err
     assert "is a directory" in livebode("export", run, "--to", "csv", "--out", tmp_path).err
     file = tmp_path / "file"
@@ -84,7 +86,7 @@ def test_a_damaged_table_leaves_nothing(run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("to", ["csv", "mat", "netcdf", "uff"])
-def test_a_disk_that_takes_no_more(run: Path, tmp_path: Path, to: str) -> None:
+def test_a_full_disk_is_reported_and_leaves_no_partial_file(run: Path, tmp_path: Path, to: str) -> None:
     # A limit on file size makes write() fail as a full disk does, only with another error number.
     command = [str(Path(sys.executable).with_name("livebode")), "export", str(run), "--to", to, "--out",
                str(tmp_path / "a")]  # fmt: skip
@@ -102,7 +104,7 @@ def test_a_disk_that_takes_no_more(run: Path, tmp_path: Path, to: str) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_disk_that_takes_no_more_of_one_function(tmp_path: Path) -> None:
+def test_a_full_disk_during_one_function_of_uff_is_reported(tmp_path: Path) -> None:
     lines = Lines(tuple(range(1, 900)), 2000, 4000.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9000, hard))
@@ -128,7 +130,9 @@ def test_the_end_of_the_program_is_no_fault_within_pyuff(tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_too_many_values_for_what_is_held_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_formats_held_in_memory_refuse_more_values_than_their_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("livebode.export.written.VALUES_MAX", 100)
     parts = [made(10, LINES), made(10, LINES)]
     for write, name in ((write_mat, "mat"), (write_netcdf, "netcdf")):
@@ -138,7 +142,7 @@ def test_too_many_values_for_what_is_held_at_once(tmp_path: Path, monkeypatch: p
         write(tmp_path / "a", parts)
 
 
-def test_nothing_to_export(tmp_path: Path) -> None:
+def test_a_run_without_responses_is_refused(tmp_path: Path) -> None:
     for write in (write_csv, write_mat, write_netcdf):
         with refused(RecordError, "no-responses"):
             write(tmp_path / "a", iter([]))
@@ -152,7 +156,7 @@ def test_nothing_to_export(tmp_path: Path) -> None:
         write_uff(tmp_path / "a", [invalid])
 
 
-def test_what_stood_there_still_stands_when_writing_fails(tmp_path: Path) -> None:
+def test_an_existing_file_is_unchanged_when_writing_fails(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("mine")
 

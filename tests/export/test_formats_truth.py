@@ -69,7 +69,9 @@ def test_csv_is_read_by_livebode_itself(tmp_path: Path) -> None:
 
 @SOME
 @given(any_responses())
-def test_xarray_and_netcdf(tmp_path_factory: pytest.TempPathFactory, responses: Responses) -> None:
+def test_netcdf_is_read_back_by_xarray_as_the_responses(
+    tmp_path_factory: pytest.TempPathFactory, responses: Responses
+) -> None:
     path = tmp_path_factory.mktemp("netcdf") / "a.nc"
     assert write_netcdf(path, cut(responses, 1), ABOUT).rows == len(responses)
     memory = to_xarray(responses, ABOUT)
@@ -158,7 +160,7 @@ def test_uff_is_evenly_spaced_where_that_is_exact(tmp_path: Path) -> None:
     assert spacing(Lines.parse("k=1:20", 4000, 2047)) == 0  # 1.95408 Hz apart to six digits
 
 
-def test_python_control_from_a_response_of_many() -> None:
+def test_one_response_of_many_converts_to_python_control() -> None:
     responses = made(30, LINES, hole=0.2)
     response = at([responses], responses.time_s[11])
     frd = response.to_control()
@@ -171,7 +173,7 @@ def test_python_control_from_a_response_of_many() -> None:
 
 @SOME
 @given(any_responses())
-def test_one_alone_is_that_one(responses: Responses) -> None:
+def test_a_single_response_equals_its_row(responses: Responses) -> None:
     for i, response in enumerate(responses):
         alone = Responses.of(response)
         for name in ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule"):

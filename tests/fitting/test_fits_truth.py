@@ -13,6 +13,7 @@ from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, Simulated
 from tests.support.axes import MULTISINE
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, Pendulum, noisy
+from tests.support.found import with_events
 from tests.support.motor_bench import bench_responses, motorbench
 
 FINE = Lines.parse("20:120:5", rate_hz=4000, window=800)
@@ -81,7 +82,7 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
     )
 
 
-def test_sigmas_that_are_far_too_small_are_made_good_by_epsilon() -> None:
+def test_epsilon_corrects_sigmas_that_are_far_too_small() -> None:
     """Noise of 3 % that is said to be 0.1 %: ε finds the 3 %, and the bounds hold."""
     found = Fitter(BELT).process(noisy(BELT.at(TRUTH, Grid.of(FINE)), FINE, 0.03, 400, reported=1 / 30))
     assert np.median(found.epsilon) == pytest.approx(0.03, rel=0.05)
@@ -102,14 +103,12 @@ def test_without_any_sigma_lines_weigh_by_their_size() -> None:
 def test_lines_that_do_not_show_the_mode_give_no_numbers_and_an_event() -> None:
     low = Lines.parse("2:10:1", rate_hz=4000, window=4000)
     fitter = Fitter(BELT)
-    found = fitter.process(noisy(BELT.at(TRUTH, Grid.of(low)), low, 0.02, 20))
+    found, (event, *_) = with_events(fitter.process, noisy(BELT.at(TRUTH, Grid.of(low)), low, 0.02, 20))
     assert not found.ok.any()
     assert np.isnan(found.value).all()
     assert np.isnan(found.bound()).all()
-    (event, *_) = fitter.drain_events()
     assert event.kind == "fit-failed"
     assert event.details["status"] in ("not seen", "bound hit", "not converged")
-    assert fitter.drain_events() == []
     assert np.isnan(fitter.derived(found).value).all()
 
 
@@ -132,7 +131,7 @@ def test_invalid_lines_are_left_out_and_too_few_are_no_response() -> None:
 
 
 @pytest.mark.parametrize("newtons", [15.0, 30.0])
-def test_friction_at_standstill_gives_no_numbers_and_none_without(newtons: float) -> None:
+def test_friction_at_standstill_is_rejected_and_a_machine_without_friction_is_fitted(newtons: float) -> None:
     words = {}
     for force in (0.0, newtons):
         axis = BeltAxis(
@@ -141,11 +140,10 @@ def test_friction_at_standstill_gives_no_numbers_and_none_without(newtons: float
         )  # fmt: skip
         settings = Settings(lines=LINES, output="velocity", input="u", excitation="w", hop=80, noise="quiet")
         tracked = Tracker(settings).process(SimulatedAxis(axis).run()[0])
-        fitter = Fitter(BELT)
-        found = fitter.process(tracked[60:])
+        found, events = with_events(Fitter(BELT).process, tracked[60:])
         words[force] = set(found.status)
         if force:
-            assert fitter.drain_events()[0].kind == "fit-failed"
+            assert events[0].kind == "fit-failed"
     assert words[0.0] == {"ok"}
     assert "ok" not in words[newtons]
     assert "friction" in words[newtons]
@@ -197,7 +195,7 @@ def bench() -> Response:
 
 
 @pytest.mark.parametrize("band_hz", [(11.0, 250.0), (20.0, 150.0), (30.0, 120.0)])
-def test_the_motor_bench_is_what_its_description_says(band_hz: tuple[float, float]) -> None:
+def test_the_motor_bench_has_the_parameters_of_its_description(band_hz: tuple[float, float]) -> None:
     found = fit(bench(), "two-mass-gain", output="position", band_hz=band_hz)
     print(f"{band_hz}: ε {found.epsilon:.3f}, {found.rows()}")
     assert found.status == "ok"

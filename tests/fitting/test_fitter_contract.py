@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
+from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
 from livebode.fitting import Fitter, Grid, TwoMass, fit, model_named
 from livebode.fitting.weighing import epsilon_for
 from tests.support.errors import refused
 from tests.support.fitted import LINES, TRUTH, noisy
+from tests.support.found import with_events
 
 BELT = TwoMass(radius_m=0.019)
 ROWS = 70
@@ -43,17 +44,17 @@ def same(one: Parameters, other: Parameters) -> None:
 @settings(max_examples=8, deadline=None)
 def test_any_way_of_cutting_gives_the_same(cuts: list[int], late_s: float) -> None:
     every = run(late_s)
-    whole = Fitter(BELT)
-    expected = whole.process(every)
+    expected, events = with_events(Fitter(BELT).process, every)
     edges = [0, *np.minimum(np.cumsum(cuts, dtype=int), ROWS).tolist(), ROWS]
     fitter = Fitter(BELT)
-    parts = [fitter.process(every[a:b]) for a, b in pairwise(edges)]
+    again: list[Event] = []
+    parts = [fitter.process(every[a:b], again.append) for a, b in pairwise(edges)]
     same(Parameters.join(parts), expected)
-    assert [e.kind for e in fitter.drain_events()] == [e.kind for e in whole.drain_events()]
+    assert [e.kind for e in again] == [e.kind for e in events]
 
 
 @pytest.mark.parametrize("late_s", [0.0, 4e-4])
-def test_a_resumed_fitter_equals_one_that_went_on(late_s: float) -> None:
+def test_a_restored_fitter_continues_with_the_same_bits(late_s: float) -> None:
     every = run(late_s)
     expected = Fitter(BELT).process(every)
     first = Fitter(BELT)
@@ -75,10 +76,8 @@ def test_a_delay_is_taken_by_every_row_that_shows_it_and_by_none_where_it_is_hel
     assert np.all(Fitter(BELT).process(run())["delay"][found.ok] == 0.0)
 
 
-def test_events_tell_where_fits_fail_and_hold_again() -> None:
-    fitter = Fitter(BELT)
-    fitter.process(run())
-    events = fitter.drain_events()
+def test_events_report_when_fits_are_rejected_and_valid_again() -> None:
+    _, events = with_events(Fitter(BELT).process, run())
     assert [e.kind for e in events][:3] == ["fit-resumed", "fit-failed", "fit-resumed"]
     assert [e.sample for e in events][:3] == [399, 20 * 30 + 399, 20 * 34 + 399]
     assert events[1].details == {"status": "no response"}
@@ -96,7 +95,7 @@ def test_events_tell_where_fits_fail_and_hold_again() -> None:
         ((BELT,), {"band_hz": (50.0, 90.0)}, (FitError, "too-few-lines", {"lines": 2, "parameters": 4})),
     ],
 )
-def test_what_cannot_be_is_refused(arguments: tuple, options: dict, error: tuple) -> None:
+def test_impossible_fits_are_refused(arguments: tuple, options: dict, error: tuple) -> None:
     kind, code, facts = error
     with refused(kind, code, **facts):
         Fitter(*arguments, **options).process(run())

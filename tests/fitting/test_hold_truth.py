@@ -133,7 +133,7 @@ def test_a_discrete_system_is_that_of_python_control_and_delays_by_poles_at_zero
     )
 
 
-def test_what_no_hold_samples_to_is_refused() -> None:
+def test_discrete_models_without_a_continuous_one_are_refused() -> None:
     with refused(FitError, "no-continuous-model", pole=pytest.approx(-0.5)):
         to_continuous([1.0], [1.0, 0.5], 100.0)
     with refused(FitError, "not-proper", numerator_degree=1, denominator_degree=1):
@@ -179,7 +179,7 @@ def test_modes_at_the_first_mass_give_the_chain_back(masses: list[float], spring
     assert np.allclose(spring, springs, rtol=1e-5)
 
 
-def test_what_follows_from_the_parameters() -> None:
+def test_derived_quantities_follow_from_the_parameters() -> None:
     model = TwoMass(radius_m=0.019)
     found = dict(zip(model.derived_names, model.derived(BELT)))
     js, load, keff, bs = BELT[:4] * [1, 0.019**2, 0.019**2, 0.019**2]

@@ -117,7 +117,7 @@ def test_sigma_is_that_of_the_formula_for_every_cut(responses: Responses, at: li
         assert found.sigma[line] == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
-def test_of_averages_the_newest_valid_one_is_given() -> None:
+def test_the_mean_of_averaged_responses_is_the_newest_valid_one() -> None:
     responses = made(40, LINES)
     responses.first[:] = 0
     responses.valid[-1] = False

@@ -65,7 +65,7 @@ def test_maximum_likelihood_scatters_least() -> None:
     assert spread["maximum likelihood"] < min(spread["levy"], spread["sanathanan-koerner"])
 
 
-def test_any_order_and_numerator_order() -> None:
+def test_every_order_and_numerator_order_is_fitted() -> None:
     poles = 0.9 * np.exp(1j * np.array([0.1, -0.1, 0.25, -0.25]))
     system = Rational(np.array([0.3, -0.2]), np.poly(poles).real, RATE_HZ)
     lines = Lines.parse("20:300:10", rate_hz=RATE_HZ, window=400)
@@ -78,13 +78,13 @@ def test_any_order_and_numerator_order() -> None:
         )
 
 
-def test_a_fit_of_too_low_an_order_says_so_by_epsilon() -> None:
+def test_a_fit_of_too_low_an_order_has_a_large_epsilon() -> None:
     found = fit_rational(noisy(held(), LINES, 1e-3, 1), order=1, method="maximum likelihood")
     assert found.epsilon[0] > 0.1
     assert found.chi2[0] > 100 * found.dof[0]
 
 
-def test_what_cannot_be_is_refused_and_what_is_missing_is_no_response() -> None:
+def test_impossible_orders_are_refused_and_lines_without_a_response_are_left_out() -> None:
     good = noisy(held(), LINES, 1e-3, 2)
     for argument, options in (
         ("order", {"order": 0}),
@@ -103,6 +103,6 @@ def test_what_cannot_be_is_refused_and_what_is_missing_is_no_response() -> None:
     assert np.isnan(found.value[0]).all()
 
 
-def test_a_hold_is_known_both_ways() -> None:
+def test_a_discrete_model_has_the_response_of_the_held_continuous_one() -> None:
     grid = Grid.of(LINES)
     assert np.allclose(Rational(B, A, RATE_HZ).response(LINES.frequency_hz), BELT.at(TRUTH, grid), rtol=1e-8)

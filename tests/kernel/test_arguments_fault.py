@@ -37,7 +37,7 @@ from livebode.kernel import SlidingDFT
         ({"damping": "x", "variant": "damped"}, "is not a number between 0 and 1"),
     ],
 )
-def test_constructor(arguments, sentence):
+def test_bad_arguments_of_the_constructor_are_refused(arguments, sentence):
     with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
         SlidingDFT(**{"window": 8, "bins": [1, 2], **arguments})
     assert sentence in str(caught.value)
@@ -68,7 +68,7 @@ def test_integral_floats_count_as_integers():
         (1, b"12345678", "which is not real"),
     ],
 )
-def test_samples(channels, x, sentence):
+def test_bad_samples_are_refused(channels, x, sentence):
     dft = SlidingDFT(8, [1], channels)
     for call in (dft.process, dft.advance):
         with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
@@ -88,7 +88,7 @@ def test_samples(channels, x, sentence):
         (1, 1j, "which is not real"),
     ],
 )
-def test_pushed_samples(channels, x, sentence):
+def test_bad_pushed_samples_are_refused(channels, x, sentence):
     dft = SlidingDFT(8, [1], channels)
     with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
         dft.push(x)
@@ -97,7 +97,7 @@ def test_pushed_samples(channels, x, sentence):
 
 
 @pytest.mark.parametrize("hop", [0, -1, 1.5, "2", None, True, -(2**70)])
-def test_hop(hop):
+def test_a_bad_hop_is_refused(hop):
     with pytest.raises(ValueError, match="is not an integer ≥ 1"):
         SlidingDFT(8, [1]).process(np.zeros(4), hop)
 
@@ -116,7 +116,7 @@ def test_hop_may_be_larger_than_the_block_and_any_kind_of_integer():
 
 
 @pytest.mark.parametrize("phase", ["windows", "", None, 1])
-def test_phase(phase):
+def test_an_unknown_phase_is_refused(phase):
     dft = SlidingDFT(8, [1])
     with pytest.raises(ValueError, match="is neither 'window' nor 'fixed'"):
         dft.process(np.zeros(4), phase=phase)
@@ -146,7 +146,7 @@ def _read_only() -> np.ndarray:
         ([[0j, 0j]] * 4, "it is a list"),
     ],
 )
-def test_out(out, sentence):
+def test_a_bad_output_array_is_refused(out, sentence):
     dft = SlidingDFT(8, [1, 2])
     with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
         dft.process(np.ones(4), out=out)
@@ -154,7 +154,7 @@ def test_out(out, sentence):
     assert dft.count == 0
 
 
-def test_out_apart_from_the_input():
+def test_an_output_array_that_shares_memory_with_the_input_is_refused():
     memory = np.zeros(64)
     with pytest.raises(ValueError, match="shares memory with x"):
         SlidingDFT(8, [1]).process(memory[6:10], out=memory[:8].view(complex).reshape(4, 1))

@@ -24,7 +24,7 @@ def test_attributes_are_read_only():
 
 
 @pytest.mark.parametrize(("dtype", "result"), [("float64", np.complex128), ("float32", np.complex64)])
-def test_shapes_and_types(dtype, result):
+def test_outputs_have_the_shape_and_type_of_the_configuration(dtype, result):
     one, two = SlidingDFT(10, [1, 2, 3], dtype=dtype), SlidingDFT(10, [1, 2, 3], 2, dtype)
     assert one.process(np.zeros(25), 10).shape == (2, 3)
     assert one.process(np.zeros((1, 25)), 10).shape == (1, 3, 3)
@@ -64,7 +64,7 @@ def test_lists_strided_reversed_and_swapped_input():
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
-def test_every_form_of_a_pushed_sample(dtype):
+def test_every_form_of_a_pushed_sample_is_accepted(dtype):
     forms = [(1.5, 2.0), [1.5, 2.0], np.array([1.5, 2.0]), np.array([1.5, 2.0], "f4"), (np.float32(1.5), 2)]
     for form in forms:
         dft = SlidingDFT(1, [0], 2, dtype)
@@ -76,7 +76,7 @@ def test_every_form_of_a_pushed_sample(dtype):
         assert dft.spectrum().tolist() == [2.0]
 
 
-def test_many_channels_in_one_push():
+def test_one_push_takes_many_channels():
     dft = SlidingDFT(1, [0], 20)
     dft.push([float(i) for i in range(20)])
     assert dft.spectrum()[:, 0].tolist() == list(range(20))

@@ -86,7 +86,7 @@ def test_instruction_sets_give_the_same_bits_and_snapshots(configuration, hop, r
     assert all(result == results[0] for result in results)
 
 
-def test_reset_is_as_new():
+def test_a_reset_kernel_equals_a_new_one():
     dft = SlidingDFT(50, [1, 2], 2)
     fresh = dft.snapshot()
     dft.advance(np.ones((2, 333)))

@@ -26,7 +26,7 @@ def test_bad_sample_is_gone_in_less_than_two_windows(window, bad, dtype):
         assert np.isfinite(got[: 2 * window + place]).all()
 
 
-def test_rows_of_an_unhealed_window_say_so():
+def test_rows_of_a_window_with_nan_are_nan():
     x = np.ones(100)
     x[30] = np.nan
     rows = SlidingDFT(20, [0, 3]).process(x)

@@ -28,12 +28,12 @@ def advanced(**changes) -> SlidingDFT:
         {"variant": "damped"},
     ],
 )
-def test_of_another_configuration(changes):
+def test_a_snapshot_of_another_configuration_is_refused(changes):
     with pytest.raises(ValueError, match="the snapshot is of another window, bins, channels, dtype or variant"):
         advanced().restore(advanced(**changes).snapshot())
 
 
-def test_of_another_damping():
+def test_a_snapshot_of_another_damping_is_refused():
     one, other = (advanced(variant="damped", damping=r) for r in (0.9, 0.8))
     with pytest.raises(ValueError, match="another window"):
         one.restore(other.snapshot())
@@ -61,7 +61,7 @@ def test_every_cut_and_every_addition_is_found():
     assert dft.snapshot() == whole
 
 
-def test_what_is_not_bytes():
+def test_a_snapshot_that_is_not_bytes_is_refused():
     for thing in ("text", None, 3, [1, 2]):
         with pytest.raises(TypeError):
             advanced().restore(thing)

@@ -100,7 +100,7 @@ def test_ratios_of_channels_do_not_depend_on_the_phase():
     assert np.allclose(window[1] / window[0], fixed[1] / fixed[0], rtol=1e-12)
 
 
-def test_is_linear():
+def test_spectra_of_a_sum_are_the_sum_of_the_spectra():
     rng = np.random.default_rng(3)
     a, b = rng.standard_normal((2, 500))
 

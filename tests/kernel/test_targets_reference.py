@@ -81,7 +81,7 @@ def test_the_drives_sizes_with_offsets(target):
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_every_variant(target, variant):
+def test_every_variant_has_the_bits_of_the_host(target, variant):
     jobs = [
         Job(noise(compact, 130), 40, (1, 2, 7, 8), 3, phase, variant, compact=compact)
         for phase in ("window", "fixed")
@@ -103,7 +103,7 @@ def test_a_nan_heals_on_the_target(target):
         assert finite[71 + 2 * 50 :].all()
 
 
-def test_it_goes_on_from_the_hosts_snapshot(target):
+def test_the_target_continues_from_the_snapshot_of_the_host(target):
     jobs = [
         Job(noise(5, 230), 100, (3, 4, 9), 7, compact=compact, before=noise(4, before))
         for compact in (False, True)
@@ -112,7 +112,7 @@ def test_it_goes_on_from_the_hosts_snapshot(target):
     assert len(list(check(target, jobs))) == 14
 
 
-def test_a_real_recording(target):
+def test_a_real_recording_gives_the_bits_of_the_host(target):
     """Two periods and a bit of the motor bench, its position drifting: windows of 2,500 samples, 40 lines."""
     log = open_log(recording("motorbench/MultisineTypeA.mat"))
     samples = next(iter(log.blocks(["iq_adx", "theta_mx"]))).data[:, :5600].T

@@ -117,7 +117,7 @@ def test_rows_without_a_fit_and_unstable_ones_hold_no_numbers() -> None:
     assert np.isnan(found.value).all()
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_impossible_loops_and_bands_are_refused() -> None:
     with refused(FitError, "loop-unknown"):
         OpenLoop(MODEL, Loop(), 4000.0)
     with refused(UsageError, "out-of-range", argument="band_hz", value=[140.0, 20.0]):

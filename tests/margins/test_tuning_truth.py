@@ -73,7 +73,7 @@ def test_a_notch_for_all_positions_is_wider_than_for_one() -> None:
     assert of_one["to_hz"] / of_one["from_hz"] < 1.05
 
 
-def test_a_tame_loop_needs_none_and_what_is_not_known_is_not_tuned() -> None:
+def test_a_stable_loop_needs_no_filter_and_an_uncertain_one_gets_none() -> None:
     assert tuning(FITS, Case(BELT).open, BAND_HZ).verdict == "none needed"
     close = Case(BELT, gain=3 * 0.2308, delay_ticks=8).open
     vague = tuning(parameters(BELTS, 900 * COVARIANCE), close, BAND_HZ)
@@ -93,7 +93,7 @@ def test_a_model_without_a_resonance_has_nothing_to_filter() -> None:
     assert "no resonance" in tuning(fits, loop, BAND_HZ).sentence
 
 
-def test_bad_wishes_are_refused() -> None:
+def test_impossible_specifications_are_refused() -> None:
     with refused(UsageError, "out-of-range", argument="peak_sensitivity", value=1.0):
         tuning(FITS, Case(BELT).open, BAND_HZ, peak_sensitivity=1.0)
     with refused(UsageError, "out-of-range", argument="frequency_hz", value=3000.0, rate_hz=RATE_HZ):

@@ -21,7 +21,7 @@ def test_uplot_is_as_it_was_published() -> None:
     assert re.search(r"uPlot 1\.\d+\.\d+", words)
 
 
-def test_ours_have_checked_types_and_import_only_what_is_here() -> None:
+def test_scripts_of_the_page_are_type_checked_and_import_only_local_files() -> None:
     for file in (HERE / "static").glob("*.js"):
         text = file.read_text(encoding="utf-8")
         assert text.startswith("// @ts-check\n"), file.name

@@ -17,8 +17,11 @@ PROGRAMS = {"bench", "examples", "studies"}
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Dotted names of the modules that a file imports, and of what it imports from them."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    """Dotted names of the modules of this repository's other folders that a file imports, and of what it imports."""
+    text = path.read_text()
+    if not re.search(r"^ *(from|import) (tests|bench|examples|studies)\b", text, re.M):
+        return
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

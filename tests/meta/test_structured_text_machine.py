@@ -47,7 +47,7 @@ def ran(body: str, variables: str = VARIABLES, more: str = "", **given: object):
         ("t[1, 2] := 5.0; A := T[1, 2];", "a", 5.0),
     ],
 )
-def test_it_computes(body: str, name: str, value: object) -> None:
+def test_expressions_are_computed_as_on_a_controller(body: str, name: str, value: object) -> None:
     assert ran(body)[name] == value
 
 
@@ -80,7 +80,7 @@ def test_it_computes(body: str, name: str, value: object) -> None:
         ("yes := (n > 0) AND (t[0, n + 5] > 0.0);", "subscript 5"),
     ],
 )
-def test_it_refuses(body: str, said: str) -> None:
+def test_code_that_controllers_run_differently_is_refused(body: str, said: str) -> None:
     with pytest.raises(RefusedError, match=said):
         ran(body)
 

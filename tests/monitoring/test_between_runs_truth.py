@@ -76,7 +76,7 @@ def test_too_few_runs_or_stretches_show_no_direction(runs: int, count: int) -> N
 
 
 @pytest.mark.parametrize(("between", "within"), [(2, 10), (4, 70)])
-def test_a_direction_chosen_by_the_noise_is_not_less_likely_than_its_bound_says(between: int, within: int) -> None:
+def test_a_direction_chosen_by_the_noise_exceeds_its_bound_no_more_often_than_stated(between: int, within: int) -> None:
     """5,000 pairs of Wishart matrices without a difference; the bound of the fraction is four standard deviations."""
     generator, draws, level = np.random.default_rng(5), 5000, 0.01
     among, noise = (generator.standard_normal((draws, degrees, 4)) for degrees in (between, within))
@@ -90,7 +90,7 @@ def test_a_direction_chosen_by_the_noise_is_not_less_likely_than_its_bound_says(
     )
 
 
-def test_projected_evidence_knows_nothing_of_the_offset_and_the_rest_of_the_others() -> None:
+def test_projected_evidence_is_independent_of_the_offset() -> None:
     seen = windows(np.random.default_rng(3), np.array([0.02, 0.0, 0.0, 0.03]), 2000)
     between = BetweenRuns(np.array([0.005, 0.0, 0.0, 0.0]), 1.0)
     score, information = between.projected(seen.score, seen.information, SMALLEST)
@@ -158,7 +158,7 @@ def test_a_chart_of_a_cell_that_the_cart_has_left_does_not_keep_the_offset_from_
 
 
 @pytest.mark.parametrize(("information", "reports"), [(0.1, 1), (1.0, 0)])
-def test_an_offset_that_the_windows_never_tell_well_enough_is_reported_once(information: float, reports: int) -> None:
+def test_an_offset_that_remains_uncertain_is_reported_once(information: float, reports: int) -> None:
     """600 windows, each with so much information on a smallest change: 0.16 of it would tell a tenth at last."""
     generator, detector = np.random.default_rng(6), MachineDetector(without_sensor(), 24.0)
     known, root = np.diag(information / SMALLEST**2), np.sqrt(information) / SMALLEST

@@ -155,5 +155,5 @@ def test_a_slope_from_runs_with_offsets_is_as_uncertain_as_the_offsets_make_it()
     assert np.mean(told) == pytest.approx(np.std(slopes), rel=0.3)
 
 
-def test_what_varies_within_a_single_run_is_cut_into_parts() -> None:
+def test_a_single_run_is_cut_into_five_parts() -> None:
     assert [part.size for part in parts_of([50])] == [10] * 5

@@ -37,7 +37,7 @@ def events_of(monitor: Monitor, tracker: Tracker, parts: list[Block]) -> list[tu
 
 
 @pytest.mark.parametrize("by_model", [True, False], ids=["model", "tables"])
-def test_cuts_and_snapshots_change_nothing(by_model: bool) -> None:
+def test_events_do_not_depend_on_cuts_or_snapshots(by_model: bool) -> None:
     block, learned = recorded((0.3, 0.3, 0.3), FAULT, seed=41), baseline(by_model)
     whole = events_of(Monitor(learned, SETTINGS), Tracker(SETTINGS), [block])
     assert [kind for kind, _, _ in whole] == ["change"]
@@ -85,7 +85,7 @@ def test_a_baseline_of_other_runs_is_refused() -> None:
         Monitor(learned, SETTINGS, "now and then")
 
 
-def test_nothing_judged_is_said() -> None:
+def test_a_run_without_a_judged_window_is_reported() -> None:
     monitor = Monitor(baseline(True), SETTINGS)
     assert monitor.finish() == []
     assert "Nothing of the run could be judged" in monitor.summary()["message"]

@@ -26,7 +26,7 @@ DAY_S = 86400.0
         ("86400", DAY_S),
     ],
 )
-def test_words_that_are_read(words: str, seconds: float) -> None:
+def test_rates_in_words_are_read_as_seconds_between_alarms(words: str, seconds: float) -> None:
     assert seconds_between(words) == pytest.approx(seconds)
 
 

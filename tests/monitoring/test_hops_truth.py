@@ -57,7 +57,7 @@ def test_no_hop_and_no_beginning_makes_a_healthy_machine_another(learned: int) -
             assert told(baseline(learned), later, hop) == [], (seed, hop, begin)
 
 
-def test_the_same_change_is_told_at_every_hop() -> None:
+def test_the_same_change_is_detected_at_every_hop() -> None:
     """Loss of 5 % at 10 s, at the latest two strokes later; the windows that are judged are the same ones."""
     block = recorded(4, JUDGED_S, TensionLoss(start_s=10.0, loss=0.05))
     first, *others = (told(baseline(20), block, hop) for hop in (20, 50, 100, 200, 400))

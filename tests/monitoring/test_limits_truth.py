@@ -43,7 +43,7 @@ def test_one_speed_and_one_way_fake_no_stiffness_on_the_way_back() -> None:
         assert monitor.detector.judged > 80
 
 
-def test_a_slow_drift_with_temperature_is_told() -> None:
+def test_a_slow_drift_with_temperature_is_detected() -> None:
     """1.5 % of stiffness in four minutes: a change like another, told before it is one percent."""
     drift = TensionLoss(loss=0.015, ramp_s=240.0)
     monitor = watcher()

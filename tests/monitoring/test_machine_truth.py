@@ -41,7 +41,7 @@ def test_a_change_is_found_named_and_sized(fault: object, what: str, percent: fl
 
 
 @pytest.mark.parametrize("ends", [BACK, BACK[::-1]], ids=["back", "there"])
-def test_a_soft_spot_is_placed_and_stands(ends: tuple[float, float]) -> None:
+def test_a_soft_spot_is_located_and_its_alarm_remains_active(ends: tuple[float, float]) -> None:
     spot = SoftSpot(position_m=1.1, width_m=0.0777, loss=0.1)
     events = watcher().process(recorded((0.3, 0.35, 0.2), spot, seed=4, ends=ends))
     assert told(events) == [("change", "stiffness")]
@@ -56,7 +56,7 @@ def test_a_ramp_is_found_early() -> None:
     assert events[0].time_s < 40.0
 
 
-def test_it_clears_and_does_not_flicker() -> None:
+def test_an_alarm_clears_once_when_the_load_is_removed() -> None:
     """A load that is picked up and put down again: one alarm, one that it has gone."""
     load = LoadChange(start_s=5.0, load_kg=0.1), LoadChange(start_s=20.0, load_kg=-0.1)
     events = watcher().process(recorded((0.3,) * 8, *load, seed=6))
@@ -85,7 +85,7 @@ def test_noise_and_excitation_are_no_change() -> None:
     assert told(watcher().process(loud)) == []
 
 
-def test_what_was_not_learned_is_not_judged_and_said_once() -> None:
+def test_speeds_and_positions_that_were_not_learned_are_not_judged_and_reported_once() -> None:
     fast = watcher()
     assert told(fast.process(recorded((1.2, 1.2), seed=9))) == [("baseline-unknown", "fast")]
     assert fast.detector.judged < 10  # at the ends of the strokes
@@ -125,7 +125,7 @@ def test_false_alarms_are_rarer_than_asked_for() -> None:
     assert alarms <= windows / windows_between
 
 
-def test_another_machine_is_told_as_one() -> None:
+def test_another_machine_is_reported_as_such() -> None:
     """79 % more inertia and mass: no single change is named for it, and an amount that is told covers the truth."""
     truth, healthy = {"inertia": 0.005, "load": 12.0}, Mechanics()
     percent = {
@@ -144,7 +144,7 @@ def test_another_machine_is_told_as_one() -> None:
         assert abs(details["amount_percent"] - percent[details["what"]]) < details["bound_percent"]
 
 
-def test_two_changes_at_once_are_told_together() -> None:
+def test_two_changes_at_once_are_reported_together() -> None:
     """The first name takes the second's part, and is corrected once that has a name too."""
     faults = TensionLoss(start_s=6.0, loss=0.04), LoadChange(start_s=6.0, load_kg=0.335)
     truth, monitor = {"stiffness": -4.0, "load": 5.0}, watcher()

@@ -35,7 +35,7 @@ def test_noise_and_what_a_model_misses_at_a_line_are_no_orders() -> None:
     assert spectrum({}, line_hz=60.0).found().size == 0
 
 
-def test_the_shaft_swings_as_the_velocity_says() -> None:
+def test_the_angle_of_the_shaft_is_the_integral_of_the_velocity() -> None:
     """The cart's position is smooth; the shaft's own swing of 5 mrad at 60 Hz is in the velocity alone."""
     time_s = np.arange(4000) / RATE_HZ
     swing = 5e-3 * np.sin(2 * np.pi * 60 * time_s)
@@ -60,7 +60,7 @@ def test_allowing_for_a_ripple_is_generalised_least_squares() -> None:
     assert information[0] == pytest.approx(s.T @ inverse @ s)
 
 
-def test_the_size_of_each_order_and_the_noise_below_it_are_told_apart() -> None:
+def test_the_amplitude_of_each_order_is_separated_from_the_noise() -> None:
     """Two orders whose windows resemble each other, of which one is not there; the noise at a line that they hit."""
     generator, windows = np.random.default_rng(3), 2000
     psi = generator.standard_normal((windows, 14, 4))

@@ -36,7 +36,7 @@ def monitor(what: str = "lines", asked: str = "one in 30 days of motion") -> Tab
     return TableMonitor(table, seconds_between(asked), 0.1)
 
 
-def test_what_is_learned_is_what_was_made() -> None:
+def test_the_learned_table_has_the_mean_and_variance_of_the_data() -> None:
     table = learn_table("lines", NAMES, [made(6000, 1)])
     cell, known = table.place(made(6000, 2))
     assert known[1:].mean() > 0.99
@@ -46,7 +46,7 @@ def test_what_is_learned_is_what_was_made() -> None:
     assert table.accuracy.inflation.max() < 1.2
 
 
-def test_healthy_rows_raise_nothing() -> None:
+def test_healthy_rows_raise_no_alarm() -> None:
     watcher = monitor()
     assert watcher.process(made(20000, 3)) == []
     assert watcher.judged > 19000
@@ -90,7 +90,7 @@ def test_an_amount_is_right_while_the_step_is_in_the_rows_own_scatter() -> None:
     assert covered >= 24
 
 
-def test_a_large_change_of_magnitude_and_phase_is_told_as_such() -> None:
+def test_a_large_change_is_reported_in_magnitude_and_phase() -> None:
     factor = np.ones((300, 3), dtype=complex)
     factor[100:, 0] = 1.5 * np.exp(0.7j)
     events = monitor().process(made(300, 40, factor=factor))
@@ -103,7 +103,7 @@ def test_louder_noise_is_no_change() -> None:
     assert monitor().process(made(5000, 5, louder=4.0)) == []
 
 
-def test_a_place_that_was_not_learned_is_said_once() -> None:
+def test_a_position_that_was_not_learned_is_reported_once() -> None:
     rows = made(600, 6)
     beyond = Rows(**(vars(rows) | {"schedule": rows.schedule + 0.7}))
     watcher = monitor()
@@ -125,7 +125,7 @@ def test_windows_that_hang_together_are_allowed_for() -> None:
     assert TableMonitor(table, seconds_between("one in 30 days of motion"), 0.1).process(slow(8)) == []
 
 
-def test_what_a_short_baseline_is_off_by_is_no_change() -> None:
+def test_the_error_of_a_short_baseline_raises_no_alarm() -> None:
     """Sixty baselines from forty windows of one place, each judged for 1,500: no alarm.
 
     One alarm in 30 days is asked for, and 2.5 hours are judged. A mean that is off by up to three of its standard
@@ -173,7 +173,7 @@ def test_a_change_is_found_as_soon_as_information_allows() -> None:
     assert steps < 2 * charts.threshold / 0.5
 
 
-def test_too_little_is_refused() -> None:
+def test_too_few_windows_to_learn_are_refused() -> None:
     with refused(BaselineError, "too-few-windows", quantity="lines"):
         learn_table("lines", NAMES, [made(20, 11)])
     with refused(BaselineError, "too-few-windows", windows=0):

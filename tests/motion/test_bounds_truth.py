@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from livebode import MotionCorrection, Responses, Tracker
-from livebode.core import Block
+from livebode.core import Block, Event
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Standstill, Strokes
 from tests.support.axes import MULTISINE
 from tests.support.moving import SETTINGS, axis, corrected, truth_at
@@ -24,7 +24,7 @@ def hits(run: BeltAxis, found: Responses) -> np.ndarray:
 
 
 @pytest.mark.parametrize("speed_m_per_s", [0.1, 0.2, 0.38])
-def test_coverage_over_strokes(speed_m_per_s: float) -> None:
+def test_bounds_cover_the_truth_over_strokes_as_often_as_stated(speed_m_per_s: float) -> None:
     each = []
     for seed in range(3):
         run = axis(0.1, strokes=2, seed=seed, motion=Strokes(speed_m_per_s=speed_m_per_s))
@@ -59,8 +59,8 @@ def standing(friction_n: float) -> tuple[BeltAxis, Block]:
 def test_standstill_is_invalid_where_dry_friction_holds_and_only_there(friction_n: float) -> None:
     run, block = standing(friction_n)
     correction = MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=run.motion.cycle(4000)[0].size // 2)
-    found = Responses.join([correction.process(block), correction.finish()])
-    events = correction.drain_events()
+    events: list[Event] = []
+    found = Responses.join([correction.process(block, events.append), correction.finish(events.append)])
     speed = np.abs(run.motion.cycle(4000)[1])[np.arange(len(block)) % run.motion.cycle(4000)[1].size]
     moved = np.concatenate([[0], np.cumsum(speed > 0.19)])
     share = (moved[found.sample + 1] - moved[np.maximum(found.first, 0)]) / 400  # of a window, spent in motion
@@ -90,6 +90,7 @@ def test_a_machine_that_never_moves_is_not_judged() -> None:
     run = BeltAxis(motion=Standstill(position_m=0.8), excitation_n_m=MULTISINE, seconds=1.5)
     block = SimulatedAxis(run).run()[0]
     correction = MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=4000)
-    found = Responses.join([correction.process(block), correction.finish()])
+    events: list[Event] = []
+    found = Responses.join([correction.process(block, events.append), correction.finish(events.append)])
     assert found.valid[found.sample >= 399].all()
-    assert not correction.drain_events()
+    assert events == []

@@ -45,7 +45,7 @@ def test_without_noise_motion_is_removed() -> None:
     ],
     ids=["plain", "friction and encoder", "backward"],
 )
-def test_with_noise_parameters_of_single_windows(options: dict[str, object]) -> None:
+def test_parameters_of_single_windows_are_within_the_targets_with_noise(options: dict[str, object]) -> None:
     axis, block = stroke(0.1, **options)
     found = errors(axis, corrected(axis, block))
     assert found.db < 0.18  # white noise alone makes 0.15
@@ -106,7 +106,7 @@ def test_a_gap_and_a_bad_sample_cost_their_windows_alone() -> None:
     assert errors(axis, Responses.join([responses[int(i) : int(i) + 1] for i in rows])).db < 0.1
 
 
-def test_standstill_and_too_little_to_fit() -> None:
+def test_at_standstill_the_response_is_the_plant_and_too_few_samples_give_none() -> None:
     axis = BeltAxis(excitation_n_m=MULTISINE, seconds=1.5)
     block, truth = SimulatedAxis(axis).run()
     correction = MotionCorrection(SETTINGS, radius_m=0.019)
@@ -117,7 +117,7 @@ def test_standstill_and_too_little_to_fit() -> None:
     assert not correction.finish().valid.any()
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_impossible_corrections_are_refused() -> None:
     def settings(**options: object) -> Settings:
         return Settings(**{"lines": LINES, "output": "y", "input": "u", "excitation": "w", "schedule": "x"} | options)
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode import Lines, LivebodeError, MotionCorrection, Responses, Settings, Tracker, multisine
-from livebode.core import Block
+from livebode.core import Block, Event
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes
 from tests.support.responses import assert_same
 
@@ -48,15 +48,17 @@ def new(**options: object) -> MotionCorrection:
     return MotionCorrection(SETTINGS, **({"radius_m": 0.019, "chunk_samples": CHUNK} | options))
 
 
-def finished(correction: MotionCorrection, blocks: list[Block]) -> Responses:
-    return Responses.join([*(correction.process(b) for b in blocks), correction.finish()])
+def finished(correction: MotionCorrection, blocks: list[Block]) -> tuple[Responses, list[Event]]:
+    events: list[Event] = []
+    parts = [correction.process(b, events.append) for b in blocks]
+    parts.append(correction.finish(events.append))
+    return Responses.join(parts), sorted(events, key=lambda event: event.sample)
 
 
 @cache
-def whole(jump: int) -> tuple[Responses, list[object], dict[str, int]]:
+def whole(jump: int) -> tuple[Responses, list[Event], dict[str, int]]:
     correction = new()
-    responses = finished(correction, pieces([], jump))
-    return responses, correction.drain_events(), correction.counts
+    return *finished(correction, pieces([], jump)), correction.counts
 
 
 cuts = st.lists(st.integers(1, len(record()) - 1), max_size=10)
@@ -67,8 +69,9 @@ cuts = st.lists(st.integers(1, len(record()) - 1), max_size=10)
 def test_any_cut_gives_the_same_bits(at: list[int], jump: int) -> None:
     correction = new()
     responses, events, counts = whole(jump)
-    assert_same(finished(correction, pieces(at, jump)), responses)
-    assert correction.drain_events() == events
+    found, again = finished(correction, pieces(at, jump))
+    assert_same(found, responses)
+    assert again == events
     assert correction.counts == counts
     kinds = {event.kind for event in events}
     assert kinds == {"held", "non-finite", "implausible"} | ({"gap"} if jump else set())
@@ -76,17 +79,15 @@ def test_any_cut_gives_the_same_bits(at: list[int], jump: int) -> None:
 
 @settings(max_examples=5, deadline=None)
 @given(at=cuts, jump=st.sampled_from([0, 23]))
-def test_a_restored_correction_goes_on_with_the_same_bits(at: list[int], jump: int) -> None:
+def test_a_restored_correction_continues_with_the_same_bits(at: list[int], jump: int) -> None:
     correction, parts, events = new(), [], []
     for block in pieces(at, jump):
-        parts.append(correction.process(block))
-        events += correction.drain_events()
+        parts.append(correction.process(block, events.append))
         snapshot = correction.snapshot()
         correction = new()
         correction.restore(snapshot)
         assert correction.snapshot() == snapshot
-    parts.append(correction.finish())
-    events += correction.drain_events()
+    parts.append(correction.finish(events.append))
     responses, expected, counts = whole(jump)
     assert_same(Responses.join(parts), responses)
     assert sorted(events, key=lambda event: event.sample) == expected

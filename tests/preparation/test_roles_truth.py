@@ -72,7 +72,7 @@ def test_right_roles_are_not_suspected(machine: str) -> None:
     ],
     ids=["exchanged", "a position as excitation", "ten times the gain", "a tenth of the gain"],
 )
-def test_wrong_roles_are_certain(machine: str, wrong: dict, words: str) -> None:
+def test_wrong_roles_are_certainly_detected(machine: str, wrong: dict, words: str) -> None:
     found = suspected(recorded(machine), **RIGHT | wrong)
     assert any(one.certain and words in one.message for one in found), found
 
@@ -137,7 +137,7 @@ def test_wrong_roles_end_with_2(tmp_path: Path, arguments: tuple, words: str) ->
     assert not (tmp_path / "run").exists()
 
 
-def test_accepted_roles_run_and_the_record_says_what_was_suspected(tmp_path: Path) -> None:
+def test_accepted_roles_run_and_the_record_contains_the_suspicion(tmp_path: Path) -> None:
     columns = signals(samples=4000)
     columns["copy"] = columns["w"]
     arguments = ("--excitation", "w", "--input", "u", "--output", "copy", "--accept-roles")
@@ -186,7 +186,7 @@ def test_a_real_spindle_in_its_right_roles_is_not_suspected() -> None:
     st.floats(0.2, 5.0), st.floats(15.0, 200.0), st.floats(0.01, 0.2), st.floats(1.0, 20.0),
     st.integers(0, 4), st.sampled_from([1.0, -1.0]), st.booleans(), st.integers(0, 2**31),
 )  # fmt: skip
-def test_no_two_masses_in_a_loop_are_refused(
+def test_random_two_mass_machines_in_a_loop_are_not_refused(
     ratio: float, notch_hz: float, zeta: float, loop_hz: float, delay: int, sign: float, position: bool, seed: int
 ) -> None:
     """Any inertia ratio to 5, any antiresonance, damping, bandwidth, delay and sign, at 1:10 noise over 20 … 140 Hz."""

@@ -171,7 +171,7 @@ def test_a_journal_that_expands_is_refused_in_a_sentence(tmp_path: Path, attack:
 
 
 @pytest.mark.parametrize("name", ["run.json", "run-copy.json"])
-def test_a_damaged_file_is_told_once_and_a_clock_that_went_back_in_words(
+def test_a_damaged_file_is_reported_once_and_a_clock_that_was_set_back_is_explained(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     def stop(done: int, _: int | None) -> None:
@@ -196,7 +196,7 @@ def test_a_damaged_file_is_told_once_and_a_clock_that_went_back_in_words(
     assert continued.details["away_s"] is None
 
 
-def test_the_next_journal_tells_what_a_damaged_end_held(tmp_path: Path) -> None:
+def test_the_next_journal_gives_the_rows_of_a_damaged_end(tmp_path: Path) -> None:
     data = bytearray(WHOLE)
     data[PIECES[-1].start + 30] ^= 1
     data[PIECES[-2].start + 30] ^= 1
@@ -235,7 +235,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
-def test_a_changed_file_of_a_finished_run_is_told_and_the_rest_is_read(finished: Path, data: st.DataObject) -> None:
+def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finished: Path, data: st.DataObject) -> None:
     files = sorted(p.relative_to(finished) for p in finished.rglob("*") if p.suffix in (".parquet", ".jsonl", ".json"))
     name = data.draw(st.sampled_from(files))
     other = finished.with_name("changed")
@@ -330,7 +330,7 @@ def test_a_journal_that_is_damaged_while_the_process_runs_is_closed_without_what
     assert "are lost" in told[0].message
 
 
-def test_a_lost_journal_is_told(tmp_path: Path) -> None:
+def test_a_lost_journal_is_reported(tmp_path: Path) -> None:
     def stop(done: int, _: int | None) -> None:
         if done > 1500:
             raise KeyError

@@ -44,7 +44,7 @@ def check_pause(kinds: list[str]) -> None:
     assert len(closing) + 2 == len(kinds)
 
 
-def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
+def test_a_file_at_its_size_limit_pauses_the_record(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
     said, say = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(say, tmp_path / "run"))
@@ -54,7 +54,7 @@ def test_a_file_that_may_grow_no_further(tmp_path: Path) -> None:
     check_pause(said.recv())
 
 
-def test_a_disk_that_is_full(tmp_path: Path) -> None:
+def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
     mount = f"mount -t tmpfs -o size=2m none {tmp_path}"
     allowed = subprocess.run(["unshare", "-Urm", "sh", "-c", mount], capture_output=True, text=True, check=False)
     if allowed.returncode:
@@ -68,18 +68,19 @@ def test_a_disk_that_is_full(tmp_path: Path) -> None:
     check_pause(done.stdout.split())
 
 
-def test_what_is_lost_is_said_exactly(tmp_path: Path) -> None:
+def test_the_lost_samples_are_reported_exactly(tmp_path: Path) -> None:
     # It is lost where memory holds no more; events are not.
     limits = Limits(interval_samples=1, segment_samples=10**9, interval_s=0.0, held_bytes=10_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+    events: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         try:
             # Not a byte more, however much of what was written before is safe by then.
             taken = [_second(store, k, {5: 1, 27: soft}.get(k), hard) for k in range(40)]
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        paused, resumed = store.drain_events()
+        paused, resumed = events
         store.finish(SUMMARY, finished=True)
     assert taken == [True] * 5 + [False] * 22 + [True] * 13
     run = Run.open(tmp_path / "run")
@@ -99,18 +100,20 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
     monkeypatch.setattr(journal, "_SPARSE_BYTES_MAX", 10_000)
     limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+    events: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))  # no file can be opened
         try:
             taken = [_second(store, k, None, hard) for k in range(20)]
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-        unclosed = [event.kind for event in store.drain_events()]
+        unclosed = [event.kind for event in events]
         assert (tmp_path / "run/open/000001.journal").stat().st_size > 30_000
         (table,) = Run.open(tmp_path / "run").tables("samples")
         taken.append(_second(store, 20, None, hard))
-    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+    events: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         assert store.last is not None
         assert store.last.sample == 2100
         store.finish(SUMMARY, finished=True)
@@ -123,25 +126,26 @@ def test_a_journal_that_no_other_can_follow_grows_and_is_closed_later(
 def test_segments_are_closed_again_when_the_next_journal_could_be_opened(tmp_path: Path) -> None:
     limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+    events: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         for k in range(8):
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft if k > 3 else 0, hard))
             _second(store, k, None, hard)
         store.finish(SUMMARY, finished=True)
-        closing = store.drain_events()
-    assert [event.kind for event in closing] == ["record-unclosed", "record-unclosed", "record-closed"]
-    assert closing[-1].details["attempts"] == 2
+    assert [event.kind for event in events] == ["record-unclosed", "record-unclosed", "record-closed"]
+    assert events[-1].details["attempts"] == 2
 
 
 def test_a_journal_that_holds_what_no_run_writes_ends_no_run(tmp_path: Path) -> None:
     limits = Limits(interval_samples=1, segment_samples=300, interval_s=0.0)
-    with Store(tmp_path / "run", {"samples": Y}, limits) as store:
+    events: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y}, limits, events.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         with (tmp_path / "run/open/000001.journal").open("ab") as file:
             file.write(to_frame(COMMIT, b"no commit"))
         taken = [_second(store, k, None, 0) for k in range(8)]
-        (event, *_) = store.drain_events()
+        event = events[0]
     assert all(taken)
     assert event.kind == "record-unclosed"
     assert "has invalid content" in event.message
@@ -165,12 +169,13 @@ def size_of(run: Path) -> int:
     return size
 
 
-def test_a_budget_is_kept_and_events_stay(tmp_path: Path) -> None:
+def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> None:
     # Segments of 0.8 MB, as random numbers do not compress; 40 of samples and of responses each are 64 MB.
     budget, rng = 8 << 20, np.random.default_rng(0)
     limits = Limits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)
-    used, said = [], []
-    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits) as store:
+    used: list[int] = []
+    said: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits, said.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         for start in range(0, 40 * 50_000, 10_000):
             block = Block(rng.standard_normal((1, 10_000)), (Channel("y"),), RATE_HZ, start=start)
@@ -179,7 +184,6 @@ def test_a_budget_is_kept_and_events_stay(tmp_path: Path) -> None:
             store.write_event(Event("mark", start, start / RATE_HZ, ""))
             store.commit(block.stop, block.stop / RATE_HZ, {"state": bytes(100)})
             used.append(size_of(tmp_path / "run"))
-            said += store.drain_events()
         store.finish(SUMMARY, finished=True)
     run = Run.open(tmp_path / "run")
     assert max(used) <= budget

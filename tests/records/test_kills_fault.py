@@ -12,7 +12,7 @@ from tests.support.killed import kill_often, run_s
 KILLS = int(os.environ.get("LIVEBODE_CRASH_KILLS", "24"))
 
 
-def test_a_kill_costs_at_most_the_last_second_and_the_run_goes_on_as_if_nothing_was(tmp_path: Path) -> None:
+def test_a_kill_loses_at_most_the_last_second_and_the_run_continues(tmp_path: Path) -> None:
     run_s(tmp_path / "first")  # with what a first process imports
     whole_s = run_s(tmp_path / "alone")
     rng, kills, runs = np.random.default_rng(16), 0, 0

@@ -21,7 +21,6 @@ from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
 from livebode.records import Run, RunDirectory
 from livebode.records.grouped_events import each_event
-from livebode.runtime.tracking import record
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
 from tests.support.recorded import (
@@ -36,6 +35,7 @@ from tests.support.recorded import (
     record_machine,
     same,
 )  # fmt: skip
+from tests.support.runs import record
 
 SAMPLES = 4000
 
@@ -64,10 +64,7 @@ def each(run: Run) -> list[Event]:
 
 def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record_machine(machine(SAMPLES), tmp_path / "segments")
-    record(
-        machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={}, force=False, progress=lambda *_: None,
-        draw=lambda *_: None,
-    )  # fmt: skip
+    record(machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={})
     check_whole(tmp_path / "segments", SAMPLES)
     runs = [Run.open(tmp_path / name) for name in ("segments", "piece")]
     assert same(runs[0].responses(), runs[1].responses())
@@ -82,7 +79,7 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sample", [1, 700, 1850, 3990])
-def test_a_run_that_ended_anywhere_is_read_and_goes_on(tmp_path: Path, sample: int) -> None:
+def test_a_run_that_ended_anywhere_is_read_and_continues(tmp_path: Path, sample: int) -> None:
     record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, sample - RATE_HZ)
     assert not Run.open(tmp_path / "run").finished
@@ -152,7 +149,7 @@ def test_a_machine_that_cannot_go_back_leaves_a_gap(tmp_path: Path) -> None:
     assert Run.open(tmp_path / "run").summary["counts"]["gaps"] == 2
 
 
-def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
+def test_a_run_of_another_configuration_or_of_a_running_process_is_not_written(tmp_path: Path) -> None:
     record_until(700, tmp_path / "run")
     with refused(RecordError, "configuration-differs", path=str(tmp_path / "run")):
         record_machine(machine(SAMPLES), tmp_path / "run", kept=RecordSection(samples=False))
@@ -175,7 +172,7 @@ def test_who_may_not_write_there_is_told(tmp_path: Path) -> None:
         record_machine(machine(SAMPLES), tmp_path / "mine")
 
 
-def test_the_segments_may_be_cut_otherwise_when_it_goes_on(tmp_path: Path) -> None:
+def test_a_continued_run_may_have_segments_of_another_length(tmp_path: Path) -> None:
     record_until(1700, tmp_path / "run")
     record_machine(machine(SAMPLES), tmp_path / "run", kept=KEPT.model_copy(update={"segment_s": 60.0}))
     check_whole(tmp_path / "run", SAMPLES)
@@ -199,7 +196,7 @@ def given(tmp_path: Path, asked: tuple[object, ...]) -> tuple[object, ...]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_the_command_goes_on_where_it_was_ended(
+def test_the_same_command_continues_where_it_was_ended(
     tmp_path: Path, given: tuple[object, ...], number: signal.Signals
 ) -> None:
     # Ended from within, after two thirds of the recording.
@@ -207,12 +204,12 @@ def test_the_command_goes_on_where_it_was_ended(
         "import os, signal, sys; import livebode.runtime.segmented as s; from livebode.cli import main\n"
         # What starts the tests in the background may have told them to ignore it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "feed = s.in_pieces\n"
-        "def ended(blocks, samples):\n"
-        "    for block in feed(blocks, samples):\n"
-        f"        if block.start > 40_000: os.kill(os.getpid(), {int(number)})\n"
-        "        yield block\n"
-        f"s.in_pieces = ended; sys.argv = {['livebode', 'run', *map(str, given)]!r}; main()"
+        "pieces = s.SegmentedRecord.pieces\n"
+        "def ended(self, block):\n"
+        "    for piece in pieces(self, block):\n"
+        f"        if piece.start > 40_000: os.kill(os.getpid(), {int(number)})\n"
+        "        yield piece\n"
+        f"s.SegmentedRecord.pieces = ended; sys.argv = {['livebode', 'run', *map(str, given)]!r}; main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == (-number if number == signal.SIGKILL else 128 + number), done.stderr
@@ -298,7 +295,7 @@ def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, says: s
     assert sorted(os.listdir(tmp_path / "run")) == before
 
 
-def test_signals_that_mean_nothing_are_said_and_kept(tmp_path: Path) -> None:
+def test_a_constant_excitation_is_reported_and_the_run_is_finished(tmp_path: Path) -> None:
     silent = replace(machine(SAMPLES), data=data(SAMPLES) * np.array([[0.0], [1.0], [1.0], [1.0]]))
     record_machine(silent, tmp_path / "run")
     run = Run.open(tmp_path / "run")

@@ -42,7 +42,7 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
     assert [event.kind for event in read.events()] == ["noise-from-detection-lines", "non-finite"]
 
 
-def test_what_is_not_a_whole_run_is_named_or_refused(run: Path, tmp_path: Path) -> None:
+def test_an_incomplete_run_is_read_with_a_warning_or_refused(run: Path, tmp_path: Path) -> None:
     with refused(RecordError, "not-a-run", path=str(tmp_path)):
         Run.open(tmp_path)
     table = run / "responses.parquet"

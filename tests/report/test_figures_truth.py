@@ -127,7 +127,7 @@ def test_no_trace_is_drawn_across_a_hole_in_time() -> None:
     assert len(time_s) == 6
 
 
-def test_strokes_are_told_apart() -> None:
+def test_forward_and_return_strokes_have_their_own_curves() -> None:
     run = resonant()
     figure = tracking_figure(run, schedule_name="position in m")
     place = figure.axes[0]

@@ -124,7 +124,7 @@ def test_a_report_needs_nothing_else_and_holds_no_secret(moving: Path, monkeypat
     assert "http" not in re.sub(r"&lt;.*?&gt;", "", html.replace('http-equiv="', ""))
 
 
-def test_long_logs_are_grouped_and_long_runs_thinned_and_both_said(moving: Path) -> None:
+def test_long_logs_are_grouped_and_long_runs_thinned_with_a_note(moving: Path) -> None:
     document = run_report(moving, made=MADE)
     (events,) = (s for s in document.sections if s.title == "Alarms and events")
     grouped, in_full = (p for p in events.parts if isinstance(p, Table))
@@ -151,7 +151,7 @@ def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> N
     assert [entry["/Title"] for entry in reader.outline] == [document.asked, *(s.title for s in document.sections)]
 
 
-def test_a_run_that_is_not_finished_says_so(tmp_path: Path) -> None:
+def test_the_report_of_an_unfinished_run_states_that_it_is_unfinished(tmp_path: Path) -> None:
     def stop(done: int, _: int | None) -> None:
         if done > 2500:
             raise KeyboardInterrupt
@@ -167,7 +167,7 @@ def test_a_run_that_is_not_finished_says_so(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"run", "r.html", "r.pdf"}
 
 
-def test_what_is_no_run_or_has_nothing_valid_is_refused(tmp_path: Path) -> None:
+def test_directories_without_a_valid_response_are_refused(tmp_path: Path) -> None:
     none = measured(5, 1)
     none.valid[:] = False
     for run, words in (
@@ -179,7 +179,7 @@ def test_what_is_no_run_or_has_nothing_valid_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("**/report.*"))
 
 
-def test_without_reportlab_the_page_is_written_and_the_rest_is_said(tmp_path: Path) -> None:
+def test_without_reportlab_the_page_is_written_and_the_missing_pdf_is_reported(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", measured(20, 1))
     code = (
         "import sys; sys.modules['reportlab'] = None; sys.argv[1:] = ['report', sys.argv[1]]\n"

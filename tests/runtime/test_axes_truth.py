@@ -93,7 +93,7 @@ def test_an_axis_that_is_still_waited_for_is_ended_at_once(tmp_path: Path) -> No
     assert not (tmp_path / "run" / "gone").exists()
 
 
-def test_a_second_signal_leaves_what_was_recorded_and_the_same_command_goes_on(tmp_path: Path) -> None:
+def test_a_second_signal_retains_the_record_and_the_same_command_continues_it(tmp_path: Path) -> None:
     with Machine(tmp_path) as a, Machine(tmp_path) as b:
         text = two(a, b)
         with Running(tmp_path, text) as running:
@@ -114,7 +114,7 @@ def test_a_second_signal_leaves_what_was_recorded_and_the_same_command_goes_on(t
         assert np.count_nonzero(np.diff(number) != 1) == 1
 
 
-def test_recordings_beside_each_other(tmp_path: Path) -> None:
+def test_each_of_two_recordings_has_the_run_that_it_has_alone(tmp_path: Path) -> None:
     write_parquet(tmp_path / "a.parquet", signals())
     write_parquet(tmp_path / "b.parquet", signals(seed=1))
     (tmp_path / "axes.toml").write_text(
@@ -150,7 +150,7 @@ def test_recordings_beside_each_other(tmp_path: Path) -> None:
         ("[axes.x]\nlines.window = 3", "key-missing", {"key": "source"}, ", axis x"),
     ],
 )  # fmt: skip
-def test_axes_that_cannot_be(tmp_path: Path, axes: str, code: str, facts: dict, place: str) -> None:
+def test_impossible_axes_are_refused(tmp_path: Path, axes: str, code: str, facts: dict, place: str) -> None:
     path = tmp_path / "axes.toml"
     with pytest.raises(ConfigError) as caught:
         axes_of(f"{axes}\n{SHARED}".encode(), path, {})
@@ -167,7 +167,7 @@ def test_axes_that_cannot_be(tmp_path: Path, axes: str, code: str, facts: dict, 
         ('fit = {model = "rigid", fixed = {Jx = 1.0}}', "no parameter 'Jx'"),
     ],
 )
-def test_a_fit_that_cannot_be_is_refused_before_anything_starts(tmp_path: Path, fit: str, says: str) -> None:
+def test_an_impossible_fit_is_refused_before_the_start(tmp_path: Path, fit: str, says: str) -> None:
     (tmp_path / "axes.toml").write_text(f'[axes.x]\nsource.url = "udp://h:1"\n{fit}\n{SHARED}')
     result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
     assert result.code == 2
@@ -176,7 +176,7 @@ def test_a_fit_that_cannot_be_is_refused_before_anything_starts(tmp_path: Path, 
     assert not (tmp_path / "runs").exists()
 
 
-def test_numbers_of_the_source_go_on_with_its_events(tmp_path: Path) -> None:
+def test_events_after_a_restart_have_the_sample_numbers_of_the_record(tmp_path: Path) -> None:
     with Machine(tmp_path) as a:
         for more in (1000, 500):
             with Running(tmp_path, f"{SHARED}[axes.x]\n{source(a)}") as running:

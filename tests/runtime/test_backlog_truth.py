@@ -28,7 +28,7 @@ def test_fits_are_left_out_and_no_sample_is_lost(tmp_path: Path) -> None:
         for batch in batches(12, first=0):
             peer.send(batch)
         assert stuck.held.wait(30)
-        source = session.orders.source
+        source = session.control.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)
         until(lambda: source.health.waiting_s > 29.0, "half a minute to wait")

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from livebode.core import Event
 from livebode.core.clock import RunClock, moment, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
@@ -92,12 +93,14 @@ def test_a_backlog_that_takes_longer_than_the_first_seconds_is_dated_in_the_end(
 
 def test_a_clock_that_is_set_begins_a_piece_and_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     relation, now_s, real = ClockRelation(), time.monotonic(), time.time
+    events: list[Event] = []
     for n in range(30):
         if n == 15:
             monkeypatch.setattr(time, "time", lambda: real() + 7200.0)
         arrived_s = now_s + 10.0 * (n + 1)
-        relation.take(LiveBlock(np.zeros((1, 1000)), ("y",), RATE_HZ, start=1000 * n, arrived_s=arrived_s))
-    (event,) = relation.drain_events()
+        block = LiveBlock(np.zeros((1, 1000)), ("y",), RATE_HZ, start=1000 * n, arrived_s=arrived_s)
+        relation.take(block, events.append)
+    (event,) = events
     assert event.kind == "computer-clock"
     assert "set by +7200 s" in event.message
     assert np.diff([unix_s for _, unix_s in relation.clock.pieces]) == pytest.approx([7200.0], abs=0.1)

@@ -20,9 +20,9 @@ from livebode.records import Run
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query
 from livebode.reporting.happenings import EventSummary
-from livebode.runtime.audience import Audience
+from livebode.runtime import Document
 from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
-from livebode.runtime.tracking import record
+from tests.support.runs import record
 
 RATE_HZ, WINDOW = 1000.0, 50
 NAMES = ("w", "u", "y")
@@ -70,7 +70,7 @@ def test_a_run_that_is_continued_reports_the_same(steps: list[tuple[str, int]], 
 
 @settings(max_examples=15, deadline=None)
 @given(happened)
-def test_what_is_reported_and_what_waits_are_every_event_at_any_moment(steps: list[tuple[str, int]]) -> None:
+def test_reported_and_waiting_events_are_together_all_events_at_any_moment(steps: list[tuple[str, int]]) -> None:
     groups, lines, events = EventGroups(), list[Event](), events_of(steps)
     for number, event in enumerate(events, start=1):
         lines += groups.take(event)
@@ -87,7 +87,7 @@ def test_a_thousand_events_of_one_cause_are_one_group_and_each_is_exact() -> Non
     assert (last["count"], last["first_s"], last["last_s"]) == (1065, 0.0, 266.0)
 
 
-def test_what_an_event_without_a_group_counts_stays_with_it() -> None:
+def test_the_count_of_a_single_event_is_not_changed_by_grouping() -> None:
     event = Event("phase-slips", 5, 0.1, "two leaps", {"count": 2, "slips": [[5, 1], [9, 1]]})
     assert [one for line in reported(EventGroups(), [event]) for one in each_event(line)] == [event]
 
@@ -159,14 +159,15 @@ def test_a_link_that_flaps_adds_a_line_a_second_at_most() -> None:
     assert AT_ONCE < len(found) <= AT_ONCE + 300
 
 
-class Page(Audience):
+class Page:
     """Keeps what a dashboard would show."""
 
     def __init__(self) -> None:
         self.notices = Notices()
 
-    def write_event(self, event: Event) -> None:
-        self.notices.take(event)
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Event):
+            self.notices.take(document)
 
 
 class Gaps:
@@ -186,13 +187,12 @@ class Gaps:
             yield Block(data, NAMES, RATE_HZ, start=start, gap=start > 0)
 
 
-def test_the_record_of_a_killed_run_tells_every_event_up_to_a_second_before(tmp_path: Path) -> None:
+def test_the_record_of_a_killed_run_contains_every_event_until_a_second_before(tmp_path: Path) -> None:
     machine, page = Gaps(tmp_path / "run"), Page()
     lines = Lines((4, 7), WINDOW, RATE_HZ)
     record(
         machine, Tracker(Settings(lines=lines, output="y", input="u", excitation="w", hop=25)), machine.run,
-        about={"configuration": {}}, force=False, draw=lambda *_: None, progress=lambda *_: None,
-        kept=RecordSection(segment_s=5.0), again=False, audience=page,
+        segments=RecordSection(segment_s=5.0), again=False, subscribers=[page],
     )  # fmt: skip
     killed, whole = Run.open(machine.killed), Run.open(machine.run)
     every = [one.sample for event in whole.events() for one in each_event(event) if one.kind == "gap"]

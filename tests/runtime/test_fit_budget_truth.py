@@ -59,7 +59,7 @@ def test_cheap_fits_are_all_made() -> None:
         assert time.fit(budget, 50, 0.0002) == 50
 
 
-def test_none_is_made_while_the_run_is_far_behind() -> None:
+def test_no_fit_is_made_while_the_run_is_far_behind() -> None:
     time = Time()
     budget = time.budget()
     for _ in range(100):

@@ -9,13 +9,13 @@ import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from livebode.core import Channel, Event
-from livebode.runtime import Audience
+from livebode.runtime import Document
+from livebode.runtime.documents import RunStarted
 from livebode.sources.live import Batch, encode_layout, encode_samples
 from livebode.sources.live.ndjson import encode_line
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
@@ -81,7 +81,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     assert (tmp_path / "live" / "bode.png").is_file()
 
 
-def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
+def test_a_live_source_without_specified_lines_is_refused(tmp_path):
     path = axis(tmp_path, 'url = "stdin:"', SMALL_AXIS.replace("window = 100", ""))
     process = started(path, tmp_path / "live")
     _, err = process.communicate(b"".join(map(encode_line, sent())), PATIENCE_S)
@@ -102,7 +102,7 @@ def test_lines_that_would_have_to_be_found_are_refused(tmp_path):
         ('url = "udp://h:1"\npasword_env = "X"', "did you mean 'password_env'"),
     ],
 )
-def test_sources_that_cannot_be(tmp_path, source, message):
+def test_impossible_sources_are_refused_without_repeating_secrets(tmp_path, source, message):
     result = livebode("run", axis(tmp_path, source), "--out", tmp_path / "live")
     assert result.code == 2
     assert message in result.err
@@ -136,21 +136,20 @@ def test_the_terminal_shows_what_somebody_must_look_after(tmp_path):
 def test_events_of_a_silent_machine_are_recorded_at_once(tmp_path):
     """A connection that is lost, and what a person acknowledges, wait for no sample."""
 
-    class Person(Audience):
-        said: ClassVar = [Event("acknowledged", 0, 0.0, "seen")]
+    started: list[RunStarted] = []
 
-        def drain_events(self):
-            return [self.said.pop()] if self.said and disconnected() else []
+    def listen(document: Document) -> None:
+        if isinstance(document, RunStarted):
+            started.append(document)
 
-    def disconnected() -> bool:
-        return any(event.kind == "disconnected" for event in session.events())
-
-    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, Person()) as session:
+    with TcpPeer(tmp_path) as peer, LiveSession(tmp_path, peer, listen) as session:
         peer.wait_ready()
         for batch in batches(40, first=0):
             peer.send(batch)
         until(session.events, "the record to begin")
         peer.interrupt()
+        until(lambda: any(event.kind == "disconnected" for event in session.events()), "the connection to be lost")
+        assert started[0].control.record(Event("acknowledged", 0, 0.0, "seen"))
         until(lambda: "acknowledged" in [event.kind for event in session.events()], "both to be recorded")
 
 

@@ -21,7 +21,7 @@ from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.records import Run
-from livebode.runtime.watching import make_watching
+from livebode.runtime.change_detection import change_detection
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
 from livebode.sources.live.kernel_drive import KernelDrive
@@ -195,7 +195,7 @@ def test_a_run_on_spectra_is_the_run_on_the_samples(tmp_path: Path, kind: type[P
         assert newest | {"schedule": None} == theirs | {"schedule": None}
 
 
-def test_a_run_goes_on_after_lost_frames_and_after_its_end(tmp_path: Path) -> None:
+def test_a_run_continues_after_lost_frames_and_after_its_end(tmp_path: Path) -> None:
     given = frames(record(), layout())
     _, out = run_live(tmp_path, "live", [b for at, b in enumerate(given[:60]) if at not in (20, 21)], REST)
     config = (tmp_path / "live.toml").read_text()
@@ -226,7 +226,7 @@ def events(out: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
 
 
-def test_a_baseline_learned_from_samples_tells_a_change_in_spectra(tmp_path: Path) -> None:
+def test_a_baseline_learned_from_samples_detects_a_change_in_spectra(tmp_path: Path) -> None:
     config = REST.replace('schedule = "x"\n', "")
     healthy = recorded(tmp_path, config, record(seconds=40.0))
     learned = livebode("learn", healthy, "--out", tmp_path / "healthy.json")
@@ -244,14 +244,14 @@ def test_a_baseline_learned_from_samples_tells_a_change_in_spectra(tmp_path: Pat
     assert learned.code == 0, learned.err
 
 
-def test_the_model_of_the_machine_is_left_out_and_said_to_be(tmp_path: Path) -> None:
+def test_the_model_of_the_machine_is_left_out_and_this_is_reported(tmp_path: Path) -> None:
     small_baseline().save(tmp_path / "baseline.json")
     axis = configured(REST + f'[monitoring]\nbaseline = "{tmp_path / "baseline.json"}"\n')
     tracker_settings = settings()
-    told = make_watching(axis, tracker_settings, samples=False).finish(lambda _: None)
+    told = change_detection(axis, tracker_settings, samples=False).summary()
     assert told["judged_by"] == "tables"
     assert "model of the machine is not used: it needs samples, but the drive sends spectra" in told["message"]
-    assert make_watching(axis, tracker_settings).finish(lambda _: None)["judged_by"] == "model"
+    assert change_detection(axis, tracker_settings).summary()["judged_by"] == "model"
 
 
 def settings() -> Settings:
@@ -273,7 +273,7 @@ def configured(text: str) -> Axis:
         ("hop = 20\n", "value-mismatch", {"key": "tracking.hop", "value": 20, "allowed": 200}),
     ],
 )  # fmt: skip
-def test_what_the_frames_do_not_say_is_refused(more: str, code: str, facts: dict) -> None:
+def test_settings_that_the_frames_contradict_are_refused(more: str, code: str, facts: dict) -> None:
     with refused(ConfigError, code, **facts):
         check_spectra(configured(REST + more), layout(), 4000.0)
 

@@ -13,7 +13,7 @@ from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
 from livebode.runtime.event_groups import REPEATS_MAX
-from livebode.runtime.tracking import record
+from tests.support.runs import record
 
 RATE_HZ, WINDOW, HOP, BLOCK = 1000.0, 50, 25, 5
 NAMES = ("w", "u", "y")
@@ -46,10 +46,7 @@ class Machine:
 def test_a_run_holds_no_more_after_twice_the_blocks(tmp_path: Path) -> None:
     machine = Machine()
     settings = Settings(lines=Lines((4, 7), WINDOW, RATE_HZ), output="y", input="u", excitation="w", hop=HOP)
-    record(
-        machine, Tracker(settings), tmp_path / "run", about={"configuration": {}}, force=False,
-        draw=lambda *_: None, progress=lambda *_: None, kept=RecordSection(segment_s=5.0), again=False,
-    )  # fmt: skip
+    record(machine, Tracker(settings), tmp_path / "run", segments=RecordSection(segment_s=5.0), again=False)
     warm, end = machine.held
     # 64 parts of the thinned copy, events that wait for the next report, and a line of the manifest a segment.
     bounds = {"Responses": 70, "Event": REPEATS_MAX, "Segment": 2 * BLOCKS * BLOCK / RATE_HZ / 5.0}

@@ -78,7 +78,7 @@ def test_the_run_is_that_of_the_correction(folder: Path) -> None:
         ('driven_by = "love"', "motion.driven_by = 'love' is not usable"),
     ],
 )
-def test_what_cannot_be_is_said_before_anything_starts(folder: Path, section: str, sentence: str) -> None:
+def test_an_impossible_motion_section_is_refused_before_the_start(folder: Path, section: str, sentence: str) -> None:
     (folder / "wrong.toml").write_text(AXIS + section + "\n")
     result = livebode("run", folder / "wrong.toml", "--out", folder / "wrong")
     assert result.code == 2

@@ -100,7 +100,7 @@ def reported(run: Path) -> list[Event]:
     return [event for event in events(run) if event.kind != "noise-from-detection-lines"]
 
 
-def test_what_cannot_be_applied_is_refused_once_and_nothing_stops(tmp_path: Path) -> None:
+def test_an_edit_that_cannot_be_applied_is_refused_once_and_the_run_continues(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine, Running(tmp_path, one(machine)) as running:
         running.tracked("x", 300)
         for count, (before, after, says) in enumerate(REFUSED, 2):
@@ -147,7 +147,7 @@ def test_a_live_run_with_a_loop_is_reported(tmp_path: Path) -> None:
         assert words in page, words
 
 
-def test_axes_come_and_go(tmp_path: Path) -> None:
+def test_axes_are_added_and_removed_during_the_run(tmp_path: Path) -> None:
     with Machine(tmp_path) as a, Machine(tmp_path) as b:
         second = f"[axes.y]\n{source(b)}"
         with Running(tmp_path, one(a), "--force") as running:
@@ -171,7 +171,7 @@ def test_axes_come_and_go(tmp_path: Path) -> None:
         assert found[name]["counts"]["samples"] == number.size
 
 
-def test_the_same_command_goes_on_with_the_newest_run(tmp_path: Path) -> None:
+def test_the_same_command_continues_the_newest_run(tmp_path: Path) -> None:
     with Machine(tmp_path) as machine:
         with Running(tmp_path, one(machine)) as running:
             running.tracked("x", 300)

@@ -13,14 +13,16 @@ from livebode.configuration.axis import FitSection, RecordSection
 from livebode.monitoring import Baseline, Monitor
 from livebode.preparation.follower import Follower
 from livebode.records import Run
+from livebode.runtime import Document, Outcome
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.documents import Tracked
 from livebode.runtime.fits import Fits
-from livebode.runtime.tracking import Outcome, record
-from livebode.runtime.watching import Watching
 from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 from tests.support.axes import MULTISINE
 from tests.support.monitored import machine
 from tests.support.moving import SETTINGS
 from tests.support.recorded import same
+from tests.support.runs import record
 
 AXIS = BeltAxis(
     motion=Strokes(speed_m_per_s=0.3), excitation_n_m=MULTISINE, seconds=4.5, friction=Friction(load_coulomb_n=15.0),
@@ -33,19 +35,19 @@ class StopError(Exception):
     pass
 
 
-def watching() -> Watching:
+def detection() -> ChangeDetection:
     baseline = Baseline(SETTINGS.lines, SETTINGS.step, ROLES, "joint", "plant", (), machine())
-    return Watching(Monitor(baseline, SETTINGS), "healthy.json")
+    return ChangeDetection(Monitor(baseline, SETTINGS), "healthy.json")
 
 
 def record_axis(follower: Follower, directory: Path, until: int | None = None) -> Outcome:
-    def progress(done: int, _: int | None) -> None:
-        if until is not None and done > until:
+    def stop(document: Document) -> None:
+        if isinstance(document, Tracked) and until is not None and document.samples > until:
             raise StopError
 
     return record(
-        SimulatedAxis(AXIS), follower, directory, about={"configuration": {}}, force=False, progress=progress,
-        draw=lambda *_: None, fits=Fits(FitSection()), watching=watching(), kept=RecordSection(segment_s=1.5),
+        SimulatedAxis(AXIS), follower, directory, subscribers=[stop], fits=Fits(FitSection()), detection=detection(),
+        segments=RecordSection(segment_s=1.5),
     )  # fmt: skip
 
 
@@ -54,7 +56,9 @@ def record_axis(follower: Follower, directory: Path, until: int | None = None) -
     [lambda: Tracker(SETTINGS), lambda: MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=5200)],
     ids=["tracker", "correction"],
 )
-def test_correction_fits_and_monitoring_go_on(tmp_path: Path, follower: Callable[[], Follower]) -> None:
+def test_correction_fits_and_monitoring_continue_in_a_resumed_run(
+    tmp_path: Path, follower: Callable[[], Follower]
+) -> None:
     whole = record_axis(follower(), tmp_path / "whole")
     for until in (6100, 14_300):
         with pytest.raises(StopError):

@@ -61,7 +61,7 @@ def test_an_edit_that_brings_a_secret_is_not_repeated(tmp_path: Path, monkeypatc
         stop(sender)
     assert code == 0, err
     assert "source.url has a user or password" in err
-    for level, logger in (("INFO", "sources.live.mqtt: connected to"), ("WARNING", "session.session: ")):
+    for level, logger in (("INFO", "sources.live.mqtt: connected to"), ("WARNING", "runtime.session: ")):
         assert f" {level} livebode.{logger}" in err
     found = b"".join(path.read_bytes() for path in running.out.rglob("*") if path.is_file())
     assert b"configuration-refused" in found

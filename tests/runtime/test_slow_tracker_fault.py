@@ -27,14 +27,14 @@ def rss_bytes() -> int:
 
 
 @pytest.mark.parametrize("kind", [UdpPeer, TcpPeer, MqttPeer])
-def test_what_does_not_fit_is_a_gap_and_memory_is_bounded(tmp_path: Path, kind: type[Peer]) -> None:
+def test_samples_that_exceed_the_queue_become_a_gap_and_memory_is_bounded(tmp_path: Path, kind: type[Peer]) -> None:
     stuck = Stuck()
     with kind(tmp_path) as peer, LiveSession(tmp_path, peer, stuck, record={"samples": True}) as session:
         peer.wait_ready()
         for batch in batches(12, first=0):
             peer.send(batch)
         assert stuck.held.wait(30)
-        before, source = rss_bytes(), session.orders.source
+        before, source = rss_bytes(), session.control.source
         for batch in hurried(BATCHES, 12 * 50):
             peer.send(batch)
         until(lambda: source.health.counts["overflow"], "an overflow")

@@ -25,6 +25,7 @@ from livebode.simulation import (
     SoftSpot,
     Standstill,
     Strokes,
+    StrokeSequence,
     TensionLoss,
 )
 from livebode.simulation.faults import Condition, OverTime
@@ -117,7 +118,7 @@ class Wobble(OverTime):
         condition.stiffness *= 1 - self.depth * self.share(time_s) * np.sin(2 * np.pi * time_s) ** 2
 
 
-def test_a_fault_of_ones_own() -> None:
+def test_a_fault_defined_by_a_user_acts_on_the_machine() -> None:
     truth = SimulatedAxis(BeltAxis(faults=(Wobble(start_s=0.1, depth=0.2),), seconds=0.5)).run()[1]
     assert truth.stiffness_n_per_m[[0, 1000]] == pytest.approx([5e5, 4e5])
 
@@ -199,7 +200,7 @@ def test_the_encoder_counts_and_its_velocity_carries_the_steps() -> None:
     assert np.allclose(block["velocity"][1:], np.diff(block["position"]) * RATE_HZ, atol=1e-9)
 
 
-def test_noise_is_white_and_as_strong_as_said() -> None:
+def test_noise_is_white_and_has_the_specified_sigma() -> None:
     axis = BeltAxis(sensor=Sensor(noise_rad_per_s=0.1), seconds=10.0, seed=5)
     block, truth = SimulatedAxis(axis).run()
     noise = block["velocity"] - truth.states[1]
@@ -279,6 +280,10 @@ BAD = [
     (lambda: Sensor(noise_rad_per_s=-0.1), "usage.out-of-range", "noise_rad_per_s"),
     (lambda: Strokes(start_m=1.0, end_m=1.0), "usage.conflict", "end_m"),
     (lambda: Strokes(jerk_m_per_s3=0.0), "usage.out-of-range", "jerk_m_per_s3"),
+    (lambda: StrokeSequence(turning_points_m=(0.4, 1.0), speeds_m_per_s=()), "usage.wrong-shape", "turning_points_m"),
+    (lambda: StrokeSequence(turning_points_m=(1.0, 1.0), speeds_m_per_s=(0.1,)), "usage.conflict", "end_m"),
+    (lambda: BeltAxis(motion=StrokeSequence(turning_points_m=(0.4, 1.9), speeds_m_per_s=(0.1,))),
+     "usage.out-of-range", "end_m"),
     (lambda: TensionLoss(loss=1.0), "usage.out-of-range", "loss"),
     (lambda: TensionLoss(loss=0.1, start_s=-1.0), "usage.out-of-range", "start_s"),
     (lambda: Backlash(gap_m=0.0), "usage.out-of-range", "gap_m"),
@@ -291,7 +296,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("make", "code", "argument"), BAD)
-def test_what_cannot_be_is_refused_before_the_start(make: object, code: str, argument: str | None) -> None:
+def test_impossible_machines_are_refused_before_the_start(make: object, code: str, argument: str | None) -> None:
     with pytest.raises(LivebodeError) as caught:
         make()
     assert (caught.value.code, caught.value.facts.get("argument")) == (code, argument)

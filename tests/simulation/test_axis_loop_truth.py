@@ -77,7 +77,7 @@ def test_indirect_is_the_sampled_plant_through_the_loop_that_the_drive_describes
     assert error(block, truth.sampled(truth.start).response(F_HZ), estimator="indirect", loop=loop) < 1e-5
 
 
-def test_the_standstill_loop_of_the_examples_is_the_same_machine() -> None:
+def test_the_two_mass_loop_is_the_same_machine_at_standstill() -> None:
     block, _ = settled()
     u, y = TwoMassLoop().run(MULTISINE, periods=1)
     for name, values in (("u", u[0]), ("velocity", y[0])):
@@ -87,7 +87,7 @@ def test_the_standstill_loop_of_the_examples_is_the_same_machine() -> None:
     assert np.allclose(at.response(F_HZ), TwoMassPlant().response(F_HZ), rtol=1e-10)
 
 
-def test_plants_in_python_control() -> None:
+def test_a_plant_in_python_control_has_the_same_response() -> None:
     mechanics = Mechanics(masses=3)
     plant = linear(mechanics, Friction(load_viscous_n_s_per_m=5.0), Spans.of(mechanics, 0.5), mechanics.load_kg)
     system = control.ss(plant.a, plant.b[:, None], plant.c[None, :], 0)
@@ -96,7 +96,7 @@ def test_plants_in_python_control() -> None:
     assert np.allclose(plant.sampled(RATE_HZ).response(F_HZ), as_model(discrete).response(F_HZ), rtol=1e-7)
 
 
-def test_two_masses_are_equation_14_and_three_with_a_light_pulley_come_to_it() -> None:
+def test_two_masses_and_three_with_a_light_pulley_have_the_response_of_equation_14() -> None:
     for x in (0.35, 0.8, 1.4):
         nominal = Mechanics()
         formula = BeltResponse(0.0028, 6.7, 0.019, float(nominal.stiffness_at(x)), float(nominal.damping_at(x)))

@@ -22,6 +22,7 @@ from livebode.simulation import (
     SoftSpot,
     Standstill,
     Strokes,
+    StrokeSequence,
     TensionLoss,
 )
 from tests.support.axes import MULTISINE, RATE_HZ, fast_stroke
@@ -65,7 +66,7 @@ def test_blocks_have_the_channels_asked_for_and_their_units() -> None:
             busy().pairs(wrong)
 
 
-def test_a_run_in_is_what_an_axis_that_stood_longer_goes_on_with() -> None:
+def test_a_run_in_equals_a_longer_standstill_before_the_first_sample() -> None:
     options = {"excitation_n_m": MULTISINE, "friction": Friction(load_coulomb_n=15.0)}
     longer, _ = SimulatedAxis(BeltAxis(seconds=0.5, **options)).run()
     # 0.3999 s are made whole repetitions of the position loop: 1600 ticks, four periods of the excitation.
@@ -90,14 +91,14 @@ def test_a_run_in_has_a_limit(value: float) -> None:
         BeltAxis(run_in_s=value)
 
 
-def test_a_seed_is_one_noise_and_every_iteration_starts_anew() -> None:
+def test_every_iteration_of_a_seed_gives_the_same_noise() -> None:
     source = busy()
     assert np.array_equal(source.run()[0].data, source.run()[0].data)
     assert not np.array_equal(busy(seed=8).run()[0]["velocity"], WHOLE["velocity"])
     assert np.array_equal(busy(seed=8).run()[0]["w"], WHOLE["w"])
 
 
-def test_a_run_without_end_goes_on_and_does_not_fit_into_a_block() -> None:
+def test_an_endless_run_continues_and_is_refused_as_one_block() -> None:
     endless = busy(seconds=inf)
     assert endless.samples is None
     first = list(itertools.islice(endless.blocks(block_samples=1000), 3))
@@ -152,7 +153,7 @@ def test_momentum_is_what_the_torque_gave(masses: int) -> None:
 
 
 @pytest.mark.parametrize("masses", [2, 3])
-def test_energy_is_what_the_torque_gave_where_stiffness_stands_still(masses: int) -> None:
+def test_energy_is_conserved_at_constant_stiffness(masses: int) -> None:
     block, s, m = free_run(masses, frozen_position_m=0.8)
     c, r = m.specific_stiffness_n, m.radius_m
     energy = (m.motor_inertia_kg_m2 * s[1] ** 2 + m.load_kg * s[-1] ** 2) / 2
@@ -194,6 +195,18 @@ def test_strokes_keep_to_their_limits_and_come_back(motion: Strokes, backwards: 
     # The way is the integral of the speed: exact to the trapezoidal rule's error at corners.
     way = np.cumsum((around[1:] + around[:-1]) / 2) / RATE_HZ + motion.start_m
     assert np.abs(way - np.append(position[1:], position[0])).max() < motion.acceleration_m_per_s2 / RATE_HZ**2
+
+
+def test_a_sequence_of_strokes_continues_each_stroke_where_the_one_before_it_ended() -> None:
+    points, speeds = (0.7, 1.6, 0.25, 0.9), (0.38, 0.1, 1.2)
+    motion = StrokeSequence(turning_points_m=points, speeds_m_per_s=speeds)
+    position, speed = motion.cycle(RATE_HZ)
+    edges = np.rint(motion.edges_s(RATE_HZ) * RATE_HZ).astype(int)
+    assert position[edges[:-1]].tolist() == list(points[:-1])
+    assert position[-1] == pytest.approx(points[-1], abs=1e-4)
+    fastest = [np.abs(speed[a:b]).max() for a, b in itertools.pairwise(edges)]
+    assert fastest == pytest.approx(list(speeds))
+    assert np.abs(np.diff(position) * RATE_HZ - (speed[1:] + speed[:-1]) / 2).max() < 4.0 / RATE_HZ
 
 
 def vars_of(motion: Strokes) -> dict[str, float]:

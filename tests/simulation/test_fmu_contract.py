@@ -138,14 +138,14 @@ def test_an_estimator_sees_the_plant_of_the_fmu(fmu: Path) -> None:
     assert np.allclose(record["x"], 0.019 * record["position"])
 
 
-def test_the_motion_goes_from_where_the_plant_stands(fmu: Path) -> None:
+def test_the_motion_begins_at_the_position_of_the_plant(fmu: Path) -> None:
     drive, motion = Drive(position_gain_per_s=15.0, velocity_gain_n_m_s=1.0), fast_stroke()
     record = whole(FmuAxis(path=fmu, drive=drive, motion=motion, seconds=0.9))
     assert record["position_reference"][0] == record["position"][0] == 0
     assert record["x"].max() == pytest.approx(motion.end_m - motion.start_m, rel=0.02)
 
 
-def test_cutting_changes_no_sample_and_every_iteration_starts_anew(fmu: Path) -> None:
+def test_cutting_changes_no_sample_and_every_iteration_is_the_same(fmu: Path) -> None:
     axis = FmuAxis(path=fmu, excitation_n_m=MULTISINE, seconds=0.2, sensor=Sensor(noise_rad_per_s=0.1), seed=4)
     first = whole(axis)
     assert len(first) == axis.samples == 800
@@ -161,7 +161,7 @@ def test_a_plant_that_blows_up_stops_the_run(fmu: Path) -> None:
     assert stopped.value.time_s == pytest.approx(51 / RATE_HZ)
 
 
-def test_what_is_no_such_fmu_is_refused(fmu: Path, tmp_path: Path) -> None:
+def test_unsuitable_fmus_are_refused(fmu: Path, tmp_path: Path) -> None:
     with refused(UsageError, "unknown-name", value="velo"):
         FmuAxis(path=fmu, velocity="velo")
     with refused(SimulationError, "fmu-unusable", path=str(tmp_path / "missing.fmu")):

@@ -22,7 +22,7 @@ def test_a_fast_stroke_follows_the_equations_of_motion_by_another_method(masses:
     [{"friction": Friction(load_coulomb_n=15.0, smoothing_m_per_s=1e-3)}, {"faults": (Backlash(gap_m=1e-4),)}],
     ids=["sharp friction", "play"],
 )
-def test_what_bends_sharply_gets_the_steps_that_it_needs(masses: int, options: dict) -> None:
+def test_sharp_friction_and_play_get_enough_substeps(masses: int, options: dict) -> None:
     states = []
     for substeps in (None, 128):
         axis = BeltAxis(

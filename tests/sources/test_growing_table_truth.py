@@ -160,7 +160,7 @@ class Record:
                     break
             timer.cancel()
             self._state = position.snapshot()
-            return source.drain_events()
+            return source.take_events()
 
 
 COUNTED = {"rate_hz": float(RATE_HZ), "time": "none"}

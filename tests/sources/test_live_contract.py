@@ -90,7 +90,7 @@ def test_the_same_samples_come_back_bit_for_bit(peer):
         assert source.samples is None
         assert source.health.connected
         assert source.health.lost == 0
-        events = source.drain_events()
+        events = source.take_events()
     is_truth(blocks)
     truth = np.concatenate([batch.data for batch in given], axis=1)
     found = np.concatenate([block.data for block in blocks], axis=1)
@@ -114,7 +114,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
-        events = [event for event in source.drain_events() if event.kind == "loss"]
+        events = [event for event in source.take_events() if event.kind == "loss"]
         lost = source.health.lost
     is_truth(blocks)
     assert lost == sum(event.details["missing_samples"] for event in events) > 0
@@ -125,7 +125,7 @@ def test_lost_samples_are_a_gap_of_their_length(peer):
 
 
 @pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.reconnects], indirect=True)
-def test_a_broken_connection_comes_back_by_itself(peer):
+def test_a_broken_connection_is_connected_again(peer):
     given = batches(60)
 
     def script() -> None:
@@ -136,14 +136,14 @@ def test_a_broken_connection_comes_back_by_itself(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, given[-1].stop - 1)
-        kinds = [event.kind for event in source.drain_events()]
+        kinds = [event.kind for event in source.take_events()]
     is_truth(blocks)
     assert [kind for kind in kinds if kind in ("connected", "disconnected")][:3] == [
         "connected", "disconnected", "connected",
     ]  # fmt: skip
 
 
-def test_rubbish_is_counted_and_the_stream_goes_on(peer):
+def test_rubbish_is_counted_and_the_stream_continues(peer):
     given = batches(60)
 
     def script() -> None:
@@ -156,14 +156,14 @@ def test_rubbish_is_counted_and_the_stream_goes_on(peer):
 
     with fed(peer, script) as source:
         is_truth(received(source, given[-1].stop - 1))
-        events = source.drain_events()
+        events = source.take_events()
     assert source.health.counts["malformed"] >= 1
     assert {event.kind for event in events} <= set(KINDS)
     assert all("\n" not in event.message for event in events)
 
 
 @pytest.mark.parametrize("peer", [name for name, kind in PEERS.items() if kind.numbers_begin_anew], indirect=True)
-def test_a_sender_that_begins_anew_is_a_restart(peer):
+def test_a_sender_that_starts_again_is_a_restart(peer):
     old, new = batches(60, first=10_000_000), batches(60, first=0)
 
     def script() -> None:
@@ -174,7 +174,7 @@ def test_a_sender_that_begins_anew_is_a_restart(peer):
 
     with fed(peer, script) as source:
         blocks = received(source, new[-1].stop - 1)
-        kinds = [event.kind for event in source.drain_events()]
+        kinds = [event.kind for event in source.take_events()]
     assert kinds.count("restart") == 1
     at = next(i for i, block in enumerate(blocks) if block["w"][0] < 1_000_000)
     is_truth(blocks[:at])
@@ -200,6 +200,6 @@ def test_stop_ends_the_blocks_and_a_misspelt_channel_is_named(peer):
             assert block.names == ("y",)
 
 
-def test_silence_is_said_once(peer):
+def test_a_silent_source_is_refused_after_its_timeout(peer):
     with refused(SourceError, "no-samples", timeout_s=0.3):
         opened(peer, timeout_s=0.3)

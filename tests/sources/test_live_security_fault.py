@@ -71,7 +71,7 @@ def settings(broker: Mosquitto, pki: Path, **changes: object) -> dict[str, objec
     return {key: value for key, value in given.items() if value is not None}
 
 
-def test_mqtt_with_certificates_and_a_password(broker, pki):
+def test_mqtt_with_certificates_and_a_password_delivers_the_samples(broker, pki):
     given = batches(20)
     context = ssl.create_default_context(cafile=pki / "authority.crt")
     context.load_cert_chain(pki / "client.crt", pki / "client.key")
@@ -89,7 +89,7 @@ def test_mqtt_with_certificates_and_a_password(broker, pki):
             parts.append(block["y"])
             if block["w"][-1] == given[-1].stop - 1:
                 break
-        told = repr(source.drain_events()) + repr(source.health)
+        told = repr(source.take_events()) + repr(source.health)
     stop(client)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
     assert SECRET not in told
@@ -105,7 +105,7 @@ def test_mqtt_with_certificates_and_a_password(broker, pki):
         ({"certificate_file": None, "key_file": None}, "if it requires a certificate", 3),
     ],
 )
-def test_mqtt_refusals_are_said_once(broker, pki, changes, remedy, attempts):
+def test_mqtt_refusals_are_reported_once(broker, pki, changes, remedy, attempts):
     changes = {key: value if value is None or key == "username" else pki / value for key, value in changes.items()}
     before = broker.logged("New connection")
     with pytest.raises(SourceError) as caught:
@@ -145,7 +145,7 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
                 parts.append(block["y"])
                 if block["w"][-1] == given[-1].stop - 1:
                     break
-            told = repr(source.drain_events()) + repr(source.health)
+            told = repr(source.take_events()) + repr(source.health)
     np.testing.assert_array_equal(np.concatenate(parts), np.concatenate([batch.data[1] for batch in given]))
     assert SECRET not in told
 
@@ -157,7 +157,7 @@ def test_opc_ua_signed_and_encrypted(pki, tmp_path):
         ({"password_file": "users"}, "status"),
     ],
 )
-def test_opc_ua_refusals_are_said_once(pki, tmp_path, changes, fact):
+def test_opc_ua_refusals_are_reported_once(pki, tmp_path, changes, fact):
     with OpcUaPeer(tmp_path, pki, ("plc", SECRET)) as peer, pytest.raises(SourceError) as caught:
         open_source(opcua(peer, pki, **{key: pki / value for key, value in changes.items()}))
     assert (caught.value.code, list(caught.value.facts)) == ("source.refused", [fact])
@@ -197,7 +197,7 @@ def test_secrets_stay_out_of_the_configuration_that_is_recorded(tmp_path, monkey
         ),
     ],
 )
-def test_secrets_that_are_not_there(given, code, facts):
+def test_missing_secrets_are_refused_without_repeating_their_names(given, code, facts):
     with refused(ConfigError, code, **facts):
         open_source(SourceSettings(url="mqtt://127.0.0.1:1/t", **given))
     with pytest.raises(ConfigError) as caught:  # in place of a name may be the password
@@ -246,7 +246,7 @@ def test_secrets_that_are_not_there(given, code, facts):
         ),
     ],
 )
-def test_settings_that_cannot_be(given, code, facts):
+def test_impossible_settings_of_a_source_are_refused(given, code, facts):
     with refused(ConfigError, code, **facts):
         open_source(SourceSettings(**given))
 
@@ -270,7 +270,7 @@ def test_datagrams_of_others_than_the_sender_are_dropped_and_named(interface):
         with Feeding(send), open_source(settings) as source:
             blocks = source.blocks()
             epochs = {next(blocks).origin.epoch for _ in range(10)}
-            events = [event for event in source.drain_events() if event.kind == "foreign"]
+            events = [event for event in source.take_events() if event.kind == "foreign"]
     assert epochs == {5}
     assert events[0].message == "a datagram from 127.0.0.3 was dropped; source.sender is 127.0.0.2"
 
@@ -303,5 +303,5 @@ def test_an_answer_of_a_plc_that_is_too_short_is_a_connection_that_is_tried_agai
         source = make_source(SourceSettings(**peer.settings | {"timeout_s": PATIENCE_S}))
         with Feeding(script), source.open():
             assert next(source.blocks()).rate_hz == RATE_HZ
-        (event,) = [event for event in source.drain_events() if event.kind == "disconnected"]
+        (event,) = [event for event in source.take_events() if event.kind == "disconnected"]
     assert "the PLC's answer is invalid" in event.message

@@ -51,7 +51,7 @@ def test_damaged_rings_give_batches_or_a_sentence():
 
 
 @given(count=st.integers(0, 500), have=st.none() | st.integers(0, 500), more=st.integers(0, 200), wide=st.booleans())
-def test_a_ring_gives_only_samples_that_still_stood(count, have, more, wide):
+def test_a_ring_gives_only_samples_that_were_not_overwritten(count, have, more, wide):
     """The PLC goes on writing while the ring is read: rows may be newer than their number, and must not come out."""
     dtype = np.dtype("<f8" if wide else "<f4")
     before, after = header(count), header(count + more)
@@ -99,7 +99,7 @@ VALUES = [
 ]  # fmt: skip
 
 
-def test_whatever_a_variant_holds():
+def test_any_value_of_an_opc_ua_variant_gives_a_batch_or_a_sentence():
     rng = random.Random(2)
     gathered = Gathered({"w [N m]": "a", "y": "b"}, 4000.0, "n")
     found = 0

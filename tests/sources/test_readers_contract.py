@@ -96,21 +96,21 @@ def test_a_misspelt_channel_names_the_nearest(module, tmp_path):
 
 
 @pytest.mark.parametrize("module", [module for module in TIMED if module != "mdf"])  # which always has time
-def test_neither_time_nor_rate(module, tmp_path):
+def test_a_recording_without_time_and_rate_is_refused(module, tmp_path):
     path = write(module, tmp_path, signals())
     with refused(RecordingError, "rate-missing", argument="rate_hz", path=str(path)):
         open_log(path)
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_a_rate_that_the_file_contradicts(module, tmp_path):
+def test_a_rate_that_contradicts_the_file_is_refused(module, tmp_path):
     path = write(module, tmp_path, with_time(signals()))
     with refused(RecordingError, "rate-conflict", argument="rate_hz", rate_hz=4000.0, given_hz=4100):
         open_log(path, rate_hz=4100)
 
 
 @pytest.mark.parametrize("module", TIMED)
-def test_time_none_ignores_the_column(module, tmp_path):
+def test_time_none_ignores_the_time_column(module, tmp_path):
     log = open_log(write(module, tmp_path, with_time(signals())), rate_hz=4100, time="none")
     assert (log.rate_hz, log.rate_origin, log.timing) == (4100, "given", None)
 

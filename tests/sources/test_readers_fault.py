@@ -86,7 +86,7 @@ def text(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
         ("t;u\n0;1.234,5\n1;2.345,6\n", "channel-missing", {}),
     ],
 )
-def test_tables_that_are_refused(tmp_path, content, code, facts):
+def test_unreadable_tables_are_refused_with_their_reason(tmp_path, content, code, facts):
     path = text(tmp_path, content)
     with refused(RecordingError, code, path=str(path), **facts):
         drain(path)
@@ -103,13 +103,13 @@ def test_text_far_down_is_found_with_its_line(tmp_path):
         drain(text(tmp_path, "t,u\n" + "\n".join(lines)))
 
 
-def test_bytes_that_are_no_utf8_in_a_ragged_row(tmp_path):
+def test_a_ragged_row_with_invalid_utf8_is_refused(tmp_path):
     rows = "".join(f"{k},1\n" for k in range(100_000)).encode()
     with refused(RecordingError, "line-ragged", line=100_002):
         drain(text(tmp_path, b"t,u\n" + rows + b"\xff\xfe,1,2\n"), rate_hz=1)
 
 
-def test_a_very_long_line_far_down(tmp_path):
+def test_an_overlong_line_is_refused_with_its_number(tmp_path):
     rows = "".join(f"{k},1\n" for k in range(100_000))
     with refused(RecordingError, "line-too-long", line=100_002, limit_bytes=1 << 20):
         drain(text(tmp_path, f"t,u\n{rows}1,{'2' * 9_000_000}\n"), rate_hz=1)
@@ -156,7 +156,7 @@ def test_a_recording_left_early_takes_no_bytes_from_the_file_opened_next(tmp_pat
     assert (finished.returncode, finished.stderr) == (0, "")
 
 
-def test_paths_that_are_no_recordings(tmp_path):
+def test_paths_that_are_not_recordings_are_refused(tmp_path):
     assert refusal(tmp_path / "none.csv").code == "recording.not-found"
     os.mkfifo(tmp_path / "pipe.csv")
     assert refusal(tmp_path / "pipe.csv").code == "recording.not-a-file"
@@ -169,7 +169,7 @@ def test_paths_that_are_no_recordings(tmp_path):
 
 
 @pytest.mark.parametrize(("number", "reason"), [(errno.EACCES, "Permission denied"), (errno.EIO, "Input/output error")])
-def test_a_file_that_the_system_does_not_give(tmp_path, monkeypatch, number, reason):
+def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch, number, reason):
     def fail(*_: object, **__: object) -> None:
         raise OSError(number, os.strerror(number))
 
@@ -181,7 +181,7 @@ def test_a_file_that_the_system_does_not_give(tmp_path, monkeypatch, number, rea
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_truncated_anywhere(module, tmp_path):
+def test_a_file_truncated_anywhere_is_read_or_refused(module, tmp_path):
     given = signals(200) if module == "sinumerik" else with_time(signals(200))
     whole = write(module, tmp_path, given).read_bytes()
     for keep in range(1, len(whole) - 3, max(1, len(whole) // 40)):
@@ -190,18 +190,18 @@ def test_truncated_anywhere(module, tmp_path):
 
 
 @pytest.mark.parametrize("module", ["parquet", "arrow", "npz", "hdf5", "matlab"])
-def test_no_rows(module, tmp_path):
+def test_a_table_without_rows_is_refused(module, tmp_path):
     error = refusal(write(module, tmp_path, {"u": np.empty(0), "v": np.empty(0)}), rate_hz=1)
     assert error.code in ("recording.channel-missing", "recording.empty")
 
 
-def test_duplicate_names_in_parquet(tmp_path):
+def test_duplicate_names_in_parquet_are_refused(tmp_path):
     pq.write_table(pa.table([[1.0, 2.0], [3.0, 4.0]], names=["u", "u"]), tmp_path / "a.parquet")
     with refused(RecordingError, "channel-duplicated", channel="u", columns=[1, 2]):
         drain(tmp_path / "a.parquet", rate_hz=1)
 
 
-def test_an_archive_with_a_password_and_one_with_pickles(tmp_path):
+def test_archives_with_a_password_or_pickles_are_refused(tmp_path):
     path = write("npz", tmp_path, signals())
     raw = bytearray(path.read_bytes())
     at = raw.find(b"PK\x01\x02")
@@ -219,7 +219,7 @@ def test_an_archive_with_a_password_and_one_with_pickles(tmp_path):
     assert "not real numbers" in pickled.message
 
 
-def test_sizes_that_are_declared_and_not_there(tmp_path):
+def test_declared_sizes_without_data_are_refused(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("huge", (2**50,), dtype="f8", chunks=(1024,))
     huge = refusal(tmp_path / "a.h5", rate_hz=1)
@@ -237,7 +237,7 @@ def test_sizes_that_are_declared_and_not_there(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [0, 10, 14, 40, 0x7F00])
-def test_an_element_type_that_matlab_does_not_have(tmp_path, kind):
+def test_an_unknown_element_type_in_a_mat_file_is_refused(tmp_path, kind):
     """SciPy looks such a type up behind the end of its table, which ends the process."""
     scipy.io.savemat(tmp_path / "a.mat", {"x": np.arange(100.0) + 0.5})
     tag = struct.pack("<II", 9, 800)
@@ -259,7 +259,7 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
     assert [skipped.name for skipped in log.skipped] == ["raw"]
 
 
-def test_xml_that_declares_entities_or_is_something_else(tmp_path):
+def test_xml_with_entities_or_other_content_is_refused(tmp_path):
     bomb = '<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "c">]><ResponseTestCustom>&b;</ResponseTestCustom>'
     assert refusal(text(tmp_path, bomb, "a.xml")).code == "recording.declaration-refused"
     other = refusal(text(tmp_path, "<html><body/></html>", "b.xml"))
@@ -284,13 +284,13 @@ def test_xml_that_declares_entities_or_is_something_else(tmp_path):
         ({"channels": ["nothing"]}, RecordingError, "channel-unknown", {"channel": "nothing"}),
     ],
 )
-def test_options_that_are_refused(tmp_path, options, kind, code, facts):
+def test_unsuitable_options_of_a_reader_are_refused(tmp_path, options, kind, code, facts):
     path = write("npz", tmp_path, signals())
     with refused(kind, code, **facts):
         drain(path, **options)
 
 
-def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
+def test_a_channel_requested_twice_or_as_a_bare_string_is_refused(tmp_path):
     log = open_log(write("npz", tmp_path, signals()), rate_hz=1)
     with refused(UsageError, "duplicate", argument="channels", value="input"):
         log.blocks(["input", "input"])
@@ -300,7 +300,7 @@ def test_asking_for_a_channel_twice_or_for_a_bare_string(tmp_path):
         log.blocks("input")
 
 
-def test_hdf5_without_its_library(tmp_path, monkeypatch):
+def test_hdf5_without_its_library_names_the_extra(tmp_path, monkeypatch):
     path = write("hdf5", tmp_path, signals())
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(ExtraError) as caught:

@@ -71,7 +71,7 @@ def test_mdf_brings_units_and_physical_values(tmp_path, version):
     np.testing.assert_array_equal(block["y"], VALUES)
 
 
-def test_mdf_groups_of_two_rates_are_told_apart(tmp_path):
+def test_mdf_groups_of_two_rates_are_separated(tmp_path):
     with asammdf.MDF(version="4.10") as file:
         file.append([asammdf.Signal(VALUES, np.arange(500) / RATE_HZ, name="y")], common_timebase=True)
         file.append([asammdf.Signal(VALUES[:50], np.arange(50) / 400, name="y")], common_timebase=True)

@@ -62,17 +62,17 @@ def test_units_in_a_row_below_the_header(tmp_path):
     assert (log.rate_hz, log.samples) == (1000, 3)
 
 
-def test_preamble_as_wide_as_the_table(tmp_path):
+def test_a_preamble_with_the_columns_of_the_table_is_skipped(tmp_path):
     log = opened(tmp_path, "Operator;Miller\nMachine;5\n\nt;u\n0,000;1\n0,001;2\n")
     assert samples(log, "t", "u").tolist() == [[0, 0.001], [1, 2]]
 
 
-def test_what_excel_writes_above_a_table(tmp_path):
+def test_the_separator_line_of_excel_is_read(tmp_path):
     log = opened(tmp_path, "sep=;\nt;u\n0;1\n0,5;2\n")
     assert (log.rate_hz, samples(log, "u").tolist()) == (2, [[1, 2]])
 
 
-def test_a_delimiter_that_ends_each_line(tmp_path):
+def test_a_trailing_delimiter_adds_no_channel(tmp_path):
     for header in ("t;u;", "t;u"):
         log = opened(tmp_path, f"{header}\n0;1;\n0,5;2;\n")
         assert [c.name for c in log.channels] == ["t", "u"]

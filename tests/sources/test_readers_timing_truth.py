@@ -34,11 +34,11 @@ def test_few_digits_are_rounding_and_not_jitter(tmp_path):
     assert log.timing.gaps == 0
 
 
-def test_float32_time(tmp_path):
+def test_the_rate_of_a_float32_time_column_is_exact(tmp_path):
     assert opened(tmp_path, (np.arange(100_000) / 4000).astype(np.float32)).rate_hz == 4000
 
 
-def test_a_rate_that_is_truly_not_round_stays_so(tmp_path):
+def test_a_rate_that_is_not_round_is_not_rounded(tmp_path):
     rate_hz = 1000.0371
     assert opened(tmp_path, np.arange(50_000) / rate_hz).rate_hz == pytest.approx(rate_hz, rel=1e-12)
 
@@ -88,7 +88,7 @@ def test_a_pause_need_not_be_whole(tmp_path):
 @pytest.mark.parametrize(
     ("kind", "factor"), [("int64", 250), (pa.timestamp("us"), 250), (pa.duration("ns"), 250_000), ("uint32", 250)]
 )
-def test_whole_number_clocks(tmp_path, kind, factor):
+def test_the_rate_of_an_integer_clock_is_exact(tmp_path, kind, factor):
     array = (
         pa.array(np.arange(3000) * factor)
         .cast(pa.int64())
@@ -104,7 +104,7 @@ def test_nanoseconds_since_1970_lose_nothing(tmp_path):
     assert (log.rate_hz, log.timing.period_s_std) == (4000, 0)
 
 
-def test_a_unit_that_only_the_rate_tells(tmp_path):
+def test_a_time_unit_is_derived_from_a_specified_rate(tmp_path):
     time = np.arange(0, 400_000, 400)
     assert opened(tmp_path, time, rate_hz=2500).timing.unit == "us"
     assert open_log(tmp_path / "log.parquet", time="t [us]").rate_hz == 2500
@@ -131,12 +131,12 @@ def test_the_given_rate_is_exact(tmp_path):
         (lambda t: np.round(t, 3), "time-not-increasing", {"sample": 1}),
     ],
 )
-def test_times_that_are_refused(tmp_path, spoil, code, facts):
+def test_time_columns_that_are_not_a_clock_are_refused(tmp_path, spoil, code, facts):
     with refused(RecordingError, code, channel="t", path=str(tmp_path / "log.parquet"), **facts):
         opened(tmp_path, spoil(np.arange(1000) / 4000))
 
 
-def test_a_rate_beside_the_column(tmp_path):
+def test_a_rate_in_the_metadata_is_used(tmp_path):
     table = pa.table({"u": np.arange(10.0)}).replace_schema_metadata({"rate_hz": "4000"})
     pq.write_table(table, tmp_path / "a.parquet")
     log = open_log(tmp_path / "a.parquet")

@@ -17,7 +17,7 @@ def joined(log, *names):
     return np.concatenate([block.data for block in log.blocks(names, block_samples=999)], axis=1)
 
 
-def test_motorbench():
+def test_the_motor_bench_has_the_known_rate_and_samples():
     log = open_log(DATA / "motorbench" / "MultisineTypeA.mat")
     assert (log.rate_hz, log.samples, log.timing.unit, log.timing.gaps) == (2500, 50_000, "us", 0)
     assert "'fs' in the file" in log.rate_origin

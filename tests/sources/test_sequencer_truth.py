@@ -78,7 +78,7 @@ def test_reordering_within_the_bound_and_repeats_change_nothing(lengths, first, 
     bound=st.integers(0, 6),
     data=st.data(),
 )
-def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
+def test_lost_batches_are_exactly_the_gaps(lengths, bound, data):
     batches = stream(lengths, 7)
     lost = data.draw(st.sets(st.integers(1, len(batches) - 2)))
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
@@ -87,7 +87,7 @@ def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
     truth = [(b.first_sample - 7, b.data.tobytes()) for b in kept]
     assert [(b.start, b.data.tobytes()) for b in blocks] == truth
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
-    events = [event for event in said.drain() if event.kind == "loss"]
+    events = [event for event in said.take() if event.kind == "loss"]
     missing = [b.first_sample - a.stop for a, b in pairwise(kept) if a.stop != b.first_sample]
     assert [event.details["missing_samples"] for event in events] == missing
     assert [event.sample for event in events] == [b.start for b in blocks if b.gap]
@@ -95,7 +95,7 @@ def test_what_is_lost_is_exactly_the_gaps(lengths, bound, data):
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=60), st.integers(0, 8))
-def test_whatever_comes_samples_are_right_and_ascend(pieces, bound):
+def test_any_overlapping_batches_give_correct_ascending_samples(pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: every sample that comes out is at its place, once."""
     batches = [stream([length], first)[0] for first, length in pieces]
     blocks = passed(batches, reorder=bound)
@@ -145,7 +145,7 @@ def test_a_second_sender_is_dropped_and_named_while_the_first_one_sends():
     blocks = passed([batch for pair in zip(a, b) for batch in pair], said, reorder=0)
     assert content(blocks) == content(passed(a, reorder=0))
     assert (said.counts["restart"], said.counts["foreign"]) == (0, 50)
-    assert said.drain()[0].details == {"epoch": "0x2", "sender_sample": 0}
+    assert said.take()[0].details == {"epoch": "0x2", "sender_sample": 0}
 
 
 @settings(deadline=None)
@@ -160,7 +160,7 @@ def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strang
     assert np.array_equal(found, np.concatenate([np.arange(block.start, block.stop) for block in mine]) + 1000)
     assert found[-1] == 1999
     assert len(found) == 1000 - 10 * strange
-    back = [event for event in said.drain() if event.kind == "restart"]
+    back = [event for event in said.take() if event.kind == "restart"]
     assert [event.details["epoch"] for event in back] == ["0x2", "0x1"]
     assert back[1].details["lost_samples"] == 10 * strange
     assert "set its address in source.sender" in back[1].message
@@ -168,7 +168,7 @@ def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strang
 
 @settings(deadline=None)
 @given(st.integers(0, 8), st.integers(1, 2), st.integers(20, 40))
-def test_batches_half_an_hour_ahead_are_not_believed_while_the_stream_goes_on(reorder, strange, at):
+def test_batches_half_an_hour_ahead_are_rejected_while_the_stream_continues(reorder, strange, at):
     good = stream([10] * 60, 1000)
     ahead = stream([10] * strange, 1000 + int(1800 * RATE_HZ))
     said = Said()
@@ -186,7 +186,7 @@ def test_a_real_jump_of_half_an_hour_is_a_loss_of_exactly_so_long(reorder):
     assert np.array_equal(
         np.concatenate([block.data[0] for block in blocks]), np.r_[1000:1400, 1400 + jump : 1800 + jump]
     )
-    (event,) = said.drain()
+    (event,) = said.take()
     assert (event.kind, event.details["missing_samples"], event.sample) == ("loss", jump, 400 + jump)
 
 
@@ -204,7 +204,7 @@ def resumed(position: Position, batches: list[Batch], said: Said, **options: int
 
 @settings(deadline=None)
 @given(st.sampled_from([0, 1]), st.integers(0, 8), st.integers(0, 40_000), st.integers(0, 300))
-def test_a_stream_continues_by_the_senders_numbers_whatever_the_clock_says(epoch, reorder, missing, again):
+def test_a_stream_continues_by_the_numbers_of_the_sender_whatever_the_clock(epoch, reorder, missing, again):
     """A broker that kept what came in 20 s, and gives some of it again, as well as a sender that was not heard."""
     again -= again % 10
     position = left_at(5000, 105_000, epoch, 20.0)
@@ -216,18 +216,18 @@ def test_a_stream_continues_by_the_senders_numbers_whatever_the_clock_says(epoch
     number = np.concatenate([np.arange(block.start, block.stop) for block in blocks])
     assert np.array_equal(np.concatenate([block.data[0] for block in blocks]), number + 100_000)
     assert number[0] == 5000 + missing
-    losses = [event.details["missing_samples"] for event in said.drain() if event.kind == "loss"]
+    losses = [event.details["missing_samples"] for event in said.take() if event.kind == "loss"]
     assert losses == ([missing] if missing else [])
     assert said.counts["restart"] == 0
 
 
 @pytest.mark.parametrize("epoch", [0, 2])
-def test_a_sender_that_began_anew_meanwhile_is_an_estimate_by_the_computers_clock(epoch):
+def test_the_gap_of_a_restarted_sender_is_estimated_by_the_computers_clock(epoch):
     position = left_at(5000, 905_000, 0 if epoch == 0 else 1, 20.0)
     said = Said()
     blocks = resumed(position, stream([10] * 60, 0, epoch), said, reorder=0)
     assert (blocks[0].start, blocks[0].gap) == (5000 + 20 * RATE_HZ - 10, True)
-    (event,) = said.drain()
+    (event,) = said.take()
     assert event.kind == "restart"
     assert "which is an estimate" in event.message
     assert event.details["estimated_samples"] == 20 * RATE_HZ - 10
@@ -269,7 +269,7 @@ def counts_of(batches: list[Batch], **options: float) -> dict[str, int]:
     return {kind: count for kind, count in said.counts.items() if count}
 
 
-def test_what_goes_wrong_is_told_apart():
+def test_each_fault_of_a_stream_is_counted_as_its_own_kind():
     """Each fault alone gives its own kind and no other."""
     good = stream([100] * 40, stamp_s=1e9)
     assert counts_of(good) == {}
@@ -299,7 +299,7 @@ def test_a_rate_that_is_a_little_wrong_shows_after_ten_seconds():
     off = [replace(b, stamp_s=1e9 + b.first_sample / 4010 + e) for b, e in zip(batches, jitter)]
     said = Said()
     passed(off, said)
-    (event,) = said.drain()
+    (event,) = said.take()
     assert event.kind == "wrong-rate"
     assert event.details["measured_hz"] == pytest.approx(4010, abs=1)
 
@@ -313,7 +313,7 @@ def test_changed_layouts_that_still_hold_the_channels_are_taken_by_name():
     ]
     said = Said()
     assert content(passed(changed, said)) == content(passed(good))
-    assert [event.kind for event in said.drain()] == ["layout-changed"]
+    assert [event.kind for event in said.take()] == ["layout-changed"]
 
 
 def test_a_flood_of_events_is_counted_and_held_back():
@@ -321,11 +321,11 @@ def test_a_flood_of_events_is_counted_and_held_back():
     said = Said(lambda: now[0])
     for _ in range(100_000):
         said.say("malformed", "x" * 100_000)
-    events = said.drain()
+    events = said.take()
     assert len(events) == BURST
     assert max(len(event.message) for event in events) <= 500
     now[0] = 1.0
     said.say("malformed", "y")
-    (event,) = said.drain()
+    (event,) = said.take()
     assert event.details["more"] == 100_000 - BURST
     assert said.counts["malformed"] == 100_001

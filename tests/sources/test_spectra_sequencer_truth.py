@@ -53,7 +53,7 @@ hops = st.sampled_from([1, 20, 60, 180])
     bound=st.integers(0, 6),
     data=st.data(),
 )
-def test_what_is_lost_is_exactly_the_gaps_and_phases_stay(hop, lengths, first, bound, data):
+def test_lost_batches_are_exactly_the_gaps_and_phases_are_unchanged(hop, lengths, first, bound, data):
     batches = stream(hop, lengths, first)
     lost = data.draw(st.sets(st.integers(1, len(batches) - 2)))
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
@@ -63,7 +63,7 @@ def test_what_is_lost_is_exactly_the_gaps_and_phases_stay(hop, lengths, first, b
     blocks = passed(displaced(kept, bound, data), said, bound)
     assert [block.start for block in blocks] == [batch.first_sample - first * hop for batch in kept]
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
-    assert sum(e.details["missing_samples"] for e in said.drain() if e.kind == "loss") == sum(
+    assert sum(e.details["missing_samples"] for e in said.take() if e.kind == "loss") == sum(
         b.first_sample - a.stop for a, b in pairwise(kept)
     )
     for block, batch in zip(blocks, kept):
@@ -76,7 +76,7 @@ def test_what_is_lost_is_exactly_the_gaps_and_phases_stay(hop, lengths, first, b
 
 @settings(deadline=None)
 @given(hops, st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=31), st.integers(0, 8))
-def test_whatever_comes_spectra_are_right_and_ascend(hop, pieces, bound):
+def test_any_overlapping_batches_give_correct_ascending_spectra(hop, pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: what comes out is at its place, once."""
     blocks = passed([stream(hop, [length], first)[0] for first, length in pieces], Said(), bound)
     numbers = np.concatenate([block.sums[0, :, 0].real for block in blocks])
@@ -96,13 +96,13 @@ def test_a_restart_is_a_gap_and_keeps_the_grid_of_hops():
     assert said.counts["restart"] == 1
 
 
-def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_said_once():
+def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_reported_once():
     given_, samples = stream(20, [1] * 12), Batch(40, np.zeros((2, 20)), SIGNALS, RATE_HZ, 1, arrived_s=0.0)
     other = made(layout(20, lines=(2, 6)), 4, 5)
     said = Said()
     blocks = passed([*given_[:4], samples, samples, other, other, *given_[4:]], said, 0)
     assert [block.start for block in blocks] == list(range(0, 240, 20))
-    messages = [event.message for event in said.drain() if event.kind == "layout-changed"]
+    messages = [event.message for event in said.take() if event.kind == "layout-changed"]
     assert messages == [
         "the sender now sends samples; they are skipped until the first layout is back",
         "the sender now sends spectra of another layout; they are skipped until the first layout is back",
@@ -111,10 +111,10 @@ def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_said_
     said = Said()
     begun = [replace(samples, first_sample=at) for at in (0, 20)]
     assert len(passed([begun[0], given_[1], begun[1]], said, 0)) == 2
-    assert [e.message[:31] for e in said.drain()] == ["the sender now sends spectra; t"]
+    assert [e.message[:31] for e in said.take()] == ["the sender now sends spectra; t"]
 
 
-def test_a_rate_that_changes_is_said():
+def test_a_changed_rate_is_reported():
     said = Said()
     first, second = stream(20, [1, 1])
     assert len(passed([first, replace(second, rate_hz=8000.0)], said, 0)) == 1

@@ -108,7 +108,7 @@ def test_the_block_that_the_design_leaves_fits_the_program(tmp_path: Path) -> No
         (AXIS.replace("gain = 1.0\n", ""), (FILE,), "'loop.velocity.gain' is missing; add it"),
     ],
 )  # fmt: skip
-def test_what_contradicts_the_axis_or_the_design_is_refused(axis: str, more, said: str, tmp_path: Path) -> None:
+def test_options_that_contradict_the_axis_or_the_design_are_refused(axis: str, more, said: str, tmp_path: Path) -> None:
     given = [part for word in more for part in ([word, tmp_path / "excitation.npz"] if word == FILE else [word])]
     done = plc(tmp_path, *given, axis=axis)
     assert done.code == 2

@@ -89,7 +89,9 @@ def test_every_kind_of_name_is_held_to_the_same() -> None:
         ([[1.0, 2.0]], {}, "wrong-shape", {"argument": "period", "shape": [1, 2]}),
     ],
 )
-def test_an_excitation_that_no_block_can_play(period, given: dict[str, float], code: str, facts: dict) -> None:
+def test_an_excitation_that_no_block_can_play_is_refused(
+    period, given: dict[str, float], code: str, facts: dict
+) -> None:
     with refused(UsageError, code, **facts):
         multisine(period, **({"rate_hz": 1e3, "limit": 2.0} | given))
 
@@ -112,7 +114,7 @@ def test_the_scale_that_a_refusal_names_passes_and_a_larger_one_by_a_thousandth_
             multisine(period * scale * 1.002, rate_hz=1e3, limit=limit)
 
 
-def test_what_does_not_fit_a_plc_is_refused_with_what_would() -> None:
+def test_blocks_too_large_for_a_plc_are_refused_with_the_largest_that_fits() -> None:
     with refused(UsageError, "too-large", samples=1_000_000, samples_max=349_523, limit_bytes=8_388_608):
         sliding_dft(Lines((1,), 1_000_000, rate_hz=1e3), ["u"])
     assert sliding_dft(Lines((1,), 349_523, rate_hz=1e3), ["u"])

@@ -42,7 +42,7 @@ def played(block: Instance, cycles: int, **given: object) -> tuple[np.ndarray, n
 
 @pytest.mark.parametrize("ramp_periods", [1, 3])
 @pytest.mark.parametrize("scale", [1.0, -0.7])
-def test_it_ramps_in_plays_the_period_to_the_bit_and_ramps_out(ramp_periods: int, scale: float) -> None:
+def test_the_block_ramps_up_plays_the_period_to_the_bit_and_ramps_down(ramp_periods: int, scale: float) -> None:
     block, ramp = fresh(ramp_periods), ramp_periods * WINDOW
     played(block, 5)
     w, steady = played(block, WINDOW - 5, enable=True, scale=scale)
@@ -94,7 +94,7 @@ def test_a_scale_beyond_the_limit_is_refused_with_the_largest_that_is_not(scale:
     assert not block["refused"]
 
 
-def test_whatever_the_program_does_the_limit_holds_and_periods_stay_on_the_grid() -> None:
+def test_random_inputs_never_exceed_the_limit_and_periods_remain_on_the_grid() -> None:
     """Inputs at random, every cycle: |w| ≤ limit, steady is the period, and levels change at borders only."""
     rng, block = np.random.default_rng(5), fresh(idle_periods=0)
     inputs = {"enable": False, "stop": False, "scale": 1.0, "w_max": LIMIT}

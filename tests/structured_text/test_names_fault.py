@@ -73,7 +73,7 @@ def test_a_name_of_mains_own_is_refused_in_every_role_and_case(name: str, role: 
     st.sampled_from(ROLES),
     st.booleans(),
 )
-def test_any_name_that_any_text_declares_is_refused_or_stands_for_one_thing(name, case, role, named) -> None:
+def test_any_name_that_a_text_declares_is_refused_or_declared_once(name, case, role, named) -> None:
     """What passes is declared once in each unit, is no unit's name, and MAIN gives a value only to what it makes."""
     spelt = case(name)
     signals = SIGNALS | {role: spelt}

@@ -62,7 +62,7 @@ def test_spectra_on_the_controller_are_the_plants_response() -> None:
     np.testing.assert_allclose(y / u, truth(), rtol=1e-12)
 
 
-def test_the_ring_holds_what_the_program_wrote_and_the_counter_tells_the_borders_of_periods() -> None:
+def test_the_ring_contains_the_samples_of_the_program_and_the_counter_marks_the_periods() -> None:
     axis = Axis()
     axis.run(CYCLES)
     raw = axis.ring.bytes()

@@ -47,7 +47,7 @@ def test_every_output_over_ten_periods_is_the_kernels_to_the_bit(window: int, bi
     assert dft["count"] == 10 * window
 
 
-def test_it_is_the_dft_of_the_last_window_and_stays_so() -> None:
+def test_the_block_is_the_dft_of_the_last_window_after_2000_periods() -> None:
     """Against numpy.fft, within the kernel's own bound of 5e-15·√N·‖x‖₂, after 2,000 periods with an offset."""
     window, bins = 50, [1, 24]
     dft = block(window, bins, ["w", "y"], "window")

@@ -10,13 +10,13 @@ from studies.design import MOVING, STANDING
 
 
 @pytest.mark.parametrize("case", STANDING)
-def test_peaks_of_a_standing_axis(case):
+def test_predicted_peaks_at_standstill_are_simulated_within_ten_percent(case):
     axis, lines, samples = STANDING[case]
     _within_ten_percent(axis, lines, samples, extremes(axis, samples))
 
 
 @pytest.mark.parametrize("case", MOVING)
-def test_peaks_on_top_of_a_motion(case):
+def test_predicted_peaks_during_a_motion_are_simulated_within_ten_percent(case):
     """Simulated: the largest over twelve alignments of excitation and motion, and two cycles; the first is smaller."""
     axis, lines, samples = MOVING[case]
     cycle_s = len(axis.motion.cycle(4000)[0]) / 4000

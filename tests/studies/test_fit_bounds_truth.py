@@ -42,7 +42,7 @@ def test_a_fit_names_what_the_model_lacks() -> None:
     assert right.about_bounds == "± covers 95 %"
 
 
-def test_what_the_user_holds_is_not_freed() -> None:
+def test_a_parameter_that_the_user_fixed_is_not_freed() -> None:
     late = responses_of(CASES["the model is right but for 1.5 ticks of delay"], 1)[0]
     assert fit(late, BELT).taken == ("delay",)
     held = fit(late, BELT, fixed={"delay": 0.0, "B": 0.0, "BL": 0.0})

@@ -7,7 +7,7 @@ import numpy as np
 from studies.fits import AFTER_S, TRUTH, least_variance, moving, standing
 
 
-def test_at_standstill_through_simulation_and_tracker() -> None:
+def test_fits_at_standstill_reach_the_cramer_rao_bound_and_their_bounds_cover_the_truth() -> None:
     found = standing(120)
     assert found.ok.all()
     ratio = np.mean(np.log(found.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance()
@@ -17,7 +17,7 @@ def test_at_standstill_through_simulation_and_tracker() -> None:
     assert cover.min() >= 0.95 - 3 * np.sqrt(0.05 * 0.95 / 120)
 
 
-def test_along_a_stroke_with_the_motion_taken_off() -> None:
+def test_fits_along_a_corrected_stroke_are_within_the_targets() -> None:
     found, axis = moving(1)
     assert AFTER_S < 0.2
     assert found.ok.all()

@@ -19,7 +19,7 @@ def periods(u: np.ndarray, y: np.ndarray, count: int = 2) -> Block:
 
 
 @pytest.mark.parametrize("seed", [None, 0, 7])
-def test_the_excitation_is_odd_with_quiet_odd_lines_and_has_its_rms(seed: int | None) -> None:
+def test_the_excitation_is_odd_with_odd_detection_lines_and_the_specified_rms(seed: int | None) -> None:
     period = period_of(LINES, seed)
     assert np.sqrt(np.mean(period**2)) == pytest.approx(RMS_N_M)
     size = np.abs(np.fft.rfft(period))
@@ -39,7 +39,7 @@ def test_squares_are_even_and_cubes_are_odd(power: int, seen: np.ndarray, empty:
     assert noise.max() < 1e-20
 
 
-def test_what_feeds_back_is_taken_off() -> None:
+def test_distortion_that_was_fed_back_is_subtracted() -> None:
     w, n = period_of(LINES, 2), np.arange(PERIOD)
     disturbance = 0.02 * np.sin(2 * np.pi * 50 * n / PERIOD) + 0.03 * np.sin(2 * np.pi * LINES.quiet[0] * n / PERIOD)
     y = (2 * w + disturbance) / (1 + 2 * 0.5)  # y = 2·u + disturbance, u = w − y/2

@@ -112,23 +112,23 @@ def test_prepared_signals_are_the_newest_at_each_row() -> None:
 
 
 @pytest.mark.parametrize("peer", [rls.textbook, rls.tuned, least_squares.sliding])
-def test_arx_peers_find_the_standing_machine_without_noise(peer, quiet: Recording) -> None:
+def test_arx_peers_find_the_machine_at_standstill_without_noise(peer, quiet: Recording) -> None:
     true = quiet.true_response(quiet.judged)[0]
     assert apart(peer(quiet).at(quiet.judged).value[0], true) < 0.02
 
 
-def test_welch_and_livebode_find_the_standing_machine_without_noise(quiet: Recording) -> None:
+def test_welch_and_livebode_find_the_machine_at_standstill_without_noise(quiet: Recording) -> None:
     true = quiet.true_response(quiet.judged)[0]
     for peer in (sliding_welch.sliding, by(track)):
         assert apart(peer(quiet).at(quiet.judged).value[0], true) < 1e-5
 
 
-def test_livebode_is_dated_at_the_centre_unless_told(quiet: Recording) -> None:
+def test_livebode_is_dated_at_the_centre_by_default(quiet: Recording) -> None:
     assert by(track)(quiet).delay == CENTRE == 199.5
     assert by(track, 260.0)(quiet).delay == 260.0
 
 
-def test_the_filter_converges_on_the_standing_machine() -> None:
+def test_the_filter_converges_to_the_machine_at_standstill() -> None:
     recording = standing(2.5, 0.1)
     answer = kalman.tuned(recording).at(recording.judged)
     assert apart(answer.parameters[0, [0, 2]], two_mass.NOMINAL[[0, 2]]) < 0.02
@@ -200,7 +200,7 @@ def test_a_row_that_was_not_estimated_is_refused(quiet: Recording) -> None:
         replace(answer).at(np.array([25]))
 
 
-def test_the_filter_that_is_told_its_start_keeps_its_parameters() -> None:
+def test_the_filter_diverges_only_where_its_start_is_unknown() -> None:
     block = starts.beginning(0)
     assert not starts.diverges(block, kalman.DOUBT)
     assert starts.diverges(block, np.full(9, np.inf))

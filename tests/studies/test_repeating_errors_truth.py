@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import Block, Channel, Lines, Responses
+from livebode.core import Block, Channel, Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine, odd_lines
 from livebode.fitting import mean_response
 from studies.repeating import CASES, Case, measure
+from tests.support.found import with_events
 
 RATE_HZ = 4000.0
 
@@ -53,14 +54,14 @@ def test_noise_larger_than_the_output_makes_no_line_distorted_and_as_large_hides
         w = np.tile(multisine(lines, phases="random", seed=seed), 10)
         y = np.sign(w) + 0.2 * w / w.std() if nonlinear else w
         y = y + noise * y.std() * rng.standard_normal(w.size)
-        found += "distorted" in [event.kind for event in tracked(y, lines, w)[0].drain_events()]
+        found += "distorted" in [event.kind for event in tracked(y, lines, w)[2]]
     assert found == distorted
 
 
-def tracked(y_of: np.ndarray, lines: Lines, w: np.ndarray, unit: str = "rad") -> tuple[Tracker, Responses]:
+def tracked(y_of: np.ndarray, lines: Lines, w: np.ndarray, unit: str = "rad") -> tuple[Tracker, Responses, list[Event]]:
     tracker = Tracker(Settings(lines=lines, output="y", input="u", excitation="w"))
     channels = (Channel("w"), Channel("u"), Channel("y", unit))
-    return tracker, tracker.process(Block(np.array([w, w, y_of]), channels, RATE_HZ))
+    return tracker, *with_events(tracker.process, Block(np.array([w, w, y_of]), channels, RATE_HZ))
 
 
 def test_a_line_below_half_a_step_of_the_sensor_is_not_valid_unless_noise_carries_it_over_the_steps() -> None:
@@ -68,10 +69,10 @@ def test_a_line_below_half_a_step_of_the_sensor_is_not_valid_unless_noise_carrie
     amplitude = np.full(len(lines), 3.0)
     amplitude[2] = 0.3
     w = np.tile(multisine(lines, amplitude, "random", seed=2), 10)
-    tracker, responses = tracked(np.round(w), lines, w)
+    _, responses, events = tracked(np.round(w), lines, w)
     assert not responses.valid[-1, 2]
     assert responses.valid[-1, [0, 1, 3, 4]].all()
-    steps = [event for event in tracker.drain_events() if event.kind == "steps"]
+    steps = [event for event in events if event.kind == "steps"]
     assert [event.details["line_hz"] for event in steps] == [lines.frequency_hz[2]]
     assert 0.1 < steps[0].details["steps"] < 0.5
     dithered = np.round(w + np.random.default_rng(3).standard_normal(w.size))
@@ -81,7 +82,7 @@ def test_a_line_below_half_a_step_of_the_sensor_is_not_valid_unless_noise_carrie
 def test_distortion_is_not_known_where_every_bin_that_it_reaches_is_excited_or_outside() -> None:
     lines = Lines.parse("20:140:20", RATE_HZ, 400)
     w = np.tile(multisine(lines), 10)
-    tracker, responses = tracked(w + 1e-3 * w**3, lines, w)
+    tracker, responses, _ = tracked(w + 1e-3 * w**3, lines, w)
     assert np.isnan(responses.distortion).all()
     assert tracker.found()["judged"]["distortion"] is None
 
@@ -118,22 +119,24 @@ def test_where_the_schedule_moves_the_noise_is_that_of_detection_lines_and_the_c
     block = Block(np.array([w, w, x * w + noise, x]), ("w", "u", "y", "x"), RATE_HZ)
     given = {"lines": lines, "output": "y", "input": "u", "excitation": "w", "schedule": "x"}
     auto, periods = Tracker(Settings(**given)), Tracker(Settings(**given, noise="periods"))
-    ours, theirs = auto.process(block), periods.process(block)
+    (ours, events), (theirs, others) = with_events(auto.process, block), with_events(periods.process, block)
     at = ours.valid.all(axis=1) & (ours.schedule > 0.5)
     assert np.median(theirs.sigma[at] / ours.sigma[at]) > 3
     error = np.abs(ours.value[at] - ours.schedule[at, np.newaxis])
     assert np.mean(error <= ours.bound(2)[at]) >= 0.95
-    assert [event.kind for event in auto.drain_events()] == ["noise-from-detection-lines"]
+    assert [event.kind for event in events] == ["noise-from-detection-lines"]
     assert auto.found()["judged"]["noise_from_detection_lines"] > 0.8 * len(ours)
-    assert periods.drain_events() == []
+    assert others == []
 
 
 def test_distortion_on_a_line_at_the_mains_is_not_called_hum() -> None:
     """Friction-like distortion of 50 Hz is at its multiples alone, where the mains would be, too."""
     lines = Lines((10,), 800, RATE_HZ, tuple(k for k in range(1, 60) if k % 10))
     w = np.tile(multisine(lines), 40)
-    tracker, responses = tracked(w + 0.02 * np.sign(w) + 1e-6 * np.random.default_rng(1).normal(size=w.size), lines, w)
-    assert "hum" not in [event.kind for event in tracker.drain_events()]
+    _, responses, events = tracked(
+        w + 0.02 * np.sign(w) + 1e-6 * np.random.default_rng(1).normal(size=w.size), lines, w
+    )
+    assert "hum" not in [event.kind for event in events]
     assert responses.valid[-1].all()
 
 

@@ -65,7 +65,7 @@ def test_the_committed_page_is_that_of_the_committed_numbers(name: str, tmp_path
         (0.9, True, "missed"),
     ],
 )
-def test_a_verdict_says_which_side_of_the_target_it_is_on(value: float, at_least: bool, word: str) -> None:
+def test_a_verdict_is_met_or_missed_by_the_side_of_the_target(value: float, at_least: bool, word: str) -> None:
     verdict = Verdict("claim", value, 1.0, at_least, why="the reason")
     assert verdict.word == word
     assert str(verdict).startswith(word)

@@ -23,10 +23,12 @@ from livebode.estimation import Tracker
 from livebode.records import Run
 from livebode.records.query import query
 from livebode.reporting.run_report import run_report
+from livebode.runtime import Document
+from livebode.runtime.documents import Tracked
 from livebode.runtime.fits import Fits
-from livebode.runtime.tracking import record
 from tests.support.command import livebode
 from tests.support.recorded import SETTINGS, machine
+from tests.support.runs import record
 
 SAMPLES, STOPPED = 2600, 1900
 TABLES = ("responses", "parameters", "samples")
@@ -45,15 +47,15 @@ class StopError(Exception):
 def record_run(directory: Path, *, until: int = 10**9, segments: bool = True, told: list[Event] | None = None) -> None:
     """Record the machine up to a sample, or continue to its end."""
 
-    def progress(done: int, _: int | None) -> None:
-        if done > until:
+    def listen(document: Document) -> None:
+        if isinstance(document, Tracked) and document.samples > until:
             raise StopError
+        if isinstance(document, Event) and document.kind.startswith("record-") and told is not None:
+            told.append(document)
 
     record(
-        machine(SAMPLES), Tracker(SETTINGS), directory,
-        about={"configuration": CONFIGURATION | {"record": KEPT.model_dump()}}, force=False, progress=progress,
-        draw=lambda *_: None, fits=Fits(FIT), kept=KEPT if segments else None,
-        tell=(lambda _: None) if told is None else told.append,
+        machine(SAMPLES), Tracker(SETTINGS), directory, fits=Fits(FIT), segments=KEPT if segments else None,
+        about={"configuration": CONFIGURATION | {"record": KEPT.model_dump()}}, subscribers=[listen],
     )  # fmt: skip
 
 

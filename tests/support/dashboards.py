@@ -11,17 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis.overview import Overview
 from livebode.configuration.axis import FitSection, LoopSection, RecordSection
 from livebode.core import Block, Channel, Lines, Responses
 from livebode.dashboard import Dashboard, Hub, Serving
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import Run
+from livebode.runtime import RunControl
+from livebode.runtime.documents import RunStarted
 from livebode.runtime.fits import Fits
-from livebode.runtime.tracking import record
 from livebode.simulation.two_mass_loop import RATE_HZ, TwoMassLoop
 from tests.support.browser import until
 from tests.support.responses import made
+from tests.support.runs import record
 
 LINES = Lines.parse("20:140:10", RATE_HZ, 400)
 UNITS = {"w": "N m", "u": "N m", "y": "rad/s", "x": "m"}
@@ -64,7 +67,7 @@ class Machine:
             self._allowed = samples
             self._more.notify_all()
 
-    def blocks(self, channels: Sequence[str]) -> Iterator[Block]:
+    def blocks(self, channels: Sequence[str]) -> Iterator[Block | None]:
         rows = [list(UNITS).index(name) for name in channels]
         for start in range(0, SAMPLES, 200):
             with self._more:
@@ -74,8 +77,7 @@ class Machine:
                         break
                     if self._allowed < 0:
                         return
-                    # So that what the audience has to say is recorded while the machine stands still.
-                    yield Block(np.empty((len(rows), 0)), tuple(channels), RATE_HZ, start=start)
+                    yield None
             yield Block(data()[rows, start : start + 200], tuple(channels), RATE_HZ, start=start)
 
 
@@ -96,9 +98,8 @@ class Watched:
             target=record,
             args=(self.machine, Tracker(SETTINGS), directory),
             kwargs={
-                "about": {"configuration": words, "found": {"format": "test"}}, "force": False, "draw": lambda *_: None,
-                "progress": lambda *_: None, "fits": Fits(section, described if loop else None), "audience": self.hub,
-                "kept": RecordSection(segment_s=1.0),
+                "about": {"configuration": words, "found": {"format": "test"}}, "subscribers": [self.hub],
+                "fits": Fits(section, described if loop else None), "segments": RecordSection(segment_s=1.0),
             },
         )  # fmt: skip
 
@@ -142,6 +143,6 @@ def begin(hub: Hub, directory: Path, lines: Lines, from_s: float = 0.0, rows: Re
     """A run on these lines, with its first responses, that begins at this time."""
     found = {"bins": list(lines.bins), "quiet_bins": [], "window": lines.window, "rate_hz": lines.rate_hz}
     found |= {"quantity": "plant", "unit": ""}
-    hub.begin(directory, {"found": found, "configuration": {"loop": LOOP}}, None)
+    hub(RunStarted(directory, {"found": found, "configuration": {"loop": LOOP}}, RunControl(), Overview()))
     rows = rows or made(30, lines, hole=0.0, unit="")
-    hub.write(replace(rows, time_s=rows.time_s + from_s))
+    hub(replace(rows, time_s=rows.time_s + from_s))

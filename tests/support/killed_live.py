@@ -23,8 +23,7 @@ from livebode.configuration.axis import Axis
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
 from livebode.runtime.destination import Destination
-from livebode.runtime.live import run_live
-from livebode.runtime.orders import Orders
+from livebode.runtime.run import run
 from tests.support.command import RATE_HZ
 from tests.support.live_feeds import Feed
 from tests.support.peers.peer import PATIENCE_S, until
@@ -46,7 +45,7 @@ def _work(configuration: dict[str, Any], directory: Path, say: Connection, fifo:
         sys.stdin = os.fdopen(os.open(fifo, os.O_RDONLY))
     axis = Axis.model_validate(configuration)
     say.send("begun")
-    run_live(axis, Destination(directory, lambda *_: None), Orders())
+    run(axis, Destination(directory, lambda *_: None))
 
 
 def start(feed: Feed, directory: Path) -> ForkServerProcess:

@@ -8,10 +8,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from livebode.cli.notices import Notices
 from livebode.configuration import Axis
-from livebode.core import Block, Event
+from livebode.core import Event
 from livebode.records import Run
-from livebode.runtime import Audience, Destination, Orders, run_live
+from livebode.runtime import Destination, Document, RunControl, Subscriber, run
+from livebode.runtime.documents import Tracked
 from livebode.sources.live import Batch, SourceSettings
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer
 
@@ -28,34 +30,36 @@ def hurried(count: int, first: int) -> list[Batch]:
     return found
 
 
-class Stuck(Audience):
+class Stuck:
     """Holds up the thread that tracks, as a disk does that does not answer."""
 
     def __init__(self) -> None:
         self.held, self.released = threading.Event(), threading.Event()
 
-    def followed(self, _: Block) -> None:
-        self.held.set()
-        self.released.wait()
+    def __call__(self, document: Document) -> None:
+        if isinstance(document, Tracked):
+            self.held.set()
+            self.released.wait()
 
 
 class LiveSession:
-    """`run_live` in a thread, on a peer that is open; leaving it ends the run and waits for its record.
+    """`run` in a thread, on a peer that is open; leaving it ends the run and waits for its record.
 
     `sections` are those of the axis; w is the input and y the output by the direct estimator where not given.
     """
 
-    def __init__(self, folder: Path, peer: Peer, audience: Audience | None = None, **sections: Any) -> None:
+    def __init__(self, folder: Path, peer: Peer, *subscribers: Subscriber, **sections: Any) -> None:
         settings: dict[str, Any] = {
             "source": SourceSettings(**peer.settings).model_dump(exclude_unset=True),
             "signals": {"output": "y", "input": "w"},
             "lines": {"frequencies": "100", "window": 400},
             "tracking": {"estimator": "direct"},
         }
-        self.run, self.orders = folder / "run", Orders()
-        self.told: list[Event] = []
-        to = Destination(self.run, lambda *_: None, audience=audience or Audience(), tell=self.told.append)
-        self._arguments = Axis.of(settings | sections, "test"), to, self.orders
+        self.run, self.control = folder / "run", RunControl()
+        self.shown: list[str] = []
+        subscribers = (*subscribers, Notices(self.shown.append))
+        to = Destination(self.run, lambda *_: None, subscribers=subscribers)
+        self._arguments = Axis.of(settings | sections, "test"), to, self.control
         self._error: BaseException | None = None
 
     def __enter__(self) -> Self:
@@ -64,7 +68,7 @@ class LiveSession:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.orders.end()
+        self.control.end()
         self._thread.join()
         if kind is None and self._error is not None:
             raise self._error
@@ -76,6 +80,6 @@ class LiveSession:
 
     def _work(self) -> None:
         try:
-            run_live(*self._arguments)
+            run(*self._arguments)
         except BaseException as error:
             self._error = error

@@ -14,8 +14,11 @@ from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.records import Run
 from livebode.records.grouped_events import each_event
-from livebode.runtime.tracking import Outcome, record
+from livebode.runtime import Document, Outcome
+from livebode.runtime.documents import Tracked
 from tests.support.command import LINES, RATE_HZ, signals
+from tests.support.found import with_events
+from tests.support.runs import record
 
 NAMES = ("w", "u", "y", "t")
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="t", hop=5, spikes=("u",))
@@ -69,18 +72,22 @@ def record_machine(
     again: bool = True,
 ) -> Outcome:
     """Record the machine until its end, from where its record ends."""
-    return record(
-        source, Tracker(SETTINGS), directory, about={"configuration": {"record": kept.model_dump()}}, force=False,
-        progress=progress, draw=lambda *_: None, kept=kept, again=again, tell=tell,
-    )  # fmt: skip
+
+    def listen(document: Document) -> None:
+        if isinstance(document, Tracked):
+            progress(document.samples, document.samples_total)
+        elif isinstance(document, Event) and document.kind.startswith("record-"):
+            tell(document)
+
+    about = {"configuration": {"record": kept.model_dump()}}
+    return record(source, Tracker(SETTINGS), directory, about=about, segments=kept, again=again, subscribers=[listen])
 
 
 @cache
 def expected(samples: int) -> tuple[Responses, tuple[Event, ...]]:
     """What an uninterrupted tracker makes of it, without any record."""
-    tracker = Tracker(SETTINGS)
-    responses = tracker.process(Block(data(samples), NAMES, RATE_HZ))
-    return responses, tuple(tracker.drain_events())
+    responses, events = with_events(Tracker(SETTINGS).process, Block(data(samples), NAMES, RATE_HZ))
+    return responses, tuple(events)
 
 
 def same(found: Responses, wanted: Responses) -> bool:

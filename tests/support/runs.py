@@ -1,14 +1,21 @@
-"""A run of a small recording, without pictures."""
+"""Runs without pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.runtime import Destination, run
+from livebode.configuration.axis import RecordSection
+from livebode.preparation.follower import Follower
+from livebode.runtime import Destination, Outcome, RunLoop, Subscriber, run
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.fits import Fits
+from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_loop import Source
 from tests.support.command import write_parquet
 
 
@@ -19,3 +26,22 @@ def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[
         "signals": {"output": "y", "input": "u", "excitation": "w"},
     }
     return run(Axis.of(given | sections, "test"), Destination(folder / "run", lambda *_: None)).directory
+
+
+def record(
+    source: Source,
+    follower: Follower,
+    directory: Path,
+    *,
+    about: Mapping[str, Any] | None = None,
+    subscribers: Sequence[Subscriber] = (),
+    fits: Fits | None = None,
+    detection: ChangeDetection | None = None,
+    segments: RecordSection | None = None,
+    again: bool = True,
+) -> Outcome:
+    """A run of these parts, which no configuration describes."""
+    to = Destination(directory, lambda *_: None, subscribers=tuple(subscribers))
+    pipeline = Pipeline(follower, fits, detection)
+    about = {"configuration": {}} if about is None else dict(about)
+    return RunLoop(source, pipeline, to, about=about, segments=segments, again=again).run()

@@ -103,7 +103,7 @@ def test_the_limits_make_room_for_a_fit_that_is_itself_uncertain() -> None:
     assert np.mean([v.verdict == "passes" for v in found]) > 0.9
 
 
-def test_a_wrong_model_fails_and_a_slightly_wrong_one_is_told_so() -> None:
+def test_a_wrong_model_fails_and_a_slightly_wrong_one_is_reported() -> None:
     columns = loop(20)
     wrong = [judged(fitted(1e-6, plant=TwoMassPlant(keff=4.5e5)), c) for c in columns]
     assert all(v.verdict == "fails" for v in wrong)
@@ -113,7 +113,7 @@ def test_a_wrong_model_fails_and_a_slightly_wrong_one_is_told_so() -> None:
     assert any(v.verdict == "small error" for v in slight)
 
 
-def test_hardly_any_noise_makes_no_failure_of_a_fit_of_99_percent() -> None:
+def test_a_fit_of_99_percent_does_not_fail_for_lack_of_noise() -> None:
     """Resonance 0.07 % off and a hundredth of the noise: r is near 1, and the model misses 1 % all the same."""
     a, b = TwoMassPlant().discrete()
     u, state, y = np.resize(W, 2000), np.zeros(4), np.empty(2000)
@@ -228,7 +228,7 @@ def test_signals_logged_a_tick_apart_are_put_together() -> None:
     assert validate(fitted(1e-6), block, input="u", output="y").verdict == "fails"
 
 
-def test_what_cannot_be_judged_is_refused() -> None:
+def test_recordings_that_cannot_validate_a_fit_are_refused() -> None:
     columns = loop(20)[0]
     with refused(SignalError, "rate-differs", rate_hz=1000.0, fit_rate_hz=RATE_HZ):
         validate(fitted(1e-6), Block(columns, CHANNELS, 1000.0), input="u", output="y")

@@ -12,9 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from livebode.cli.failures import failure_of
+from livebode.cli.notices import Notices
 from livebode.cli.terminal import console
 from livebode.core import Event, LivebodeError
-from livebode.runtime import Session, StoppedError
+from livebode.runtime import Session, StoppedError, Subscriber
 from livebode.runtime.axis_thread import AxisThread
 
 _COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
@@ -35,6 +36,10 @@ class AxesTerminal:
     def tell(self, name: str, event: Event) -> None:
         """Print an event of an axis."""
         self._print(f"livebode: {name}: {event.message}" if name else f"livebode: {event.message}")
+
+    def subscriber(self, name: str) -> Subscriber:
+        """Prints the events of an axis that a person must act on."""
+        return Notices(lambda message: self._print(f"livebode: {name}: {message}" if name else f"livebode: {message}"))
 
     def run(self, session: Session) -> None:
         """Run the session and show its state."""
@@ -93,7 +98,7 @@ def said(error: Exception | None) -> str:
 
 def _row(thread: AxisThread) -> tuple[str, ...]:
     status = thread.status
-    health = status.health() if status.health is not None else None
+    health = status.health
     event = "" if status.event is None else status.event.message
     return (
         thread.name or "axis",

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from livebode.cli.documents import write_documents
-from livebode.cli.options import Json
+from livebode.cli.options import Json, Language
+from livebode.language import in_language
 from livebode.records import to_json
 
 
@@ -18,6 +19,7 @@ def compare_command(
     after: Annotated[Path, typer.Argument(metavar="AFTER", help="Directory of a later run with the same signals.")],
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write FILE.html and FILE.pdf.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Find the lines, parameters and margins that differ between two runs, with amounts and bounds.
@@ -30,7 +32,8 @@ def compare_command(
     files: list[Path] = []
     remark = ""
     if out is not None:
-        files, remark = write_documents(found.document(datetime.now(UTC)), out, force=force)
+        with in_language(language):
+            files, remark = write_documents(found.document(datetime.now(UTC)), out, force=force)
     if as_json:
         print(to_json(found.plain()))
         return

@@ -17,7 +17,8 @@ from livebode.cli.serving import served
 from livebode.configuration.axis import ServeSection
 from livebode.core import Responses
 from livebode.records import to_json
-from livebode.runtime import Relay
+from livebode.runtime import Destination, Document
+from livebode.runtime.documents import Tracked
 
 _SHOWN = 4
 
@@ -51,28 +52,22 @@ def demo_command(
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
-    with served(shown, ServeSection() if serve else ServeSection(port=0), port, ["demo"], stays=serve) as audience_of:
+    with served(
+        shown, ServeSection() if serve else ServeSection(port=0), port, ["demo"], stays=serve
+    ) as subscribers_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
             task = bar.add_task("", total=seconds)
 
-            class Numbers(Relay):
-                def write(self, responses: Responses) -> None:
-                    super().write(responses)
-                    bar.update(task, description=_numbers(responses))
+            def show_numbers(document: Document) -> None:
+                if isinstance(document, Responses):
+                    bar.update(task, description=_numbers(document))
+                elif isinstance(document, Tracked):
+                    total = document.samples_total or document.samples
+                    bar.update(task, completed=seconds * document.samples / total)
 
-            def progress(done: int, total: int | None) -> None:
-                bar.update(task, completed=seconds * done / (total or done))
-
-            outcome = demo(
-                out,
-                seconds=seconds,
-                seed=seed,
-                real_time=not fast,
-                baseline=baseline,
-                progress=progress,
-                audience=Numbers(audience_of("demo")),
-                draw=drawing("simulated belt axis", ("u", "velocity")),
-            )
+            draw = drawing("simulated belt axis", ("u", "velocity"))
+            to = Destination(out, draw, force=True, subscribers=(*subscribers_of("demo"), show_numbers))
+            outcome = demo(to, seconds=seconds, seed=seed, real_time=not fast, baseline=baseline)
         if as_json:
             print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
             return

@@ -6,6 +6,9 @@ from typing import Annotated
 
 import typer
 
+from livebode.core import UsageError
+from livebode.language import available
+
 Excitation = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the excitation w.")]
 Output = Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the measured output y.")]
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sample rate, if the recording does not contain it.")]
@@ -22,3 +25,26 @@ Port = Annotated[
     typer.Option(metavar="PORT", min=0, max=65535, help="Port of the dashboard; 0: any free port. \\[default: 8765]"),
 ]
 Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it is recorded.")]
+
+
+def _language(code: str) -> str:
+    if code not in available():
+        raise UsageError(
+            "not-one-of",
+            f"--language={code!r} is not one of the languages",
+            f"choose {', '.join(available())}",
+            argument="--language",
+            value=code,
+            allowed=list(available()),
+        )
+    return code
+
+
+Language = Annotated[
+    str,
+    typer.Option(
+        metavar="CODE",
+        callback=_language,
+        help=f"Language of the document: {', '.join(available())}. Terminal and JSON output are English.",
+    ),
+]

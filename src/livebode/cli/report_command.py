@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from livebode.cli.documents import write_documents
-from livebode.cli.options import Json
+from livebode.cli.options import Json, Language
 
 
 def report_command(
@@ -24,6 +24,7 @@ def report_command(
         Path | None, typer.Option(metavar="FILE", help="File name without suffix. \\[default: RUN/report]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report at --out.")] = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Write the measurement, its settings and its results as report.html and report.pdf.
@@ -31,6 +32,7 @@ def report_command(
     An existing report in the run directory is replaced. The PDF needs the extra `pdf`.
     """
     from livebode.core.clock import RunClock, moments_by
+    from livebode.language import in_language
     from livebode.records import Run, to_json
     from livebode.reporting.material import Judged
     from livebode.reporting.run_report import run_report
@@ -44,7 +46,7 @@ def report_command(
         section = FitSection.model_validate(recorded_configuration(Run.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
-    with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)):
+    with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)), in_language(language):
         document = run_report(directory, judged, made=datetime.now(UTC))
         files, remark = write_documents(document, out or directory / "report", force=force or out is None)
     if as_json:

@@ -9,14 +9,16 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.notices import Notices
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
-from livebode.cli.serving import AudienceOf, served
+from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile
 from livebode.configuration.axis import ServeSection
-from livebode.core import ConfigError, Event, LivebodeError, UsageError
+from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.records import to_json
-from livebode.runtime import Audience, Destination, Draw, Outcome, Session, StoppedError, run
+from livebode.runtime import Destination, Document, Draw, Outcome, Session, StoppedError, Subscriber, run
+from livebode.runtime.documents import Tracked
 
 
 def run_command(
@@ -119,11 +121,11 @@ def run_command(
     axes = {"": _axis(target, over)} if file is None else file.read()
     directory = out or Path("runs") / target.stem
     live = any(axis.source.live for axis in axes.values())
-    with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as audience_of:
+    with served(serve, _serving(axes), port, [name or target.stem for name in axes], stays=not live) as subscribers_of:
         if list(axes) == [""] and not live:
-            _show(_run(axes[""], directory, force, as_json, audience_of(target.stem)), as_json)
+            _show(_run(axes[""], directory, force, as_json, subscribers_of(target.stem)), as_json)
         else:
-            _run_axes(axes, directory, force, as_json, file, lambda name: audience_of(name or target.stem))
+            _run_axes(axes, directory, force, as_json, file, lambda name: subscribers_of(name or target.stem))
 
 
 def _serving(axes: Axes) -> ServeSection:
@@ -168,7 +170,7 @@ def _window(text: str | None) -> int | str | None:
         ) from None
 
 
-def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audience) -> Outcome:
+def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tuple[Subscriber, ...]) -> Outcome:
     """Track one recording, with a progress bar."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -182,27 +184,32 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, audience: Audien
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
         task = bar.add_task("tracking", total=None)
 
-        def progress(done: int, total: int | None) -> None:
-            bar.update(task, completed=done, total=total)
+        def show_progress(document: Document) -> None:
+            if isinstance(document, Tracked):
+                bar.update(task, completed=document.samples, total=document.samples_total)
 
-        def tell(event: Event) -> None:
-            bar.console.print(f"livebode: {event.message}", highlight=False, markup=False)
-
-        return run(axis, Destination(directory, _drawing(axis), force, progress, tell, audience))
+        notices = Notices(lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False))
+        return run(axis, Destination(directory, _drawing(axis), force, (*subscribers, show_progress, notices)))
 
 
 def _run_axes(
-    axes: Axes, directory: Path, force: bool, as_json: bool, file: ConfigurationFile | None, audience_of: AudienceOf
+    axes: Axes,
+    directory: Path,
+    force: bool,
+    as_json: bool,
+    file: ConfigurationFile | None,
+    subscribers_of: SubscribersOf,
 ) -> None:
     """Track live sources or several axes until all have ended."""
     from livebode.cli.axes_terminal import AxesTerminal, plain
 
     def to(name: str, axis: Axis) -> Destination:
-        return Destination(directory / name, _drawing(axis), force, audience=audience_of(name))
+        subscribers = (*subscribers_of(name), shown.subscriber(name))
+        return Destination(directory / name, _drawing(axis), force, subscribers)
 
-    terminal = AxesTerminal(quiet=as_json)
-    session = Session(axes, to, tell=terminal.tell, leave=terminal.leave, file=file)
-    terminal.run(session)
+    shown = AxesTerminal(quiet=as_json)
+    session = Session(axes, to, tell=shown.tell, leave=shown.leave, file=file)
+    shown.run(session)
     if session.ended_by and all(thread.ended_early for thread in session.all):
         raise KeyboardInterrupt if session.ended_by == signal.SIGINT else SystemExit(128 + session.ended_by)
     if "" in session.threads:

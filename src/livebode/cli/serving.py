@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from livebode.configuration.axis import ServeSection
-from livebode.runtime import Audience
+from livebode.runtime import Subscriber
 
 if TYPE_CHECKING:
     from livebode.dashboard import Dashboard
 
-AudienceOf = Callable[[str], Audience]
+SubscribersOf = Callable[[str], tuple[Subscriber, ...]]
 
 
 def tell(sentence: str) -> None:
@@ -35,20 +35,20 @@ def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
 @contextmanager
 def served(
     wanted: bool, section: ServeSection, port: int | None, names: Sequence[str], stays: bool
-) -> Iterator[AudienceOf]:
-    """A function that returns the audience of an axis by its name: the dashboard, or nobody.
+) -> Iterator[SubscribersOf]:
+    """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
 
     `names` are the axes that exist from the beginning; `stays` serves the page after the run until Ctrl-C.
     """
     if not wanted:
-        yield lambda _: Audience()
+        yield lambda _: ()
         return
     dashboard = dashboard_of(section, port)
     for name in names:
         dashboard.hub(name)
     with dashboard:
         tell(f"the dashboard is at {dashboard.url}")
-        yield dashboard.hub
+        yield lambda name: (dashboard.hub(name),)
         if stays:
             tell(f"the run is finished; {dashboard.url} shows it until Ctrl-C")
             wait_for_the_end()

@@ -7,10 +7,11 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.core import PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, Quantity, counted
+from livebode.language import available
 from livebode.sources.live import SourceSettings, checked_address
 
 SAME_RATE = 1e-6
@@ -21,6 +22,15 @@ MAY_BE_SECRET = {
 }
 Ticks = Annotated[int, Field(ge=0)]
 File = Annotated[Path, Field(strict=False)]
+
+
+def _known_language(code: str) -> str:
+    if code not in available():
+        raise ValueError(f"is not one of the languages {', '.join(available())}")
+    return code
+
+
+Language = Annotated[str, AfterValidator(_known_language)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -206,6 +216,7 @@ class ServeSection(_Section):
     certificate_file: File | None = None
     key_file: File | None = None
     read_only: bool = False
+    language: Language | None = None
 
     def beside(self, folder: Path) -> ServeSection:
         """With files relative to a folder."""

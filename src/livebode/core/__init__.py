@@ -20,7 +20,7 @@ from livebode.core.errors import (
     SourceError,
     UsageError,
 )
-from livebode.core.event import Event
+from livebode.core.event import Emit, Event, ignore
 from livebode.core.lines import Lines
 from livebode.core.loop import Loop
 from livebode.core.model import Gain, Model, as_model
@@ -42,6 +42,7 @@ __all__ = [
     "ConfigError",
     "DamageWarning",
     "DesignError",
+    "Emit",
     "Event",
     "ExtraError",
     "FitError",
@@ -68,6 +69,7 @@ __all__ = [
     "UsageError",
     "as_model",
     "counted",
+    "ignore",
     "nearest_name",
     "rms",
     "rounded_down",

@@ -134,8 +134,10 @@ class Block:
             ) from None
 
     def cut(self, first: int, last: int) -> Block:
-        """Samples at positions first … last − 1 of this block, without a copy."""
+        """Samples at positions first … last − 1 of this block, without a copy; all of them are this block itself."""
         first, last, _ = slice(first, last).indices(len(self))
+        if (first, last) == (0, len(self)):
+            return self
         return replace(self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0)
 
 

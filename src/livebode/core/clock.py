@@ -11,6 +11,8 @@ from datetime import datetime
 from math import isfinite
 from typing import Any
 
+from livebode.language import date, number
+
 _EPOCH_FROM_S, _EPOCH_TO_S = 1e8, 1e11  # years 1973 … 5138; a run's own clock stays below three years
 
 
@@ -84,8 +86,8 @@ def moment(time_s: float, digits: int = 1) -> str:
     if clock is not None and not _EPOCH_FROM_S < time_s < _EPOCH_TO_S:
         unix_s = clock.unix_s(time_s)
     if unix_s is None or not _EPOCH_FROM_S < unix_s < _EPOCH_TO_S:
-        return f"{time_s:.{digits}f} s"
-    return f"{datetime.fromtimestamp(unix_s).astimezone():%Y-%m-%d %H:%M:%S %Z}"
+        return f"{number(time_s, f'.{digits}f')} s"
+    return date(datetime.fromtimestamp(unix_s).astimezone())
 
 
 def moment_of_start() -> str:

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from livebode.language import marked
+
 Tone = Literal["ok", "check", "alarm", "differs", "open"]
 """Nothing to do; a person should look; an alarm is active; two runs differ; not assessed."""
 
 TONES: Mapping[str, str] = {
-    "ok": "OK",
-    "check": "check",
-    "alarm": "ALARM",
-    "differs": "differs",
-    "open": "not assessed",
+    "ok": marked("OK"),
+    "check": marked("check"),
+    "alarm": marked("ALARM"),
+    "differs": marked("differs"),
+    "open": marked("not assessed"),
 }
 """The verdict that is printed for each tone."""
 
@@ -101,5 +103,5 @@ class Document:
     verdict: tuple[Finding, ...]
     sections: tuple[Section, ...]
     foot: str = ""
-    asked: str = "Verdict"
+    asked: str = ""
     tones: Mapping[str, str] = field(default_factory=lambda: TONES)

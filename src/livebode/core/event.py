@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,3 +21,11 @@ class Event:
     time_s: float
     message: str
     details: dict[str, Any] = field(default_factory=dict)
+
+
+Emit = Callable[[Event], None]
+"""Receives the events that a call finds, in their order."""
+
+
+def ignore(event: Event) -> None:
+    """The `Emit` of a caller who does not need events."""

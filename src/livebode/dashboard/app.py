@@ -24,6 +24,7 @@ from livebode.dashboard.past import Past
 from livebode.dashboard.places import Place
 from livebode.dashboard.settings import Serving
 from livebode.dashboard.state import State
+from livebode.language import for_page, negotiated
 
 _HERE = Path(__file__).parent
 _FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -37,6 +38,7 @@ def application(board: Board, serving: Serving) -> Guard:
         Route("/", pages.page),
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
+        Route("/catalogue", pages.catalogue),
         Route("/logout", pages.logout, methods=["POST"]),
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
@@ -53,7 +55,7 @@ class _Pages:
     """The handlers of the routes."""
 
     def __init__(self, board: Board, serving: Serving) -> None:
-        self._board, self._secure = board, serving.tls is not None
+        self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self._files = _files()
 
     async def page(self, request: Request) -> Response:
@@ -77,6 +79,12 @@ class _Pages:
             COOKIE, session, max_age=int(SESSION_S), httponly=True, samesite="strict", secure=self._secure
         )
         return answer
+
+    async def catalogue(self, request: Request) -> Response:
+        """The language of the page; also for the login, so without access control."""
+        asked_for = request.query_params.get("language", "")
+        code = negotiated(asked_for, self._language, request.headers.get("accept-language", ""))
+        return Response(for_page(code), media_type="application/json", headers={"vary": "accept-language"})
 
     async def logout(self, request: Request) -> Response:
         self._board.access.logout(request.headers.get("cookie", ""))

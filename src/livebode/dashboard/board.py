@@ -104,7 +104,7 @@ class Board:
             return
         newest = state.newest
         sample, time_s = (int(newest.sample[0]), float(newest.time_s[0])) if newest is not None else (0, 0.0)
-        if not state.hub.say(acknowledgement(notice, key, count, sample, time_s)):
+        if not state.hub.record(acknowledgement(notice, key, count, sample, time_s)):
             raise ServerError("busy", "too many acknowledgements wait to be recorded", "try again in a moment")
 
     def close(self) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from livebode.analysis.overview import Overview
 from livebode.core import Block, Event, Parameters, Responses
-from livebode.runtime import Audience
+from livebode.runtime.documents import ClockSet, Document, Fitted, RunEnded, RunStarted, Tracked
+from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -19,16 +20,15 @@ Item = Responses | tuple[Parameters, ...] | Event
 VALUES_MAX = 1 << 20
 """Largest number of values (responses × lines) that wait for the dashboard, about 40 MB; older ones are dropped."""
 EVENTS_MAX = 4096
-_SAYINGS_MAX = 64
 _DELAYS = 1024
 _INTERVALS = 16
 
 
-class Hub(Audience):
-    """Buffers the data that an axis publishes until the dashboard takes them at its own rate.
+class Hub:
+    """A subscriber that buffers the data that an axis publishes until the dashboard takes them at its own rate.
 
-    Every method of an Audience only appends to a list, under a lock that is held no longer than that. Data that the
-    dashboard does not take in time are dropped, oldest first, so that memory is bounded.
+    A document is only appended to a list, under a lock that is held no longer than that. Data that the dashboard does
+    not take in time are dropped, oldest first, so that memory is bounded.
     """
 
     def __init__(self, name: str) -> None:
@@ -36,7 +36,6 @@ class Hub(Audience):
         self.directory: Path | None = None
         self.begun: Mapping[str, Any] | None = None
         self.ended: Mapping[str, Any] | None = None
-        self.health: Callable[[], Health] | None = None
         self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
@@ -49,40 +48,45 @@ class Hub(Audience):
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
         self._values = 0
         self._events: deque[Event] = deque(maxlen=EVENTS_MAX)
-        self._sayings: list[Event] = []
+        self.control: RunControl | None = None
 
-    def share(self, overview: Overview) -> None:
-        self.overview = overview
+    @property
+    def health(self) -> Health | None:
+        """State of the live source; None for a recording, or before the run."""
+        return None if self.control is None else self.control.health
 
-    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
+    def __call__(self, document: Document) -> None:
+        match document:
+            case Responses():
+                self._append(document, document.value.size)
+            case Fitted(parts):
+                self._append(parts, sum(part.value.size for part in parts))
+            case Event():
+                with self._lock:
+                    self._events.append(document)
+            case Tracked(block):
+                self._count(block)
+            case RunStarted():
+                self._begin(document)
+            case ClockSet(pieces):
+                self.clock = pieces
+            case RunEnded(summary):
+                self.ended = summary
+
+    def record(self, event: Event) -> bool:
+        """Record an event of a person; False if the run has ended or too many are waiting."""
+        return self.ended is None and self.control is not None and self.control.record(event)
+
+    def _begin(self, started: RunStarted) -> None:
         with self._lock:  # buffered data belong to a previous run, whose lines may differ
             self._rows, self._values = deque(), 0
-        self.directory, self.health, self.ended = directory, health, None
+        self.directory, self.control, self.overview = started.directory, started.control, started.overview
+        self.ended = None
         self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
-        self.begun = summary
+        self.begun = started.summary
 
-    def set_clock(self, pieces: Sequence[tuple[float, float]]) -> None:
-        self.clock = tuple(pieces)
-
-    def write(self, responses: Responses) -> None:
-        self._keep(responses, responses.value.size)
-
-    def write_parameters(self, *parts: Parameters) -> None:
-        self._keep(parts, sum(part.value.size for part in parts))
-
-    def write_event(self, event: Event) -> None:
-        with self._lock:
-            self._events.append(event)
-
-    def drain_events(self) -> list[Event]:
-        if not self._sayings:
-            return []
-        with self._lock:
-            sayings, self._sayings = self._sayings, []
-        return sayings
-
-    def followed(self, block: Block) -> None:
+    def _count(self, block: Block) -> None:
         self.samples = block.stop
         self.gaps += block.gap
         if not len(block):
@@ -93,17 +97,6 @@ class Hub(Audience):
         if isinstance(block, LiveBlock):
             self.delays_s.append(self.followed_s - block.arrived_s)
 
-    def finish(self, summary: Mapping[str, Any]) -> None:
-        self.ended = summary
-
-    def say(self, event: Event) -> bool:
-        """Record an event; False if the run has ended or too many are waiting."""
-        with self._lock:
-            taken = self.ended is None and len(self._sayings) < _SAYINGS_MAX
-            if taken:
-                self._sayings.append(event)
-        return taken
-
     def take(self) -> list[Item]:
         """Data since the last call, events last."""
         with self._lock:
@@ -111,7 +104,7 @@ class Hub(Audience):
             events, self._events = self._events, deque(maxlen=EVENTS_MAX)
         return [*rows, *events]
 
-    def _keep(self, item: Responses | tuple[Parameters, ...], values: int) -> None:
+    def _append(self, item: Responses | tuple[Parameters, ...], values: int) -> None:
         with self._lock:
             self._rows.append(item)
             self._values += values

@@ -34,6 +34,8 @@ class Serving:
         Context with certificate and key; None for plain HTTP.
     read_only
         Whether nobody may acknowledge.
+    language
+        Of pages whose user has not chosen one; None: that of the browser.
     """
 
     address: str
@@ -43,6 +45,7 @@ class Serving:
     viewer_token: str | None = None
     tls: tuple[Path, Path] | None = None
     read_only: bool = False
+    language: str | None = None
 
     @classmethod
     def of(cls, section: ServeSection) -> Serving:
@@ -82,7 +85,8 @@ class Serving:
                     key="serve.address",
                     value=section.address,
                 )
-        return cls(section.address, section.port, tuple(section.names), token, viewer, tls, section.read_only)
+        names = tuple(section.names)
+        return cls(section.address, section.port, names, token, viewer, tls, section.read_only, section.language)
 
 
 def _loopback(address: str) -> bool:

@@ -263,8 +263,8 @@ class State:
         found |= {"silent_s": silent_s, "stale": silent_s > max(_SILENT_S, 3 * usual_s)}
         if delays.size:
             found |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
-        if hub.health is not None:
-            found["source"] = asdict(hub.health())
+        if (health := hub.health) is not None:
+            found["source"] = asdict(health)
         return found
 
     def _largest_sensitivity(self) -> dict[str, float] | None:

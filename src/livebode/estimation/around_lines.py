@@ -8,7 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, Responses
+from livebode.core import Emit, Event, Responses, ignore
 from livebode.estimation import snapshots
 from livebode.estimation.counted import Counted
 from livebode.estimation.line_stage import LineStage
@@ -31,6 +31,7 @@ class AroundLines(Generic[W]):
     _lines: LineStage
     _watch: W
     _parts: Mapping[str, Part]
+    _events: list[Event]
     _nothing: Responses | None = None
 
     @property
@@ -55,13 +56,15 @@ class AroundLines(Generic[W]):
         """Share of the reference's power that repeats from period to period, shape (lines,); see `LineStage`."""
         return self._lines.repeatability()
 
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: missing and excluded samples, and verdicts on lines."""
-        return sorted(self._watch.drain() + self._lines.drain(), key=lambda event: event.sample)
-
-    def finish(self) -> Responses | None:
+    def finish(self, _emit: Emit = ignore, /) -> Responses | None:
         """Remaining responses at the end: always an empty batch; None where no samples came."""
         return self._nothing
+
+    def _hand_over(self, emit: Emit) -> None:
+        """Emit the events that its parts found in this batch: missing and excluded samples, and verdicts on lines."""
+        for event in sorted(self._events, key=lambda event: event.sample):
+            emit(event)
+        self._events.clear()
 
     def snapshot(self) -> bytes:
         """Everything that the next result depends on, exact; see `restore`."""

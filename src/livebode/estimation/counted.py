@@ -13,16 +13,16 @@ from livebode.core import Block, Event
 class Counted:
     """Counts and Events of a stream of Blocks.
 
-    `kinds` are reasons for exclusion, `also` further counts, and `last` the sample at which each kind
-    was before the first one.
+    Events are appended to `events`. `kinds` are reasons for exclusion, `also` further counts, and `last` the sample at
+    which each kind was before the first one.
     """
 
-    def __init__(self, kinds: Iterable[str], last: int, also: tuple[str, ...] = ()) -> None:
+    def __init__(self, events: list[Event], kinds: Iterable[str], last: int, also: tuple[str, ...] = ()) -> None:
         self._kinds = tuple(kinds)
         self._next = -1
         self._last = dict.fromkeys(self._kinds, last)
         self.counts = dict.fromkeys(("samples", "gaps", "missing", *also, *self._kinds), 0)
-        self._events: list[Event] = []
+        self._events = events
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         return {
@@ -36,9 +36,5 @@ class Counted:
         self._last = dict(zip(self._kinds, (int(n) for n in state["last"])))
         self.counts = dict(zip(self.counts, (int(n) for n in state["counts"])))
 
-    def drain(self) -> list[Event]:
-        events, self._events = self._events, []
-        return events
-
-    def _tell(self, kind: str, block: Block, sample: int, message: str, **details: int) -> None:
+    def _report(self, kind: str, block: Block, sample: int, message: str, **details: int) -> None:
         self._events.append(Event(kind, sample, block.origin_s + sample / block.rate_hz, message, dict(details)))

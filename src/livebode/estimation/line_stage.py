@@ -54,7 +54,9 @@ class LineStage:
         The available bins; None where all are available.
     """
 
-    def __init__(self, settings: Settings, sent: Collection[int] | None = None) -> None:
+    def __init__(
+        self, settings: Settings, sent: Collection[int] | None = None, *, events: list[Event] | None = None
+    ) -> None:
         lines = settings.lines
         self._settings, self._roles = settings, settings.roles
         self._hann = Hann(lines) if settings.hann else None
@@ -68,7 +70,7 @@ class LineStage:
         self._movement = Movement(self._places)
         self._moving = 0
         self._largest = 0.0
-        self._events: list[Event] = []
+        self._events = [] if events is None else events
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -85,11 +87,6 @@ class LineStage:
         self._moments.load(state)
         self._movement.load(state)
         self._largest, self._moving = float(state["largest"][0]), int(state["moving"][0])
-
-    def drain(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
 
     def found(self) -> dict[str, Any]:
         """The basis of the responses as plain data for a record: rate, window, lines, hop, the noise's origin."""

@@ -56,7 +56,7 @@ class RepeatingErrors:
         Lines, signals and estimator.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
         self._settings, lines = settings, settings.lines
         self._mains = Mains(lines)
         possible = reached(lines).size > 0 and not settings.hann
@@ -77,7 +77,7 @@ class RepeatingErrors:
         self._silence = SilentHum(len(lines))
         self._judged_every = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
         self._told = np.zeros((len(_KINDS), len(lines)), dtype=np.bool_)
-        self._events: list[Event] = []
+        self._events = [] if events is None else events
 
     def _forget(self) -> None:
         self._moments = PeriodMoments(1, len(self._bins), 1.0, own=True)
@@ -104,11 +104,6 @@ class RepeatingErrors:
         self._movement.load(state)
         self._silence.load(state)
         self._now = state["distortion"].astype(np.float64), state["invalid"].astype(np.bool_)
-
-    def drain(self) -> list[Event]:
-        """Events since the last call: lines that became invalid, each once with its reason."""
-        events, self._events = self._events, []
-        return events
 
     def judged(self) -> dict[str, Any]:
         """For a record: the lines with a reason against them, and the newest distortion at each."""

@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import NOT_WHOLE, SPIKE, Block, Responses, SignalError, Spectra, SpectraLayout, UsageError
+from livebode.core import (
+    NOT_WHOLE,
+    SPIKE,
+    Block,
+    Emit,
+    Event,
+    Responses,
+    SignalError,
+    Spectra,
+    SpectraLayout,
+    UsageError,
+    ignore,
+)
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
@@ -54,14 +66,15 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         self.settings, self._layout = settings, layout
         names = [channel.name for channel in layout.signals]
         self._signals = [names.index(settings.channel(role) or "") for role in settings.roles]
-        self._lines = LineStage(settings, layout.bins)
+        self._events: list[Event] = []
+        self._lines = LineStage(settings, layout.bins, events=self._events)
         bins = self._lines.bins
         why = "a Hann window needs" if settings.hann else "the noise needs"
         self._columns = layout.columns([int(k) for k in bins], why)
         advanced = np.array([settings.loop.advance_ticks(role) for role in settings.roles])
         differenced = np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
-        self._watch = SpectraWatch(layout.window)
+        self._watch = SpectraWatch(self._events, layout.window)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
         self._speed = HopSpeed(settings.lines.rate_hz) if settings.ripple else None
         self._parts = {
@@ -77,8 +90,8 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         constants = {signal.name: c for signal, c in zip(layout.signals, layout.subtracted)}
         return super().found() | {"from": "spectra", "subtracted": constants}
 
-    def process(self, block: Block) -> Responses:
-        """Responses of these Spectra, which follow the previous ones.
+    def process(self, block: Block, emit: Emit = ignore) -> Responses:
+        """Responses of these Spectra, which follow the previous ones; `emit` receives each event in them.
 
         Raises
         ------
@@ -112,6 +125,7 @@ class SpectraTracker(AroundLines[SpectraWatch]):
         centre = np.stack([time_s, schedule])
         responses = self._lines.process(rows, place, centre, block.channels, ripple=ripple)
         self._nothing = responses[0:0]
+        self._hand_over(emit)
         return responses
 
     @property

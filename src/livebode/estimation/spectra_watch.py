@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import SignalError, Spectra
+from livebode.core import Event, SignalError, Spectra
 from livebode.estimation.counted import Counted
 
 _KINDS = {
@@ -18,8 +18,8 @@ _KINDS = {
 class SpectraWatch(Counted):
     """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
 
-    def __init__(self, window: int) -> None:
-        super().__init__(_KINDS, -(1 << 62), also=("spectra",))
+    def __init__(self, events: list[Event], window: int) -> None:
+        super().__init__(events, _KINDS, -(1 << 62), also=("spectra",))
         self._window = window
 
     def take(self, block: Spectra, marked: dict[str, NDArray[np.bool_]]) -> None:
@@ -38,7 +38,7 @@ class SpectraWatch(Counted):
             self.counts["gaps"] += 1
             self.counts["missing"] += missing
             many = f"spectra of {missing} samples are" if missing else "an unknown number of spectra is"
-            self._tell(
+            self._report(
                 "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
             )
         if first:
@@ -54,7 +54,7 @@ class SpectraWatch(Counted):
             self.counts[kind] += sample.size
             self._last[kind] = int(sample[-1]) if sample.size else self._last[kind]
         for number, kind in sorted(begins):
-            self._tell(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
+            self._report(kind, block, number, f"{_KINDS[kind]}; its response is not valid")
 
     def _count(self, block: Spectra, not_whole: NDArray[np.bool_], new: int) -> None:
         """Samples of these windows that previous ones did not contain; `new` since the previous window."""

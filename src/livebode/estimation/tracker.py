@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Event, Responses, SignalError
+from livebode.core import Block, Emit, Event, Responses, SignalError, ignore
 from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
@@ -51,7 +51,8 @@ class Tracker(AroundLines[Watch]):
     def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
         self.settings = settings
         self._roles = settings.roles
-        self._lines = LineStage(settings)
+        self._events: list[Event] = []
+        self._lines = LineStage(settings, events=self._events)
         window = settings.lines.window
         self._spectra = LineSpectra(
             window,
@@ -64,8 +65,8 @@ class Tracker(AroundLines[Watch]):
         )
         self._centre = Centre(window)
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
-        self._repeating = RepeatingErrors(settings) if repeating else None
-        self._watch = Watch(window)
+        self._repeating = RepeatingErrors(settings, self._events) if repeating else None
+        self._watch = Watch(self._events, window)
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -80,11 +81,6 @@ class Tracker(AroundLines[Watch]):
         found = super().found()
         return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
 
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: missing and excluded samples, and verdicts on lines."""
-        repeating = self._repeating.drain() if self._repeating else []
-        return sorted(super().drain_events() + repeating, key=lambda event: event.sample)
-
     def _named(self, channels: tuple[str, ...]) -> NDArray[np.bool_]:
         return np.array([self.settings.channel(role) in channels for role in self._roles])
 
@@ -96,8 +92,10 @@ class Tracker(AroundLines[Watch]):
         """Numbers of further samples to exclude as spikes; no effect where no channel is checked."""
         self._spectra.known_spikes = samples
 
-    def process(self, block: Block) -> Responses:
+    def process(self, block: Block, emit: Emit = ignore) -> Responses:
         """Responses at the hops of this Block, which follows the previous one.
+
+        `emit` receives each event in it: missing and excluded samples, and verdicts on lines.
 
         Raises
         ------
@@ -135,4 +133,5 @@ class Tracker(AroundLines[Watch]):
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
         self._nothing = responses[0:0]
+        self._hand_over(emit)
         return responses

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Block, SignalError
+from livebode.core import Block, Event, SignalError
 from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
 
@@ -18,8 +18,8 @@ _KINDS = {
 class Watch(Counted):
     """Counts and Events of a stream of Blocks."""
 
-    def __init__(self, window: int) -> None:
-        super().__init__(_KINDS, -window)
+    def __init__(self, events: list[Event], window: int) -> None:
+        super().__init__(events, _KINDS, -window)
         self._window = window
 
     def starts(self, block: Block) -> bool:
@@ -61,4 +61,4 @@ class Watch(Counted):
 
     def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
         message = f"{what}; responses are invalid until a window of {self._window} samples is complete again"
-        self._tell(kind, block, sample, message, **details)
+        self._report(kind, block, sample, message, **details)

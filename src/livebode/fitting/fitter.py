@@ -8,7 +8,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Event, FitError, GridError, Lines, Parameters, Responses, SignalError, UsageError
+from livebode.core import (
+    Emit,
+    Event,
+    FitError,
+    GridError,
+    Lines,
+    Parameters,
+    Responses,
+    SignalError,
+    UsageError,
+    ignore,
+)
 from livebode.core.parameters import OK
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
@@ -79,7 +90,6 @@ class Fitter:
         self._band, self._hold = band_hz, hold
         Problem(self.model, Grid(np.ones(1), 1.0, hold), self._fixed, self._free)  # rejected before anything starts
         self._lines: Lines | None = None
-        self._events: list[Event] = []
         self._word = NO_RESPONSE
         self._seen = 0
         self._start: Floats | None = None
@@ -98,8 +108,10 @@ class Fitter:
         """Of `derived`."""
         return self.model.derived_names
 
-    def process(self, responses: Responses) -> Parameters:
+    def process(self, responses: Responses, emit: Emit = ignore) -> Parameters:
         """Parameters of each Response, in order.
+
+        `emit` receives an event where fits begin to fail ("fit-failed") and where they are valid again ("fit-resumed").
 
         Raises
         ------
@@ -124,7 +136,9 @@ class Fitter:
             first = last
         if not parts:
             parts = [self._parameters(responses, fit_rows(self._delay.problem, *measured_of(responses, use)))]
-        return Parameters.join(parts)
+        found = Parameters.join(parts)
+        self._report(found, emit)
+        return found
 
     def derived(self, parameters: Parameters) -> Parameters:
         """Derived quantities with bounds: resonances, damping ratios, quality factors, ratios."""
@@ -161,11 +175,6 @@ class Fitter:
         if self._lines is None:
             raise RuntimeError("the fitter has processed no responses, so its lines are not known; process some first")
         return self._delay.problem.grid
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call: where fits begin to fail ("fit-failed") and are valid again ("fit-resumed")."""
-        events, self._events = self._events, []
-        return events
 
     def snapshot(self) -> bytes:
         """Everything that the next row's result depends on; see `restore`."""
@@ -264,9 +273,7 @@ class Fitter:
         if self._seen % _GROUP == 0:
             self._finish_group(problem)
             self._delay.decide()
-        parameters = self._parameters(responses, found)
-        self._notice(parameters)
-        return parameters
+        return self._parameters(responses, found)
 
     def _finish_group(self, problem: Problem) -> None:
         self._rows = self._rows[-_MEMORY:]
@@ -283,13 +290,13 @@ class Fitter:
             sample=responses.sample, time_s=responses.time_s, schedule=responses.schedule,
         )  # fmt: skip
 
-    def _notice(self, parameters: Parameters) -> None:
+    def _report(self, parameters: Parameters, emit: Emit) -> None:
         for i, word in enumerate(parameters.status):
             if word == self._word:
                 continue
             self._word, sample, time_s = str(word), int(parameters.sample[i]), float(parameters.time_s[i])
             kind = "fit-resumed" if word == OK else "fit-failed"
-            self._events.append(Event(kind, sample, time_s, SENTENCES[self._word], {"status": self._word}))
+            emit(Event(kind, sample, time_s, SENTENCES[self._word], {"status": self._word}))
 
 
 def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Event, Responses, SignalError
+from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, ignore
 from livebode.estimation import Settings, Tracker, snapshots
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
@@ -123,11 +123,12 @@ class MotionCorrection:
         self._names = [name for name in names if name]
         # Sigma is from the residual of the model, which does not contain the motion.
         self._tracker = Tracker(replace(settings, noise="periods") if settings.noise == "auto" else settings)
+        self._events: list[Event] = []
         self._recorded = Recorded(self._names, lines)
         self._waiting = Waiting(lines)
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
-        self._standstill = Standstill(settings)
+        self._standstill = Standstill(settings, self._events)
         self._ripple = RippleWatch(settings)
         self._from = 0
         self._parts: dict[str, Recorded | Waiting | Learner | Scatter | Standstill | RippleWatch] = {
@@ -166,12 +167,10 @@ class MotionCorrection:
         """As `Tracker.repeatability`."""
         return self._tracker.repeatability()
 
-    def drain_events(self) -> list[Event]:
-        """Events since the last call, those of the Tracker and of completed chunks."""
-        return sorted(self._tracker.drain_events() + self._standstill.drain(), key=lambda event: event.sample)
-
-    def process(self, block: Block) -> Responses:
+    def process(self, block: Block, emit: Emit = ignore) -> Responses:
         """Responses of the chunks that this Block completes; often none, for a completed chunk many.
+
+        `emit` receives the events of the Tracker in this Block, and those of completed chunks.
 
         Raises
         ------
@@ -180,10 +179,10 @@ class MotionCorrection:
         """
         for name in self._names:
             block.index(name)
-        tracked = self._tracker.process(block)
+        tracked = self._tracker.process(block, self._events.append)
         done: list[Responses] = []
         if self._recorded and (block.gap or block.start != self._recorded.stop):
-            done.append(self.finish())
+            done.append(self._finished())
         if not self._recorded:
             self._from = block.start
         self._waiting.append(tracked)
@@ -195,18 +194,29 @@ class MotionCorrection:
             at += len(piece)
             if self._recorded.stop == wanted:
                 done.append(self._corrected(self._from + self._chunk))
+        self._hand_over(emit)
         return Responses.join(done) if done else tracked[0:0]
 
-    def finish(self) -> Responses:
+    def finish(self, emit: Emit = ignore) -> Responses:
         """Responses of the remaining samples, fitted as a short chunk; the next Block starts a new chunk."""
         if not self._recorded:
             raise SignalError("too-short", "there are no samples to finish", "process a block first", samples=0)
+        last = self._finished()
+        self._hand_over(emit)
+        return last
+
+    def _hand_over(self, emit: Emit) -> None:
+        for event in sorted(self._events, key=lambda event: event.sample):
+            emit(event)
+        self._events.clear()
+
+    def _finished(self) -> Responses:
         last = self._corrected(self._recorded.stop)
         self._recorded.forget()
         return last
 
     def snapshot(self) -> bytes:
-        """Everything that the next sample's result depends on, exact; see `restore`. Drain events first."""
+        """Everything that the next sample's result depends on, exact; see `restore`."""
         own: dict[str, NDArray[np.generic]] = {
             "tracker": np.frombuffer(self._tracker.snapshot(), dtype=np.uint8),
             "from": np.array([self._from]),

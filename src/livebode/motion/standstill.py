@@ -40,13 +40,13 @@ class Standstill:
     standstill of an axis with drag has the same effect.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, events: list[Event]) -> None:
         self._settings = settings
         self._window = settings.lines.window
         self._noise = 0.0  # Σ|R|² over the lines where the axis moves
         self._drag = np.inf  # mean torque in steady motion; unlimited while unknown
         self._until = -1  # end of the last stretch in which friction stopped it
-        self._events: list[Event] = []
+        self._events = events
 
     def stretches(self, left: Residual, chunk: Chunk) -> list[tuple[int, int]]:
         """Numbers of the first and last sample of stretches with changes of sign less than a window apart.
@@ -95,16 +95,12 @@ class Standstill:
             stretch = Stretch(first, last, float(np.sqrt(excess)))
             if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
                 if not goes_on:
-                    self._say(stretch, tracked)
+                    self._report(stretch, tracked)
                 self._until = last
                 done.append(stretch)
         return done
 
-    def drain(self) -> list[Event]:
-        events, self._events = self._events, []
-        return events
-
-    def _say(self, stretch: Stretch, tracked: Responses) -> None:
+    def _report(self, stretch: Stretch, tracked: Responses) -> None:
         lines = self._settings.lines
         newest_s = float(tracked.time_s[0]) + (lines.window - 1) / 2 / lines.rate_hz
         time_s = newest_s + (stretch.first - int(tracked.sample[0])) / lines.rate_hz
@@ -120,7 +116,6 @@ class Standstill:
     def load(self, state: dict[str, NDArray[np.generic]]) -> None:
         self._noise, self._drag = (float(n) for n in state["noise"])
         self._until = int(state["until"][0])
-        self._events = []
 
 
 def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:

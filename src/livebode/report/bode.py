@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Model, Response, Responses, counted
+from livebode.core import Model, Response, Responses
 from livebode.core.clock import moment
+from livebode.language import tr, trn
 from livebode.report import ticks, words
 from livebode.report.style import FEW_LINES, Style, drawing, empty_note, heading, new_figure, plain, style
 from livebode.report.summary import MEAN_PROBABILITY, PROBABILITY, Summary, decibels, summarised
@@ -61,15 +62,15 @@ def bode_figure(
     with drawing(look):
         coherent = bool(np.isfinite(summary.coherence).any())
         figure = new_figure(9.0, 7.6 if coherent else 6.6)
-        heading(figure, look, title or "Bode plot", words.facts(responses, summary.count, names), _LEFT)
+        heading(figure, look, title or tr("Bode plot"), words.facts(responses, summary.count, names), _LEFT)
         magnitude, phase, *rest = _panels(figure, coherent)
         _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary), mean is None)
         _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary), mean is None)
         magnitude.set_ylabel(words.magnitude_label(responses, 46))
-        phase.set_ylabel("phase in degrees")
+        phase.set_ylabel(tr("phase in degrees"))
         if rest:
             _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary), mean is None)
-            rest[0].set_ylabel("coherence γ²")
+            rest[0].set_ylabel(tr("coherence γ²"))
         curve = _curve(summary, fitted) if fitted is not None and summary.count else None
         _scales(look, summary, curve, magnitude, phase, *rest)
         if summary.count:
@@ -179,7 +180,7 @@ def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *pa
         plain(axes)
         axes.yaxis.set_label_coords(-0.066, 0.5)
         frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
-    panels[-1].set_xlabel("frequency in Hz")
+    panels[-1].set_xlabel(tr("frequency in Hz"))
     _, db, deg = curve or (np.zeros(0), np.zeros(0), np.zeros(0))
     _limits(magnitude, summary.magnitude_db, _newest_db(summary), db, room=3.0)
     low_deg, high_deg = _limits(
@@ -243,17 +244,19 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
         ]
     mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
     handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
-    texts = [f"median of {counted(summary.count, 'valid response')}", "5–95 % of them"][: len(handles) - 1]
+    median = trn("median of {n} valid response", "median of {n} valid responses", summary.count)
+    texts = [median, tr("5–95 % of them")][: len(handles) - 1]
     if mean:
-        handles, texts = handles[len(texts) // 2 :], ["5–95 % of the responses"] * (len(texts) // 2)
+        handles, texts = handles[len(texts) // 2 :], [tr("5–95 % of the responses")] * (len(texts) // 2)
     at_s = summary.newest.time_s
-    newest = f"newest, at {moment(at_s, 2)}"
+    newest = tr("newest, at {time}", time=moment(at_s, 2))
     if np.isfinite(summary.newest_bound).any():
-        newest += f", bound: {100 * PROBABILITY:.1f} % (3σ)"
-    texts.append(f"average, bound: {100 * MEAN_PROBABILITY:g} %" if mean else newest)
+        newest += tr(", bound: {percent:.1f} % (3σ)", percent=100 * PROBABILITY)
+    average = tr("average, bound: {percent:g} %", percent=100 * MEAN_PROBABILITY)
+    texts.append(average if mean else newest)
     if fit:
         handles.append(Line2D([], [], color=look.ink, linewidth=1.0, dashes=(4, 2)))
-        texts.append("its fit" if mean else "newest fit")
+        texts.append(tr("its fit") if mean else tr("newest fit"))
     figure.legend(
         handles,
         texts,

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Response, counted
+from livebode.core import Response
+from livebode.language import tr, trn
+from livebode.report import words
 from livebode.report.bode import frequency_axis
 from livebode.report.map import frequency_edges
 from livebode.report.style import FEW_LINES, Style, drawing, heading, new_figure, plain, style
@@ -52,8 +54,10 @@ def comparison_figure(
         )
         first = figure.add_subplot(grid[0])
         panels = [first, *(figure.add_subplot(grid[i], sharex=first) for i in (1, 2, 3))]
-        facts = f"{before.quantity} · {counted(len(f), 'line')} · {int(differs.sum())} differ"
-        heading(figure, look, "Before and after", facts, 0.085)
+        lines = trn("{n} line", "{n} lines", len(f))
+        different = tr("{count} differ", count=int(differs.sum()))
+        facts = f"{words.quantity(before)} · {lines} · {different}"
+        heading(figure, look, tr("Before and after"), facts, 0.085)
         turn = unwrapped(np.degrees(np.angle(before.value)), np.zeros(len(f), dtype=bool))
         drawn = [
             _response(panels[:2], f * 1.004**side, one, turn, colour, name)
@@ -62,14 +66,15 @@ def comparison_figure(
         for axes, values, room in zip(panels, zip(*drawn), (3.0, 10.0)):
             _squeeze(axes, np.concatenate(values), room)
         _ratio(panels[2:], look, f, ratio, bound, differs)
-        unit = f" re 1 {before.unit}" if before.unit else ""
-        labels = (f"magnitude in dB{unit}", "phase in degrees", "ratio in dB", "ratio in degrees")
+        labels = (
+            words.decibel_label(before.unit), tr("phase in degrees"), tr("ratio in dB"), tr("ratio in degrees"),
+        )  # fmt: skip
         for axes, label in zip(panels, labels):
             axes.set_ylabel(label)
             axes.yaxis.set_label_coords(-0.066, 0.5)
             plain(axes)
             frequency_axis(axes, f, labels=axes is panels[-1])
-        panels[-1].set_xlabel("frequency in Hz")
+        panels[-1].set_xlabel(tr("frequency in Hz"))
         _legend(figure, look)
     return figure
 
@@ -135,7 +140,7 @@ def places_figure(frequency_hz: Floats, places: list[PlaceChange], *, dark: bool
     """The change of the magnitude over place and frequency, forward and return; dots mark significant differences."""
     look = style(dark)
     ways = [[p for p in places if p[2] == back] for back in (False, True)]
-    shown = [(way, name) for way, name in zip(ways, ("forward (rising)", "return (falling)")) if way]
+    shown = [(way, name) for way, name in zip(ways, (tr("forward (rising)"), tr("return (falling)"))) if way]
     reach = max(float(np.nanmax(np.abs([decibels(p[3]) for p in places]), initial=0.0)), 0.1)
     edges_hz = frequency_edges(frequency_hz) if len(frequency_hz) > 1 else frequency_hz[0] * np.array([0.9, 1.1])
     with drawing(look):
@@ -157,13 +162,13 @@ def places_figure(frequency_hz: Floats, places: list[PlaceChange], *, dark: bool
                           color="#1d2733", markeredgecolor="#ffffff", markeredgewidth=0.6, gid="differs")  # fmt: skip
             _frequencies(axes, frequency_hz, edges_hz)
             axes.set_title(name, loc="left", size=10, color=look.ink)
-            axes.set_xlabel("schedule")
+            axes.set_xlabel(tr("schedule"))
             axes.tick_params(labelleft=i == 0)
             plain(axes, grid=False)
-        figure.axes[0].set_ylabel("frequency in Hz")
+        figure.axes[0].set_ylabel(tr("frequency in Hz"))
         bar = figure.colorbar(mesh, cax=figure.add_subplot(grid[-1]))
         bar.outline.set_visible(False)
-        bar.set_label("change in dB", size=9.5)
+        bar.set_label(tr("change in dB"), size=9.5)
     return figure
 
 
@@ -191,7 +196,8 @@ def _legend(figure: Figure, look: Style) -> None:
         Line2D([], [], markerfacecolor=look.paper, **dot),
     ]
     figure.legend(
-        handles, ["before, bound: 95 %", "after, bound: 95 %", "differs", "does not differ"], loc="upper left",
+        handles,
+        [tr("before, bound: 95 %"), tr("after, bound: 95 %"), tr("differs"), tr("does not differ")], loc="upper left",
         bbox_to_anchor=(0.085, 1 - 0.76 / figure.get_size_inches()[1]), ncols=4, borderpad=0.0, borderaxespad=0.0,
         handlelength=1.6, columnspacing=2.0,
     )  # fmt: skip

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from livebode.core.document import Picture
+from livebode.language import tr
+from livebode.report.local_ticks import localise_ticks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,15 +16,21 @@ WIDTH_IN = 9.0
 
 
 def drawn(picture: Picture) -> Figure:
-    """The picture in the light look."""
+    """The picture in the light look and the language in use."""
+    figure = _figure(picture)
+    localise_ticks(figure)
+    return figure
+
+
+def _figure(picture: Picture) -> Figure:
     if picture.what == "bode":
         from livebode.report.bode import bode_figure
 
-        return bode_figure(**picture.data, title="Average response")
+        return bode_figure(**picture.data, title=tr("Average response"))
     if picture.what == "tracking":
         from livebode.report.tracking import tracking_figure
 
-        return tracking_figure(**picture.data, title="Magnitude over time", width_in=WIDTH_IN)
+        return tracking_figure(**picture.data, title=tr("Magnitude over time"), width_in=WIDTH_IN)
     if picture.what == "parameters":
         from livebode.report.parameters import parameters_figure
 
@@ -30,11 +38,11 @@ def drawn(picture: Picture) -> Figure:
     if picture.what == "loop":
         from livebode.report.loop import loop_figure
 
-        return loop_figure(**picture.data, title="Open loop", width_in=WIDTH_IN)
+        return loop_figure(**picture.data, title=tr("Open loop"), width_in=WIDTH_IN)
     if picture.what == "validation":
         from livebode.report.validation import validation_figure
 
-        return validation_figure(**picture.data, title="Measured and simulated", folded=True)
+        return validation_figure(**picture.data, title=tr("Measured and simulated"), folded=True)
     if picture.what == "comparison":
         from livebode.report.comparison import comparison_figure
 

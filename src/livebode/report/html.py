@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.language import current_language, recognised
 from livebode.report.figures import drawn
 from livebode.report.page_style import STYLE_SHEET
 from livebode.report.svg import inline_svg
@@ -12,12 +13,12 @@ from livebode.report.svg import inline_svg
 
 def to_html(document: Document) -> str:
     """The page. All content of the document is text, even if it looks like a tag."""
-    title = _text(f"{document.title}: {document.kind.lower()}")
+    title = _text(f"{document.title}: {document.kind}")
     body = "\n".join(_section(section, i) for i, section in enumerate(document.sections))
     facts = "".join(f"<div><dt>{_text(n)}</dt><dd>{_text(v)}</dd></div>" for n, v in document.facts)
     links = "".join(f'<a href="#s{i}">{_text(s.title)}</a> ' for i, s in enumerate(document.sections))
     return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<!DOCTYPE html>\n<html lang="{current_language().code}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         # Nothing is loaded or executed, even if a text should pass the escaping.
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
@@ -41,7 +42,8 @@ def _text(text: str) -> str:
 
 def _verdict(document: Document) -> str:
     return "\n".join(
-        f'<li><span class="tone {f.tone}">{_text(document.tones[f.tone])}</span><span>{_text(f.text)}</span></li>'
+        f'<li><span class="tone {f.tone}">{_text(recognised(document.tones[f.tone]))}</span>'
+        f"<span>{_text(f.text)}</span></li>"
         for f in document.verdict
     )
 

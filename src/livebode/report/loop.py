@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Responses
 from livebode.fitting import Fit
+from livebode.language import number, recognised, tr
 from livebode.margins import Margins, OpenLoop
 from livebode.report.bode import frequency_axis
 from livebode.report.pictures import save
@@ -63,7 +64,7 @@ def loop_figure(found: Loop, *, title: str = "", dark: bool = False, width_in: f
             2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985,
             top=1 - 1.15 / height, bottom=0.55 / height, hspace=0.09, wspace=0.17,
         )  # fmt: skip
-        heading(figure, look, title or "Loop", _facts(found), 0.78 / width_in)
+        heading(figure, look, title or tr("Loop"), _facts(found), 0.78 / width_in)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         nyquist = figure.add_subplot(grid[:, 1])
@@ -124,9 +125,9 @@ def _bode(magnitude: Axes, phase: Axes, look: Style, found: Loop, f: Floats, cur
                        markeredgecolor=look.ink, markeredgewidth=1.6, zorder=6)  # fmt: skip
         phase.plot(where, np.interp(where, f, _degrees(value)), marker, markersize=9, markerfacecolor="none",
                    markeredgecolor=look.ink, markeredgewidth=1.6, zorder=6)  # fmt: skip
-    magnitude.set_ylabel("|L| in dB")
-    phase.set_ylabel("phase of L in degrees")
-    phase.set_xlabel("frequency in Hz")
+    magnitude.set_ylabel(tr("|L| in dB"))
+    phase.set_ylabel(tr("phase of L in degrees"))
+    phase.set_xlabel(tr("frequency in Hz"))
     bottom, top = np.min(_degrees(value)) - 20, np.max(_degrees(value)) + 20
     phase.set_ylim(max(bottom, _LOWEST_DEG), top)
     phase.set_yticks(np.arange(np.ceil(max(bottom, _LOWEST_DEG) / 90) * 90, top, 90))
@@ -162,7 +163,9 @@ def _nyquist(axes: Axes, look: Style, found: Loop, f: Floats, value: Complex) ->
     ms = found.margins.of("peak_sensitivity")[0]
     if np.isfinite(ms):
         axes.add_patch(Circle((-1, 0), 1 / ms, fill=False, edgecolor=look.ink, linewidth=1.2, zorder=4))
-        axes.annotate(f"Ms = {ms:.3g}", (-1, 1 / ms), (0, 5), textcoords="offset points", ha="center", color=look.ink)
+        axes.annotate(
+            f"Ms = {number(ms, '.3g')}", (-1, 1 / ms), (0, 5), textcoords="offset points", ha="center", color=look.ink
+        )
     for marker, where in _marked(found):
         level = found.loop.at(found.fit.parameters.value[:1], where)[0]
         axes.plot(level.real, level.imag, marker, markersize=9, markerfacecolor="none", markeredgecolor=look.ink,
@@ -195,17 +198,17 @@ def _marked(found: Loop) -> list[tuple[str, Floats]]:
 def _facts(found: Loop) -> str:
     bound = found.margins.bound()[0]
     words = [
-        f"{label} {found.margins.value[0, i]:.3g} ± {bound[i]:.2g}{unit}"
+        f"{label} {number(found.margins.value[0, i], '.3g')} ± {number(bound[i], '.2g')}{unit}"
         for label, name, unit in (
-            ("gain margin", "gain_margin", " dB"),
-            ("phase margin", "phase_margin", "°"),
-            ("delay margin", "delay_margin", " ms"),
+            (tr("gain margin"), "gain_margin", " dB"),
+            (tr("phase margin"), "phase_margin", "°"),
+            (tr("delay margin"), "delay_margin", " ms"),
             ("Ms", "peak_sensitivity", ""),
-            ("bandwidth", "bandwidth", " Hz"),
+            (tr("bandwidth"), "bandwidth", " Hz"),
         )
         if np.isfinite(found.margins.value[0, (i := found.margins.index(name))])
     ]
-    return " · ".join(words) or str(found.margins.status[0])
+    return " · ".join(words) or recognised(str(found.margins.status[0]))
 
 
 def _legend(figure: Figure, look: Style, left: float) -> None:
@@ -219,7 +222,9 @@ def _legend(figure: Figure, look: Style, left: float) -> None:
         Line2D([], [], marker="D", **mark),
         Line2D([], [], marker="s", **mark),
     ]
-    texts = ["L of the fit, 95 % band", "beyond the lines", "measured lines, 95 %", "|L| = 1", "L negative"]
+    texts = [
+        tr("L of the fit, 95 % band"), tr("beyond the lines"), tr("measured lines, 95 %"), "|L| = 1", tr("L negative"),
+    ]  # fmt: skip
     figure.legend(
         handles, texts, loc="upper left", bbox_to_anchor=(left, 1 - 0.76 / figure.get_size_inches()[1]), ncols=5,
         borderpad=0.0, borderaxespad=0.0, handlelength=1.8, columnspacing=1.8,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses
+from livebode.language import tr
 from livebode.report import ticks, words
 from livebode.report.style import Style, plain
 from livebode.report.summary import decibels, quantiles
@@ -60,9 +61,9 @@ def draw_maps(
             panel.tick_params(axis="both", labelbottom=row == 1, labelleft=i == 0)
             if row == 1:
                 panel.set_xlabel(across[i][2])
-        axes[0].set_ylabel("frequency in Hz")
-        name = words.magnitude_label(responses, 40) if row == 0 else "change from the median in dB"
-        _colour_bar(figure, grid[row, -1], meshes[-1], name)
+        axes[0].set_ylabel(tr("frequency in Hz"))
+        name = words.magnitude_label(responses, 40) if row == 0 else tr("change from the median in dB")
+        _colour_bar(figure, grid[row, -1], meshes[-1], name, extend="neither" if row == 0 else "both")
 
 
 def grouped_lines(frequency_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -145,8 +146,8 @@ def _change_colours(look: Style, change_db: Floats) -> dict[str, Any]:
     return {"cmap": look.change_map, "vmin": -reach, "vmax": reach}
 
 
-def _colour_bar(figure: Figure, cell: SubplotSpec, mesh: QuadMesh, label: str) -> None:
-    bar = figure.colorbar(mesh, cax=figure.add_subplot(cell), extend="both" if "change" in label else "neither")
+def _colour_bar(figure: Figure, cell: SubplotSpec, mesh: QuadMesh, label: str, extend: str) -> None:
+    bar = figure.colorbar(mesh, cax=figure.add_subplot(cell), extend=extend)
     bar.outline.set_visible(False)
     bar.set_label(label, size=9.5)
     bar.ax.tick_params(length=3.0)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.language import recognised, tr
 from livebode.report import words
 from livebode.report.style import Style, drawing, new_figure, plain, shortened, style
 from livebode.report.tracking import with_holes
@@ -62,7 +63,7 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     axes.fill_between(at, low[:, 0], high[:, 0], color=look.run, alpha=0.22, linewidth=0, gid="bound")
     axes.plot(at, middle[:, 0], color=look.run, linewidth=1.2, gid="value")
     axes.set_title(
-        shortened((f"{name} in {unit}" if unit else name).replace("_", " "), 60),
+        shortened(_label(name, unit), 60),
         loc="left",
         size=10,
         color=look.ink,
@@ -74,6 +75,11 @@ def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     axes.set_xlim(float(np.nanmin(time_s)), float(np.nanmax(time_s)))
     _limits(axes, value, half)
     plain(axes)
+
+
+def _label(name: str, unit: str) -> str:
+    text = recognised(name.replace("_", " "))
+    return tr("{name} in {unit}", name=text, unit=recognised(unit)) if unit else text
 
 
 def _limits(axes: Axes, value: Floats, half: Floats) -> None:

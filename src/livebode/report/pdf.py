@@ -27,10 +27,12 @@ from reportlab.platypus import Paragraph as Words
 from reportlab.platypus import Table as Grid
 
 from livebode.core.document import Document, Listing, Paragraph, Part, Picture, Section, Table
+from livebode.language import recognised
 from livebode.report.figures import WIDTH_IN, drawn
 from livebode.report.html import readable
-from livebode.report.pdf_figure import BOLD, FIXED, PLAIN, draw_on, register_fonts
-from livebode.report.style import LIGHT
+from livebode.report.pdf_figure import draw_on, draw_string
+from livebode.report.pdf_fonts import BOLD, FIXED, PLAIN, register_fonts, runs, wide_font
+from livebode.report.style import LIGHT, columns
 
 _MARGIN = 16 * mm
 _WIDTH = A4[0] - 2 * _MARGIN
@@ -62,7 +64,7 @@ def save_pdf(document: Document, path: Path) -> None:
 class _Pages(BaseDocTemplate):  # type: ignore[misc]
     def __init__(self, document: Document, path: Path) -> None:
         super().__init__(
-            str(path), pagesize=A4, title=readable(f"{document.title}: {document.kind.lower()}"), author="livebode",
+            str(path), pagesize=A4, title=readable(f"{document.title}: {document.kind}"), author="livebode",
             invariant=1, pageCompression=1,
         )  # fmt: skip
         frame = Frame(_MARGIN, 18 * mm, _WIDTH, A4[1] - 34 * mm, 0, 0, 0, 0)
@@ -101,9 +103,8 @@ class _Numbered(Canvas):  # type: ignore[misc]
 
 
 def _foot(canvas: Canvas, text: str) -> None:
-    canvas.setFont(PLAIN, 7.5)
     canvas.setFillColor(HexColor(LIGHT.muted))
-    canvas.drawString(_MARGIN, 10 * mm, text)
+    draw_string(canvas, 10 * mm, text, PLAIN, 7.5, x=_MARGIN)
 
 
 class _Drawing(Flowable):  # type: ignore[misc]
@@ -153,7 +154,10 @@ _CODE = _style("code", 7, fontName=FIXED, leading=9)
 
 def _words(text: str, style: ParagraphStyle) -> Words:
     # Paragraphs have a markup language; text from data must remain plain text.
-    return Words(escape(readable(text), quote=False), style)
+    parts = [(escape(run, quote=False), wide) for run, wide in runs(readable(text))]
+    if any(wide for _, wide in parts):
+        style = style.clone(style.name, wordWrap="CJK")
+    return Words("".join(f'<font name="{wide_font()}">{run}</font>' if wide else run for run, wide in parts), style)
 
 
 def _cell(text: str, style: ParagraphStyle, width: float) -> Words:
@@ -175,7 +179,7 @@ def _verdict(document: Document) -> Grid:
     rows, widths = [], [0.16 * _WIDTH, 0.84 * _WIDTH]
     for finding in document.verdict:
         tone = _style("tone", 8, fontName=BOLD, textColor=HexColor(_TONE[finding.tone]))
-        rows.append([_words(document.tones[finding.tone], tone), _cell(finding.text, _BODY, widths[1])])
+        rows.append([_words(recognised(document.tones[finding.tone]), tone), _cell(finding.text, _BODY, widths[1])])
     return Grid(rows, colWidths=widths, style=_LINES, hAlign="LEFT")
 
 
@@ -231,5 +235,5 @@ def _widths(table: Table) -> list[float]:
     if not any(table.headings):
         return [0.24 * _WIDTH, 0.76 * _WIDTH]
     every = [table.headings, *table.rows]
-    letters = [min(max(len(texts[i]) for texts in every), 60) + 2 for i in range(len(table.headings))]
+    letters = [min(max(columns(texts[i]) for texts in every), 60) + 2 for i in range(len(table.headings))]
     return [_WIDTH * max(n, 6) / sum(max(m, 6) for m in letters) for n in letters]

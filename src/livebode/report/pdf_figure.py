@@ -8,37 +8,27 @@ draw a path, an image and a text. This one draws on ReportLab's canvas, so lines
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_mixed import MixedModeRenderer
 from reportlab.lib.utils import ImageReader
 from reportlab.pdfbase import pdfmetrics
-from reportlab.pdfbase.ttfonts import TTFont
 
-from livebode.report.style import LIGHT, drawing, quiet_about_letters
+from livebode.report.pdf_fonts import BOLD, PLAIN, runs, wide_font
+from livebode.report.style import LIGHT, drawing, quiet_about_letters, wide_letters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.path import Path as Curve
     from reportlab.pdfgen.canvas import Canvas
 
-PLAIN, BOLD, FIXED = "DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"
+_LACKING = 0.4  # of the size, by which Matplotlib measures a wide letter too narrow
 _RASTER_DPI = 220  # of maps, whose cells are pixels in any case
 _CAPS = {"butt": 0, "round": 1, "projecting": 2}
 _JOINS = {"miter": 0, "round": 1, "bevel": 2}
 _MOVE, _LINE, _CURVE3, _CURVE4, _CLOSE = 1, 2, 3, 4, 79
-
-
-def register_fonts() -> None:
-    """Register Matplotlib's fonts, which contain the required symbols, with ReportLab."""
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    for name in (PLAIN, BOLD, FIXED):
-        if name not in pdfmetrics.getRegisteredFontNames():
-            pdfmetrics.registerFont(TTFont(name, folder / f"{name}.ttf"))
 
 
 def draw_on(canvas: Canvas, figure: Figure) -> None:
@@ -125,9 +115,12 @@ class _OnCanvas(RendererBase):
         canvas.translate(x, y)
         canvas.rotate(angle)
         bold = prop.get_weight() in ("bold", "semibold", 600, 700)
-        canvas.setFont(BOLD if bold else PLAIN, prop.get_size_in_points())
-        canvas.drawString(0, 0, s)
+        draw_string(canvas, 0, s, BOLD if bold else PLAIN, prop.get_size_in_points())
         canvas.restoreState()
+
+    def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
+        width, height, descent = super().get_text_width_height_descent(s, prop, ismath)
+        return width + _LACKING * wide_letters(s) * prop.get_size_in_points(), height, descent
 
     def _clip(self, gc: Any) -> None:
         canvas = self._canvas
@@ -138,6 +131,15 @@ class _OnCanvas(RendererBase):
         path, transform = gc.get_clip_path()
         if path is not None:
             canvas.clipPath(_shape(canvas, path.iter_segments(transform)), stroke=0, fill=0)
+
+
+def draw_string(canvas: Canvas, y: float, text: str, font: str, size: float, x: float = 0.0) -> None:
+    """Draw one line of text with the fonts that its letters need."""
+    for run, wide in runs(text):
+        name = wide_font() if wide else font
+        canvas.setFont(name, size)
+        canvas.drawString(x, y, run)
+        x += pdfmetrics.stringWidth(run, name, size)
 
 
 def _alpha(gc: Any, colour: Any) -> float:

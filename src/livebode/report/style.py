@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from livebode.language import tr
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -161,8 +163,10 @@ def plain(axes: Axes, grid: bool = True) -> None:
         axes.grid(True, linewidth=0.7)
 
 
-def empty_note(axes: Axes, look: Style, text: str = "no valid response") -> None:
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=12, color=look.muted)
+def empty_note(axes: Axes, look: Style) -> None:
+    axes.text(
+        0.5, 0.5, tr("no valid response"), transform=axes.transAxes, ha="center", va="center", size=12, color=look.muted
+    )
 
 
 def shortened(text: str, letters: int) -> str:
@@ -184,6 +188,11 @@ def shortened(text: str, letters: int) -> str:
         if columns(head) + columns(tail) >= letters - 1:
             break
     return f"{head}…{tail}"
+
+
+def wide_letters(text: str) -> int:
+    """Number of wide (East Asian) letters, which the fonts of Matplotlib lack: they are measured too narrow."""
+    return sum(unicodedata.east_asian_width(c) in "WF" for c in text)
 
 
 def columns(text: str) -> int:

@@ -37,7 +37,9 @@ def inline_svg(figure: Figure, label: str, salt: str) -> str:
 
     text = io.StringIO()
     with drawing(LIGHT), matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": salt}), quiet_about_letters():
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+        from livebode.report.svg_renderer import draw_svg
+
+        draw_svg(figure, text)
     svg = _METADATA.sub("", _PROLOGUE.sub("", text.getvalue(), count=1), count=1)
     svg = _SIZE.sub(rf'<svg class="figure" viewBox="\1" role="img" aria-label="{_literal(label)}">', svg, count=1)
     svg = _NAMED.sub("<g>", svg)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Responses
+from livebode.language import numerals, tr
 from livebode.report import ticks, words
 from livebode.report.map import draw_maps
 from livebode.report.style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
@@ -51,15 +52,15 @@ def tracking_figure(
     look = style(dark)
     use = usable(responses)
     schedule = scheduled(responses, use)
-    name = shortened(schedule_name, 60) or "scheduling signal"
+    name = shortened(schedule_name, 60) or tr("scheduling signal")
     mapped = len(responses.lines) > TRACES_MAX
     with drawing(look):
         figure = new_figure(width_in or (12.0 if schedule else 9.5), 7.0 if mapped else 5.6)
         left = 0.78 / figure.get_size_inches()[0]
-        said = words.facts(responses, int(use.any(axis=1).sum())) + (
-            " · grey: no valid response" if mapped and use.any() else ""
-        )
-        heading(figure, look, title or "Tracking", said, left)
+        facts = words.facts(responses, int(use.any(axis=1).sum()))
+        if mapped and use.any():
+            facts += " · " + tr("grey: no valid response")
+        heading(figure, look, title or tr("Tracking"), facts, left)
         if not use.any():
             _empty(figure, look, responses, left)
         elif mapped:
@@ -82,7 +83,7 @@ def _empty(figure: Figure, look: Style, responses: Responses, left: float) -> No
     empty_note(axes, look)
     axes.set_xticks([])
     axes.set_yticks([])
-    axes.set_xlabel("time in s")
+    axes.set_xlabel(tr("time in s"))
     axes.set_ylabel(words.magnitude_label(responses))
 
 
@@ -218,7 +219,7 @@ def _name_lines(axes: Axes, responses: Responses, magnitude_db: Floats, colours:
     at = spread(np.array([(level - low) / (high - low) for _, level in ended]), 12.0 / height_pt)
     for (i, level), y in zip(ended, at):
         axes.annotate(
-            f"{ticks.frequency_label(responses.lines.frequency_hz[i])} Hz",
+            f"{numerals(ticks.frequency_label(responses.lines.frequency_hz[i]))} Hz",
             xy=(1.0, (level - low) / (high - low)),
             xytext=(1.025, y),
             xycoords="axes fraction",
@@ -260,10 +261,12 @@ def _key(figure: Figure, look: Style, left: float, schedule: bool, bounded: bool
     entries: list[tuple[Line2D | Patch, str]] = []
     if schedule:
         dot = {"linestyle": "", "marker": "o", "markersize": 4.5, "markeredgecolor": look.muted}
-        entries.append((Line2D([], [], markerfacecolor=look.muted, **dot), "rising"))  # type: ignore[arg-type]
-        entries.append((Line2D([], [], markerfacecolor=look.paper, **dot), "falling"))  # type: ignore[arg-type]
+        entries.append((Line2D([], [], markerfacecolor=look.muted, **dot), tr("rising")))  # type: ignore[arg-type]
+        entries.append((Line2D([], [], markerfacecolor=look.paper, **dot), tr("falling")))  # type: ignore[arg-type]
     if bounded:
-        entries.append((Patch(facecolor=look.muted, alpha=0.3), f"bound: {100 * PROBABILITY:.1f} % (3σ)"))
+        entries.append(
+            (Patch(facecolor=look.muted, alpha=0.3), tr("bound: {percent:.1f} % (3σ)", percent=100 * PROBABILITY))
+        )
     figure.legend(
         [handle for handle, _ in entries],
         [text for _, text in entries],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from livebode.language import recognised, tr
 from livebode.report.pictures import save
 from livebode.report.style import Style, drawing, heading, new_figure, plain, shortened, style
 
@@ -47,8 +48,11 @@ def validation_figure(
             figure, grid = _grid(9.0, 2 * len(found), columns, [1.0] * columns)
         else:
             figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(found), columns + 1, [1.5, *[1.0] * columns])
-        facts = f"{found[0].samples} samples · band: 97 % of random correlations at each lag · dashed: 2.17/√L"
-        heading(figure, look, title or "Validation", facts, 0.7 / figure.get_size_inches()[0])
+        facts = tr(
+            "{samples} samples · band: 97 % of random correlations at each lag · dashed: {limit:.2f}/√L",
+            samples=found[0].samples, limit=2.17,
+        )  # fmt: skip
+        heading(figure, look, title or tr("Validation"), facts, 0.7 / figure.get_size_inches()[0])
         for row, one in enumerate(found):
             last, below = row == len(found) - 1, 2 * row + 1 if folded else row
             _output(figure.add_subplot(grid[2 * row, :] if folded else grid[row, 0]), look, one, last or folded)
@@ -70,14 +74,18 @@ def _grid(width_in: float, rows: int, columns: int, ratios: list[float]) -> tupl
 def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
     shown = slice(max(0, found.samples - _SHOWN), found.samples)
     at_s = np.arange(found.samples)[shown] / found.rate_hz
-    axes.plot(at_s, found.measured[shown], color=look.newest, linewidth=2.6, alpha=0.55, label="measured")
-    axes.plot(at_s, found.simulated.output[shown], color=look.run, linewidth=0.9, label="ŷ, simulated")
+    axes.plot(at_s, found.measured[shown], color=look.newest, linewidth=2.6, alpha=0.55, label=tr("measured"))
+    axes.plot(at_s, found.simulated.output[shown], color=look.run, linewidth=0.9, label=tr("ŷ, simulated"))
     axes.set_title(
-        f"{found.model}: {found.verdict}, fit {found.fit_percent:.1f} %", loc="left", size=10, color=look.ink
-    )
+        tr(
+            "{model}: {verdict}, fit {percent:.1f} %",
+            model=recognised(found.model), verdict=recognised(found.verdict), percent=found.fit_percent,
+        ),
+        loc="left", size=10, color=look.ink,
+    )  # fmt: skip
     axes.set_ylabel(shortened(found.output, 30))
     if last:
-        axes.set_xlabel("time in s")
+        axes.set_xlabel(tr("time in s"))
     axes.legend(loc="upper right", ncols=2, borderpad=0.2)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.22 * (high - low))
@@ -100,9 +108,9 @@ def _correlation(axes: Axes, look: Style, c: Correlation, counts: bool, last: bo
         at = c.lags[beyond & (np.sign(c.value) == sign)]
         axes.plot(at, np.full(len(at), 0.96 * sign * reach), mark, markersize=4, color=look.newest)
     axes.set_ylim(-reach, reach)
-    axes.set_ylabel("correlation")
-    share = f"{100 * c.share:.0f} % inside" if counts else "does not count"
-    axes.set_title(f"ε with {c.name}: {share}", loc="left", size=10, color=look.ink)
+    axes.set_ylabel(tr("correlation"))
+    share = tr("{percent:.0f} % inside", percent=100 * c.share) if counts else tr("does not count")
+    axes.set_title(tr("ε with {signal}: {share}", signal=c.name, share=share), loc="left", size=10, color=look.ink)
     if last:
-        axes.set_xlabel("lag in samples")
+        axes.set_xlabel(tr("lag in samples"))
     plain(axes)

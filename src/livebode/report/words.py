@@ -4,38 +4,55 @@ from __future__ import annotations
 
 import numpy as np
 
-from livebode.core import Responses, counted
+from livebode.core import Response, Responses
 from livebode.core.clock import moment, moment_of_start
+from livebode.language import marked, numerals, recognised, tr, trn
 from livebode.report.style import shortened
 from livebode.report.ticks import frequency_label
 
-_SYMBOL = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
+_SYMBOL = {
+    marked("plant"): "G",
+    marked("open loop"): "L",
+    marked("closed loop"): "T",
+    marked("sensitivity"): "S",
+}
 _CLOCK_FROM_S = 1e5
 
 
-def quantity(responses: Responses) -> str:
+def quantity(responses: Response | Responses) -> str:
     """The quantity with its usual letter: "plant G"."""
     letter = _SYMBOL.get(responses.quantity)
-    return f"{responses.quantity} {letter}" if letter else str(responses.quantity)
+    name = recognised(str(responses.quantity))
+    return f"{name} {letter}" if letter else name
 
 
 def magnitude_label(responses: Responses, letters: int = 60) -> str:
     """The label of the magnitude, with the unit of 0 dB."""
-    return shortened(f"magnitude in dB re 1 {responses.unit}" if responses.unit else "magnitude in dB", letters)
+    return shortened(decibel_label(responses.unit), letters)
+
+
+def decibel_label(unit: str) -> str:
+    """Magnitude in dB, with the unit of 0 dB if there is one."""
+    return tr("magnitude in dB re 1 {unit}", unit=unit) if unit else tr("magnitude in dB")
 
 
 def lines_phrase(responses: Responses) -> str:
     """Number of lines and their range."""
     f = responses.lines.frequency_hz
     if len(f) == 1:
-        return f"1 line, {frequency_label(f[0])} Hz"
-    return f"{len(f)} lines, {frequency_label(f[0])}–{frequency_label(f[-1])} Hz"
+        return tr("1 line, {at} Hz", at=numerals(frequency_label(f[0])))
+    low, high = (numerals(frequency_label(at)) for at in (f[0], f[-1]))
+    return tr("{count} lines, {low}–{high} Hz", count=len(f), low=low, high=high)
 
 
 def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None = None) -> str:
     """The line below the title: quantity, channels, lines, and how much is valid."""
-    path = f" from {shortened(names[0], 30)} to {shortened(names[1], 30)}" if names else ""
-    return f"{quantity(responses)}{path} · {lines_phrase(responses)} · {valid_rows} of {counted(len(responses))} valid"
+    what = quantity(responses)
+    if names:
+        first, second = (shortened(name, 30) for name in names)
+        what = tr("{quantity} from {input} to {output}", quantity=what, input=first, output=second)
+    valid = trn("{valid} of {n} response valid", "{valid} of {n} responses valid", len(responses), valid=valid_rows)
+    return f"{what} · {lines_phrase(responses)} · {valid}"
 
 
 def clock(time_s: np.ndarray) -> tuple[float, str]:
@@ -44,6 +61,6 @@ def clock(time_s: np.ndarray) -> tuple[float, str]:
     first, last = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     if abs(first) < _CLOCK_FROM_S or last - first > abs(first) / 10:
         start = moment_of_start()
-        return 0.0, f"time in s after {start}" if start else "time in s"
+        return 0.0, tr("time in s after {start}", start=start) if start else tr("time in s")
     origin = float(np.floor(first))
-    return origin, f"time in s after {moment(origin, 0)}"
+    return origin, tr("time in s after {start}", start=moment(origin, 0))

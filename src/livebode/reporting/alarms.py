@@ -6,9 +6,9 @@ from typing import Any
 
 from livebode.core import Event
 from livebode.core.document import Finding, Tone
+from livebode.language import recognised, tr, trn
 from livebode.records import Run
 from livebode.reporting.happenings import EventSummary
-from livebode.reporting.wording import many
 
 _ACTIVE_MAX = 5
 
@@ -23,7 +23,10 @@ def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
     if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
         tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
     latest = _newest(happenings)[-_ACTIVE_MAX:] if active else []
-    return (Finding(tone, monitoring["message"]), *(Finding("alarm", event.message) for event in latest))
+    return (
+        Finding(tone, recognised(monitoring["message"])),
+        *(Finding("alarm", recognised(event.message)) for event in latest),
+    )
 
 
 def _newest(happenings: EventSummary) -> list[Event]:
@@ -42,10 +45,14 @@ def _so_far(run: Run, happenings: EventSummary) -> Finding:
     """The changes so far, if run.json does not contain a summary yet."""
     if run.finished:
         return Finding(
-            "open", "Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs."
+            "open", tr("Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs.")
         )
     came, cleared = happenings.count("change"), happenings.count("change-cleared")
     if not came:
-        return Finding("open", "No change was reported so far; the final verdict is available at the end of the run.")
-    message = f"So far {many(came, 'change')} reported, {cleared} cleared."
+        text = tr("No change was reported so far; the final verdict is available at the end of the run.")
+        return Finding("open", text)
+    message = trn(
+        "So far {n:,} change reported, {cleared} cleared.", "So far {n:,} changes reported, {cleared} cleared.", came,
+        cleared=cleared,
+    )  # fmt: skip
     return Finding("alarm" if came > cleared else "check", message)

@@ -16,19 +16,14 @@ from livebode.analysis.difference import ALPHA, Compared, Difference, compare
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core.clock import moment
 from livebode.core.document import TONES, Document, Finding, Paragraph, Part, Picture, Section, Table
+from livebode.language import marked, number, recognised, tr, trn
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
 from livebode.reporting.comparison_verdict import verdict
 from livebode.reporting.material import written
-from livebode.reporting.wording import BOUND_95, decibels, many, polar, signed, to_toml, with_bound
+from livebode.reporting.wording import BOUND_95, decibels, polar, signed, to_toml, with_bound
 
-_TEST = (
-    "A line differs if |G₂ − G₁|², divided by the variance of both means, exceeds a limit that chance exceeds with a "
-    "probability of {alpha:.2g}: 5 % for all {m} together (Bonferroni). For two runs of an unchanged machine, the "
-    "probability that any line differs is at most 5 %. The variance is from the scatter between windows, with degrees "
-    "of freedom by Welch and Satterthwaite."
-)
-_TONES = {**TONES, "ok": "no difference shown"}
+_TONES = {**TONES, "ok": marked("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
 
 
@@ -90,55 +85,67 @@ class Comparison:
     def document(self, made: datetime) -> Document:
         """The report."""
         one, other = self.found.runs
-        title = f"{one.path.resolve().name} and {other.path.resolve().name}"
+        title = tr("{before} and {after}", before=one.path.resolve().name, after=other.path.resolve().name)
         rows = (
-            ("before", str(one.path)), ("after", str(other.path)),
-            ("before written", written(one.path / "run.json")), ("after written", written(other.path / "run.json")),
-            ("responses", " and ".join(f"{a.count:,}" for a in self.found.averages)),
-            ("compared at", _span(self.found)), ("report written", moment(made.timestamp())),
+            (tr("before"), str(one.path)), (tr("after"), str(other.path)),
+            (tr("before written"), written(one.path / "run.json")),
+            (tr("after written"), written(other.path / "run.json")),
+            (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
+            (tr("compared at"), _span(self.found)), (tr("report written"), moment(made.timestamp())),
         )  # fmt: skip
         sections = [self._response(), self._places(), self._parameters(), self._events(), _settings(one, other)]
         there = tuple(section for section in sections if section is not None)
         return Document(
-            "Before and after", title, rows, self.sentences, there, f"{title} · livebode",
-            "What changed", _TONES,
+            tr("Before and after"), title, rows, self.sentences, there, f"{title} · livebode",
+            tr("What changed"), _TONES,
         )  # fmt: skip
 
     def _response(self) -> Section:
         d = self.found.overall
-        how = "means over the common places, each place counted alike" if self.found.places else "means of the runs"
-        caption = f"Before and after: {how}, with 95 % bounds. Below: ratio after/before, with the bound that covers "
-        caption += f"all {d.m} lines together with 95 %; filled marks differ."
+        how = tr("means of the runs")
+        if self.found.places:
+            how = tr("means over the common places, each place counted alike")
+        caption = tr(
+            "Before and after: {how}, with 95 % bounds. Below: ratio after/before, with the bound that covers all {m} "
+            "lines together with 95 %; filled marks differ.",
+            how=how, m=d.m,
+        )  # fmt: skip
         picture = Picture("comparison", {"before": d.before, "after": d.after, "ratio": d.ratio, "bound": d.bound,
                                          "differs": d.differs}, caption)  # fmt: skip
         radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
         rows = [
             (
-                f"{f:g}", *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],
+                number(f, "g"), *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],
                 *polar(complex(d.after.value[i]), float(radius[1][i]))[:2],
-                *polar(complex(d.ratio[i]), float(d.bound[i])), _p(d.p[i]), "yes" if d.differs[i] else "no",
+                *polar(complex(d.ratio[i]), float(d.bound[i])), _p(d.p[i]), tr("yes") if d.differs[i] else tr("no"),
             )
             for i, f in enumerate(d.before.lines.frequency_hz)
         ]  # fmt: skip
         step = -(-len(rows) // _LINES_SHOWN)
         shown = [row for i, row in enumerate(rows) if i % step == 0 or d.differs[i]]
-        note = f"Every {step}th line, and those that differ. " if step > 1 else ""
-        headings = ("Hz", "before dB", "±", "after dB", "±", "ratio dB", "±", "ratio °", "±", "p", "differs")
-        table = Table(headings, tuple(shown), tuple(range(10)), note + "± of the ratio: 95 % at all lines together.")
-        return Section("Frequency response", (picture, Paragraph(_TEST.format(alpha=ALPHA / d.m, m=d.m)), table))
+        note = tr("± of the ratio: 95 % at all lines together.")
+        if step > 1:
+            note = tr("Only some of the lines are shown, and all that differ.") + " " + note
+        headings = (
+            "Hz", tr("before dB"), "±", tr("after dB"), "±", tr("ratio dB"), "±", tr("ratio °"), "±", "p",
+            tr("differs"),
+        )  # fmt: skip
+        table = Table(headings, tuple(shown), tuple(range(10)), note)
+        return Section(tr("Frequency response"), (picture, Paragraph(_how_tested(d.m)), table))
 
     def _places(self) -> Section | None:
         places = self.found.places
         if not places:
             return None
-        caption = "Change of the magnitude at each place and line, forward and return; dots mark those that differ."
+        caption = tr("Change of the magnitude at each place and line, forward and return; dots mark those that differ.")
         data = {
             "frequency_hz": self.found.overall.before.lines.frequency_hz,
             "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
         }
         found = [
             (
-                f"{p.low:.3g} … {p.high:.3g}", "return" if p.back else "forward", f"{f:g}",
+                f"{number(p.low, '.3g')} … {number(p.high, '.3g')}",
+                tr("return") if p.back else tr("forward"), number(f, "g"),
                 *polar(complex(p.difference.ratio[i]), float(p.difference.bound[i])), _p(p.difference.p[i]),
             )
             for p in places
@@ -148,10 +155,15 @@ class Comparison:
         parts: list[Part] = [Picture("places", data, caption)]
         if found:
             left_out = len(found) - _PLACES_SHOWN
-            note = f"{left_out} more rows not shown; --json prints all." if left_out > 0 else ""
-            headings = ("place", "direction", "Hz", "ratio dB", "±", "ratio °", "±", "p")
-            parts.append(Table(headings, tuple(found[:_PLACES_SHOWN]), tuple(range(2, 8)), note))
-        return Section("By place", tuple(parts))
+            note = trn(
+                "{n:,} more row not shown; --json prints all.",
+                "{n:,} more rows not shown; --json prints all.",
+                left_out,
+            )
+            headings = (tr("place"), tr("direction"), "Hz", tr("ratio dB"), "±", tr("ratio °"), "±", "p")
+            shown = tuple(found[:_PLACES_SHOWN])
+            parts.append(Table(headings, shown, tuple(range(2, 8)), note if left_out > 0 else ""))
+        return Section(tr("By place"), tuple(parts))
 
     def _parameters(self) -> Section:
         parts: list[Part] = []
@@ -159,24 +171,38 @@ class Comparison:
             (self.changes.parameter_words, self.changes.parameters),
             (self.changes.margin_words, self.changes.margins),
         ):
-            parts += [Paragraph(words)] if words else []
+            parts += [Paragraph(recognised(words))] if words else []
             if table:
-                headings = ("", "before", "±", "after", "±", "unit", "change", "±", "in %", "significant")
-                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), _NOTE))
-        return Section("Parameters and margins", tuple(parts))
+                headings = (
+                    "", tr("before"), "±", tr("after"), "±", tr("unit"), tr("change"), "±", tr("in %"),
+                    tr("significant"),
+                )  # fmt: skip
+                note = tr(
+                    "± of before and after covers 95 % each; ± of the change covers the whole table together "
+                    "(Bonferroni)."
+                )
+                parts.append(Table(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8), note))
+        return Section(tr("Parameters and margins"), tuple(parts))
 
     def _events(self) -> Section:
         counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
-        rows = tuple((kind, f"{counts[0][kind]:,}", f"{counts[1][kind]:,}") for kind in kinds)
-        parts: list[Part] = [Table(("kind", "before", "after"), rows, (1, 2))] if rows else []
-        for run, when in zip(self.found.runs, ("Before", "After")):
-            message = run.summary.get("monitoring", {}).get("message", "changes are not assessed.")
-            parts.append(Paragraph(f"{when}: {message}"))
-        return Section("Events", tuple(parts))
+        rows = tuple((recognised(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
+        parts: list[Part] = [Table((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
+        for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
+            message = run.summary.get("monitoring", {}).get("message", marked("changes are not assessed."))
+            parts.append(Paragraph(f"{when}: {recognised(message)}"))
+        return Section(tr("Events"), tuple(parts))
 
 
-_NOTE = "± of before and after covers 95 % each; ± of the change covers the whole table together (Bonferroni)."
+def _how_tested(m: int) -> str:
+    return tr(
+        "A line differs if |G₂ − G₁|², divided by the variance of both means, exceeds a limit that chance exceeds with "
+        "a probability of {alpha:.2g}: 5 % for all {m} together (Bonferroni). For two runs of an unchanged machine, "
+        "the probability that any line differs is at most 5 %. The variance is from the scatter between windows, with "
+        "degrees of freedom by Welch and Satterthwaite.",
+        alpha=ALPHA / m, m=m,
+    )  # fmt: skip
 
 
 def _settings(before: Run, after: Run) -> Section:
@@ -184,8 +210,8 @@ def _settings(before: Run, after: Run) -> Section:
     one, other = (set(_flat(recorded_configuration(run.summary))) for run in (before, after))
     rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
     if not rows:
-        return Section("Settings", (Paragraph("Both runs have the same settings."),))
-    return Section("Settings that differ", (Table(("setting", "before", "after"), rows),))
+        return Section(tr("Settings"), (Paragraph(tr("Both runs have the same settings.")),))
+    return Section(tr("Settings that differ"), (Table((tr("setting"), tr("before"), tr("after")), rows),))
 
 
 def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
@@ -205,8 +231,8 @@ def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
 def _row(c: Change) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
-        c.words, *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed, f"{percent(c, c.amount):+.2g}",
-        "yes" if c.significant else "no",
+        recognised(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
+        number(percent(c, c.amount), "+.2g"), tr("yes") if c.significant else tr("no"),
     )  # fmt: skip
 
 
@@ -231,12 +257,16 @@ def _lines(d: Difference) -> dict[str, Any]:
 
 
 def _p(p: float) -> str:
-    return f"{p:.2g}" if isfinite(p) else "—"
+    return number(p, ".2g") if isfinite(p) else "—"
 
 
 def _span(of: Compared) -> str:
     f = of.overall.before.lines.frequency_hz
-    where = (
-        f"; {many(len(of.places), 'place')} of the schedule, forward and return counted separately" if of.places else ""
-    )
-    return f"{many(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz{where}"
+    text = trn("{n:,} line, {low:g} … {high:g} Hz", "{n:,} lines, {low:g} … {high:g} Hz", len(f), low=f[0], high=f[-1])
+    if not of.places:
+        return text
+    return text + "; " + trn(
+        "{n:,} place of the schedule, forward and return counted separately",
+        "{n:,} places of the schedule, forward and return counted separately",
+        len(of.places),
+    )  # fmt: skip

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from livebode.analysis.changes import Change, Changes, percent
 from livebode.analysis.difference import Compared, Difference, Place
 from livebode.core.document import Finding, Tone
+from livebode.language import listed, number, recognised, tr, trn
 from livebode.reporting.alarms import alarms
 from livebode.reporting.happenings import EventSummary
-from livebode.reporting.wording import many, polar, signed
+from livebode.reporting.wording import polar, signed
 
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")
 
@@ -22,18 +23,18 @@ def verdict(found: Compared, changes: Changes) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
     findings = [
         *_alarms(found),
-        *(Finding("check", text) for text in found.warnings),
+        *(Finding("check", recognised(text)) for text in found.warnings),
         _overall(found.overall),
         *_by_place(found.places),
-        *_changed("parameter", changes.parameters),
-        *_changed("margin", changes.margins),
+        *_parameters(changes.parameters),
+        *_margins(changes.margins),
     ]
     return tuple(sorted(findings, key=lambda finding: _URGENT.index(finding.tone)))
 
 
 def _alarms(found: Compared) -> Iterator[Finding]:
     """Alarms of both runs; none for a finished run without a baseline."""
-    for run, when in zip(found.runs, ("Before", "After")):
+    for run, when in zip(found.runs, (tr("Before"), tr("After"))):
         if run.summary.get("monitoring", {}).get("baseline") is not None or not run.finished:
             for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
                 if finding.tone != "ok":
@@ -42,14 +43,20 @@ def _alarms(found: Compared) -> Iterator[Finding]:
 
 def _overall(d: Difference) -> Finding:
     if not np.isfinite(d.p).any():
-        return Finding("open", "There is no line at which both runs have a valid mean with a known sigma.")
+        return Finding("open", tr("There is no line at which both runs have a valid mean with a known sigma."))
     if not d.differs.any():
-        return Finding("ok", f"No line differs by more than chance ({d.m} tested together; {_seen([d])}).")
+        text = tr("No line differs by more than chance ({m} tested together; {seen}).", m=d.m, seen=_seen([d]))
+        return Finding("ok", text)
     f, worst = d.before.lines.frequency_hz, int(np.nanargmin(d.p))
-    verb = "differs" if d.differs.sum() == 1 else "differ"
     db, around, deg, turned = polar(complex(d.ratio[worst]), float(d.bound[worst]))
-    words = f"{many(int(d.differs.sum()), 'line')} of {d.m} {verb}: {_hz(f[d.differs])}. "
-    words += f"Most certain at {f[worst]:g} Hz: {signed(db)} ± {around} dB, {signed(deg)} ± {turned}°."
+    words = trn(
+        "{n:,} line of {m} differs: {lines}.", "{n:,} lines of {m} differ: {lines}.", int(d.differs.sum()),
+        m=d.m, lines=_hz(f[d.differs]),
+    )  # fmt: skip
+    words += " " + tr(
+        "Most certain at {at:g} Hz: {db} ± {around} dB, {deg} ± {turned}°.",
+        at=f[worst], db=signed(db), around=around, deg=signed(deg), turned=turned,
+    )  # fmt: skip
     return Finding("differs", words)
 
 
@@ -57,36 +64,83 @@ def _by_place(places: tuple[Place, ...]) -> Iterator[Finding]:
     if not places:
         return
     if not any(np.isfinite(p.difference.p).any() for p in places):
-        yield Finding("open", "There is no place at which both runs have a valid mean with a known sigma.")
+        yield Finding("open", tr("There is no place at which both runs have a valid mean with a known sigma."))
         return
     there = [p for p in places if p.difference.differs.any()]
     count = sum(int(p.difference.differs.sum()) for p in there)
-    words = f"By place: {count} of {places[0].difference.m} pairs of line and place differ, at {len(there)} "
-    words += f"of {many(len(places), 'place')} (forward and return counted separately"
-    words += ")." if there else f"; {_seen([p.difference for p in places])})."
-    yield Finding("differs" if there else "ok", words)
+    values = {"count": count, "pairs": places[0].difference.m, "there": len(there)}
+    if there:
+        words = trn(
+            "By place: {count} of {pairs} pairs of line and place differ, at {there} of {n:,} place (forward and "
+            "return counted separately).",
+            "By place: {count} of {pairs} pairs of line and place differ, at {there} of {n:,} places (forward and "
+            "return counted separately).",
+            len(places), **values,
+        )  # fmt: skip
+        yield Finding("differs", words)
+        return
+    words = trn(
+        "By place: {count} of {pairs} pairs of line and place differ, at {there} of {n:,} place (forward and return "
+        "counted separately; {seen}).",
+        "By place: {count} of {pairs} pairs of line and place differ, at {there} of {n:,} places (forward and return "
+        "counted separately; {seen}).",
+        len(places), seen=_seen([p.difference for p in places]), **values,
+    )  # fmt: skip
+    yield Finding("ok", words)
 
 
 def _seen(found: Sequence[Difference]) -> str:
     """The smallest detectable change: at every line and at the best line."""
     seen = 100 * np.concatenate([d.seen[np.isfinite(d.p)] for d in found])
     least, most = float(seen.min()), float(seen.max())
-    at = f"detectable: ≥ {most:.2g} %"
-    return at if most < 1.5 * least else f"{at} at every line, ≥ {least:.2g} % at the best line"
+    if most < 1.5 * least:
+        return tr("detectable: ≥ {most:.2g} %", most=most)
+    return tr("detectable: ≥ {most:.2g} % at every line, ≥ {least:.2g} % at the best line", most=most, least=least)
 
 
-def _changed(what: str, table: tuple[Change, ...]) -> Iterator[Finding]:
-    if not table:
-        return
-    moved = [c for c in table if c.significant]
-    listed = "; ".join(f"{c.words} {percent(c, c.amount):+.2g} % ± {percent(c, c.bound):.2g} %" for c in moved[:6])
+def _parameters(table: tuple[Change, ...]) -> Iterator[Finding]:
+    moved, listing = _changed(table)
     if moved:
-        yield Finding("differs", f"{many(len(moved), what)} of {len(table)} changed: {listed}.")
-        return
-    seen = "; ".join(f"{c.words} ≥ {percent(c, c.seen):.2g} %" for c in table[:6] if isfinite(percent(c, c.seen)))
-    yield Finding("ok", f"No significant change of a {what}" + (f" (detectable: {seen})." if seen else "."))
+        text = trn(
+            "{n:,} parameter of {all} changed: {changes}.", "{n:,} parameters of {all} changed: {changes}.", moved,
+            all=len(table), changes=listing,
+        )  # fmt: skip
+        yield Finding("differs", text)
+    elif table:
+        without = tr("No significant change of a parameter.")
+        seen = tr("No significant change of a parameter (detectable: {changes}).", changes=listing)
+        yield Finding("ok", seen if listing else without)
+
+
+def _margins(table: tuple[Change, ...]) -> Iterator[Finding]:
+    moved, listing = _changed(table)
+    if moved:
+        text = trn(
+            "{n:,} margin of {all} changed: {changes}.", "{n:,} margins of {all} changed: {changes}.", moved,
+            all=len(table), changes=listing,
+        )  # fmt: skip
+        yield Finding("differs", text)
+    elif table:
+        without = tr("No significant change of a margin.")
+        seen = tr("No significant change of a margin (detectable: {changes}).", changes=listing)
+        yield Finding("ok", seen if listing else without)
+
+
+def _changed(table: tuple[Change, ...]) -> tuple[int, str]:
+    """Number of significant changes with their list; if there are none, the list of the detectable changes."""
+    moved = [c for c in table if c.significant]
+    if moved:
+        return len(moved), "; ".join(
+            f"{recognised(c.words)} {number(percent(c, c.amount), '+.2g')} % ± {number(percent(c, c.bound), '.2g')} %"
+            for c in moved[:6]
+        )
+    return 0, "; ".join(
+        f"{recognised(c.words)} ≥ {number(percent(c, c.seen), '.2g')} %"
+        for c in table[:6]
+        if isfinite(percent(c, c.seen))
+    )
 
 
 def _hz(frequency_hz: NDArray[np.float64]) -> str:
-    shown = ", ".join(f"{f:g}" for f in frequency_hz[:12])
+    shown = listed(number(f, "g") for f in frequency_hz[:12])
     return f"{shown}{' …' if len(frequency_hz) > 12 else ''} Hz"

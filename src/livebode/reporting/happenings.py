@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from livebode.core import Event
 from livebode.core.clock import moment
 from livebode.core.document import Paragraph, Part, Table
+from livebode.language import number, recognised, tr, trn
 from livebode.records.grouped_events import each_event, event_counts
-from livebode.reporting.wording import many
 
 ALARMS = ("change", "change-corrected", "change-cleared", "baseline-unknown", "doubtful")
 """Kinds that are listed individually; so are the events of the record itself."""
@@ -71,18 +71,24 @@ class EventSummary:
     def parts(self) -> tuple[Part, ...]:
         """A table of the kinds, and a list of the alarms."""
         if not self.kinds:
-            return (Paragraph("The run has no events."),)
+            return (Paragraph(tr("The run has no events.")),)
         rows = tuple(
-            (name, f"{k.count:,}", moment(k.first.time_s, 2), moment(k.newest.time_s, 2), k.newest.message[:_LETTERS])
+            (
+                recognised(name), number(k.count, ","), moment(k.first.time_s, 2), moment(k.newest.time_s, 2),
+                recognised(k.newest.message)[:_LETTERS],
+            )
             for name, k in self.kinds.items()
-        )
-        grouped = Table(("kind", "count", "first", "newest", "newest message"), rows, (1,))
+        )  # fmt: skip
+        headings = (tr("kind"), tr("count"), tr("first"), tr("newest"), tr("newest message"))
+        grouped = Table(headings, rows, (1,))
         if not self.told:
             return (grouped,)
-        note = (
-            f"{many(self.left_out, 'event')} between them not shown; events.jsonl contains all."
-            if self.left_out
-            else ""
+        note = trn(
+            "{n:,} event between them not shown; events.jsonl contains all.",
+            "{n:,} events between them not shown; events.jsonl contains all.",
+            self.left_out,
         )
-        in_full = tuple((moment(e.time_s, 2), e.kind, e.message[:_LETTERS]) for e in self.in_full)
-        return grouped, Table(("time", "kind", "message"), in_full, note=note)
+        in_full = tuple(
+            (moment(e.time_s, 2), recognised(e.kind), recognised(e.message)[:_LETTERS]) for e in self.in_full
+        )
+        return grouped, Table((tr("time"), tr("kind"), tr("message")), in_full, note=note if self.left_out else "")

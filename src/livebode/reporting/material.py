@@ -17,6 +17,7 @@ from livebode.configuration.recorded import recorded_configuration
 from livebode.core import LivebodeError, Responses
 from livebode.core.clock import moment
 from livebode.fitting import Fit
+from livebode.language import recognised, tr
 from livebode.records import Run
 from livebode.reporting.happenings import EventSummary
 
@@ -72,7 +73,7 @@ class Material:
         source = self.configuration.get("source", {})
         name = Path(source["log"]).name if "log" in source else source.get("url", "")
         if "demo" in self.configuration:
-            name = "simulated belt axis"
+            name = tr("simulated belt axis")
         return str(name or self.run.path.name)
 
     @property
@@ -111,24 +112,26 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
 
 def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
     if "fit" not in configuration:
-        return None, "No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one."
+        return None, tr("No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one.")
     try:
         found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
     except LivebodeError as error:
-        return None, f"No model was fitted: {error}."
-    return (found, words) if found.status == "ok" else (None, f"The fit to {words} was rejected: {found.sentence}.")
+        return None, tr("No model was fitted: {why}.", why=recognised(str(error)))
+    if found.status == "ok":
+        return found, words
+    return None, tr("The fit to {what} was rejected: {why}.", what=recognised(words), why=recognised(found.sentence))
 
 
 def _loop(configuration: dict[str, Any], of: Averaged, fit: Fit | None) -> tuple[LoopReport | None, str]:
     described = LoopSection.model_validate(configuration.get("loop", {})).build(of.overview.lines.rate_hz)
     if described.feedback is None:
-        return None, "No margins: the run's configuration does not describe the loop ([loop])."
+        return None, tr("No margins: the run's configuration does not describe the loop ([loop]).")
     if fit is None:
-        return None, "No margins: they need a fitted model, and there is none."
+        return None, tr("No margins: they need a fitted model, and there is none.")
     try:
         found = loop_report(fit, "the mean", of.overview, described)
     except LivebodeError as error:
-        return None, f"No margins: {error}."
+        return None, tr("No margins: {why}.", why=recognised(str(error)))
     return replace(found, responses=Responses.of(of.response)), ""
 
 

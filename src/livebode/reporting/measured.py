@@ -5,21 +5,29 @@ from __future__ import annotations
 from typing import Any
 
 from livebode.core.document import Paragraph, Section
+from livebode.language import listed, marked, number, recognised, tr, trn
 from livebode.reporting.material import Material
-from livebode.reporting.wording import duration, many, pairs
+from livebode.reporting.wording import duration, pairs
 
 _ESTIMATOR = {
-    "joint": "joint: S_wy/S_wu, unbiased in any linear loop",
-    "direct": "direct: S_uy/S_uu, biased if y is fed back to u",
-    "indirect": "indirect: response of the closed loop, from which the described controllers are removed",
+    "joint": marked("joint: S_wy/S_wu, unbiased in any linear loop"),
+    "direct": marked("direct: S_uy/S_uu, biased if y is fed back to u"),
+    "indirect": marked("indirect: response of the closed loop, from which the described controllers are removed"),
 }
 _NOISE = {
-    "periods": "the scatter between windows that are whole periods apart",
-    "auto": "the scatter between windows that are whole periods apart; where the schedule moves, detection lines "
-    "(non-excited bins)",
-    "quiet": "detection lines (non-excited bins); at standstill the scatter between periods if it is larger",
+    "periods": marked("the scatter between windows that are whole periods apart"),
+    "auto": marked(
+        "the scatter between windows that are whole periods apart; where the schedule moves, detection lines "
+        "(non-excited bins)"
+    ),
+    "quiet": marked("detection lines (non-excited bins); at standstill the scatter between periods if it is larger"),
 }
-_ROLES = {"excitation": "excitation w", "input": "plant input u", "output": "output y", "schedule": "schedule"}
+_ROLES = {
+    "excitation": marked("excitation w"),
+    "input": marked("plant input u"),
+    "output": marked("output y"),
+    "schedule": marked("schedule"),
+}
 
 
 def how(of: Material) -> Section:
@@ -29,50 +37,75 @@ def how(of: Material) -> Section:
     f = of.run.lines.frequency_hz
     source = of.configuration.get("source", {})
     rows = [
-        ("source", str(source.get("log") or source.get("url") or "")),
-        ("format", str(found.get("format", ""))),
-        *((_ROLES[role], of.channels[role]) for role in _ROLES if role in of.channels),
-        ("rate", f"{found['rate_hz']:g} Hz" + (f" ({found['rate_from']})" if "rate_from" in found else "")),
-        ("samples", f"{of.samples:,}, {duration(of.samples / found['rate_hz'])}"),
-        ("quantity", f"{found['quantity']}, in {found['unit']}" if found["unit"] else f"{found['quantity']}, no unit"),
-        ("lines", f"{many(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz on a grid of {1 / window_s:.4g} Hz"),
-        ("window", f"{found['window']} samples, {1000 * window_s:.4g} ms: a whole number of periods of each line"),
-        ("hop", f"{found['hop']} samples, {found['rate_hz'] / found['hop']:.4g} responses/s" if "hop" in found else ""),
-        ("estimator", _ESTIMATOR.get(tracking.get("estimator", ""), "")),
-        ("bounds from", _NOISE.get(tracking.get("noise", ""), "")),
-        ("options", ", ".join(_options(tracking, of))),
-        ("loop", "; ".join(_loop(of.configuration.get("loop", {})))),
-    ]
-    bounds = (
+        (tr("source"), str(source.get("log") or source.get("url") or "")),
+        (tr("format"), str(found.get("format", ""))),
+        *((recognised(_ROLES[role]), of.channels[role]) for role in _ROLES if role in of.channels),
+        (tr("rate"), f"{number(found['rate_hz'], 'g')} Hz" + _rate_from(found)),
+        (tr("samples"), listed((number(of.samples, ","), duration(of.samples / found["rate_hz"])))),
+        (tr("quantity"), _quantity(found)),
+        (tr("lines"), trn(
+            "{n:,} line, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
+            "{n:,} lines, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
+            len(f), low=f[0], high=f[-1], step=1 / window_s,
+        )),
+        (tr("window"), tr(
+            "{samples} samples, {ms:.4g} ms: a whole number of periods of each line",
+            samples=found["window"], ms=1000 * window_s,
+        )),
+        (tr("hop"), _hop(found)),
+        (tr("estimator"), recognised(_ESTIMATOR.get(tracking.get("estimator", ""), ""))),
+        (tr("bounds from"), recognised(_NOISE.get(tracking.get("noise", ""), ""))),
+        (tr("options"), listed(_options(tracking, of))),
+        (tr("loop"), "; ".join(_loop(of.configuration.get("loop", {})))),
+    ]  # fmt: skip
+    bounds = tr(
         "The effective time of a response is the centre of its window. A bound contains the true response with the "
         "stated probability. It covers noise, and distortion where it is detected; "
         "it does not cover a systematic error that the signals do not show."
     )
-    return Section("How it was measured", (pairs(rows), Paragraph(bounds)))
+    return Section(tr("How it was measured"), (pairs(rows), Paragraph(bounds)))
 
 
 def _options(tracking: dict[str, Any], of: Material) -> list[str]:
     said = []
     if tracking.get("average"):
-        said.append(f"averaged over periods with forgetting {tracking['forgetting']:g}")
+        said.append(tr("averaged over periods with forgetting {forgetting:g}", forgetting=tracking["forgetting"]))
     if tracking.get("differenced"):
-        said.append(f"differenced: {', '.join(tracking['differenced'])}")
+        said.append(tr("differenced: {channels}", channels=listed(tracking["differenced"])))
     if tracking.get("spikes"):
-        said.append(f"windows with spikes of {', '.join(tracking['spikes'])} excluded")
+        said.append(tr("windows with spikes of {channels} excluded", channels=listed(tracking["spikes"])))
     if tracking.get("hann"):
-        said.append("Hann window")
+        said.append(tr("Hann window"))
     if tracking.get("dtype") == "float32":
-        said.append("single precision")
+        said.append(tr("single precision"))
     if "motion" in of.configuration:
-        said.append("corrected for the axis's motion with a moving model")
+        said.append(tr("corrected for the axis's motion with a moving model"))
     return said
 
 
 def _loop(loop: dict[str, Any]) -> list[str]:
     """The described controllers in words; empty if there are none."""
-    said = []
-    for name in ("velocity", "position", "position_pd"):
-        if name in loop:
-            settings = ", ".join(f"{key} {value}" for key, value in loop[name].items() if value)
-            said.append(f"{name.replace('_', ' ')}: {settings}")
-    return [f"excitation at the {loop['excitation_at']}", *said] if said else []
+    said = [
+        # The keys of the configuration, with numbers as in the file.
+        f"{name}: {', '.join(f'{key} {value}' for key, value in loop[name].items() if value)}"
+        for name in ("velocity", "position", "position_pd")
+        if name in loop
+    ]
+    at = recognised(str(loop.get("excitation_at")))
+    return [tr("excitation at the {place}", place=at), *said] if said else []
+
+
+def _rate_from(found: dict[str, Any]) -> str:
+    return f" ({recognised(found['rate_from'])})" if "rate_from" in found else ""
+
+
+def _quantity(found: dict[str, Any]) -> str:
+    name, unit = recognised(found["quantity"]), found["unit"]
+    return tr("{quantity}, in {unit}", quantity=name, unit=unit) if unit else tr("{quantity}, no unit", quantity=name)
+
+
+def _hop(found: dict[str, Any]) -> str:
+    if "hop" not in found:
+        return ""
+    per_s = found["rate_hz"] / found["hop"]
+    return tr("{samples} samples, {per_s:.4g} responses/s", samples=found["hop"], per_s=per_s)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from livebode.core.clock import moment
 from livebode.core.document import Document, Paragraph, Section
+from livebode.language import tr
 from livebode.reporting import sections
 from livebode.reporting.material import Judged, Material, read, written
 from livebode.reporting.measured import how
@@ -44,11 +45,12 @@ def run_report(directory: Path, judged: Judged | None = None, *, made: datetime)
     there = [section for section in found if isinstance(section, Section)]
     version = of.run.summary.get("versions", {}).get("livebode", "")
     return Document(
-        kind="Report of a run",
+        kind=tr("Report of a run"),
         title=of.title,
         facts=facts(of, made),
         verdict=verdict(of),
-        sections=(*there, Section("Not in this report", absent)) if absent else tuple(there),
+        sections=(*there, Section(tr("Not in this report"), absent)) if absent else tuple(there),
+        asked=tr("Verdict"),
         foot=f"{of.title} · {of.run.path.resolve().name} · livebode {version}".strip(),
     )
 
@@ -59,15 +61,15 @@ def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
     log, first_s, last_s = source.get("log"), *of.of.spans_s
     begun = (of.run.summary.get("source") or {}).get("clock_offset_s")
     rows = (
-        ("machine", of.title),
-        ("source", str(source.get("url", "")) if "url" in source else "a recording" if log else ""),
-        ("run", of.run.path.resolve().name),
-        ("run's clock", f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
-        ("started", moment(float(begun)) if begun is not None else ""),
-        ("duration", duration(of.samples / of.run.lines.rate_hz)),
-        ("recording written", written(Path(log)) if log else ""),
-        ("run written", written(of.run.path / "run.json")),
-        ("report written", moment(made.timestamp())),
+        (tr("machine"), of.title),
+        (tr("source"), str(source.get("url", "")) if "url" in source else tr("a recording") if log else ""),
+        (tr("run"), of.run.path.resolve().name),
+        (tr("run's clock"), f"{moment(first_s, 2)} … {moment(last_s, 2)}"),
+        (tr("started"), moment(float(begun)) if begun is not None else ""),
+        (tr("duration"), duration(of.samples / of.run.lines.rate_hz)),
+        (tr("recording written"), written(Path(log)) if log else ""),
+        (tr("run written"), written(of.run.path / "run.json")),
+        (tr("report written"), moment(made.timestamp())),
         ("livebode", str(of.run.summary.get("versions", {}).get("livebode", ""))),
     )
     return tuple((name, value) for name, value in rows if value)

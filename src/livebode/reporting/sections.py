@@ -7,15 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from livebode.analysis.loop_report import LoopReport
 from livebode.analysis.parameter_track import MARGINS, Track
 from livebode.core.clock import moment
 from livebode.core.document import Listing, Paragraph, Part, Picture, Section, Table
+from livebode.fitting import Fit
+from livebode.language import listed, marked, number, recognised, tr
 from livebode.margins.words import WORDS
 from livebode.reporting.alarms import alarms
 from livebode.reporting.material import Material, by_schedule
 from livebode.reporting.wording import (
     BOUND_95,
-    many,
+    lines_of,
     pairs,
     polar_rows,
     share,
@@ -32,34 +35,45 @@ def response(of: Material) -> Section:
     """The mean with its bounds, the fitted model, and a table."""
     one = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
-    caption = (
-        f"Bars: {of.of.words}, with 95 % bounds. Light: range of 5–95 % of the single responses"
-        f"{_thinned(of)}.{' Dashed: the ' + of.fit.model.name + ' model fitted to it.' if of.fit else ''}"
-    )
+    caption = tr(
+        "Bars: {what}, with 95 % bounds. Light: range of 5–95 % of the single responses{thinned}.",
+        what=recognised(of.of.words), thinned=_drawn(of, len(of.of.overview)),
+    )  # fmt: skip
+    if of.fit:
+        caption += tr(" Dashed: the {model} model fitted to it.", model=recognised(of.fit.model.name))
     picture = Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
     frequency = one.lines.frequency_hz
     rows = [
-        (f"{f:g}", *polar, f"{c:.4f}" if isfinite(c) else "—", share(n, of.of.count))
+        (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
         for f, polar, c, n in zip(frequency, polar_rows(one, BOUND_95), one.coherence, of.of.valid)
     ]
     step = -(-len(rows) // _LINES_SHOWN)
-    note = f"Every {step}th of {len(rows)} lines; responses.parquet contains all." if step > 1 else ""
-    table = Table(
-        ("Hz", f"dB{_re(of)}", "± dB", "degrees", "± degrees", "coherence γ²", "valid"),
-        tuple(rows[::step]), tuple(range(7)), note,
+    note = tr(
+        "{shown} of {count} lines are shown; responses.parquet contains all.",
+        shown=len(rows[::step]), count=len(rows),
     )  # fmt: skip
-    return Section("Frequency response", (picture, table))
+    table = Table(
+        ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid")),
+        tuple(rows[::step]), tuple(range(7)), note if step > 1 else "",
+    )  # fmt: skip
+    return Section(tr("Frequency response"), (picture, table))
 
 
 def tracking(of: Material) -> Section:
     """Magnitude of the lines over time and over the schedule, if there is one."""
-    where = f" and over {of.channels.get('schedule', 'the schedule')}" if by_schedule(of.of) else ""
     shown = of.of.overview
     if len(shown.lines) <= _TRACES_MAX:
         shown = shown[:: -(-len(shown) // _TRACED)]
-    caption = f"Magnitude at each line over time{where}, with 99.7 % bounds{_drawn(of, len(shown))}."
+    thinned = _drawn(of, len(shown))
+    caption = tr("Magnitude at each line over time, with 99.7 % bounds{thinned}.", thinned=thinned)
+    if by_schedule(of.of):
+        schedule = of.channels.get("schedule", tr("the schedule"))
+        caption = tr(
+            "Magnitude at each line over time and over {schedule}, with 99.7 % bounds{thinned}.",
+            schedule=schedule, thinned=thinned,
+        )  # fmt: skip
     data = {"responses": shown, "schedule_name": of.channels.get("schedule", "")}
-    return Section("Tracking", (Picture("tracking", data, caption),))
+    return Section(tr("Tracking"), (Picture("tracking", data, caption),))
 
 
 def parameters(of: Material) -> Section | str:
@@ -74,25 +88,40 @@ def parameters(of: Material) -> Section | str:
     rows = []
     for name in dict.fromkeys([*fitted, *newest]):
         now = newest.get(name)
-        mean = with_bound(*fitted[name]) if name in fitted else ("fixed" if now and not now.sigma else "—", "")
+        mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
         late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
-        rows.append((name.replace("_", " "), *mean, *late, units.get(name) or (now.unit if now else "")))
-    note = f"Of the mean: {of.fit.about_bounds}." if of.fit else "± covers 95 % if the model is complete."
-    at = next((n.time_s for n in newest.values()), float("nan"))
-    headings = ("", "of the mean", "±", f"newest, at {moment(at, 2)}" if newest else "newest", "±", "unit")
-    if of.fit is not None:
-        low, high = of.fit.band_hz
-        words = (
-            f"The {of.fit.model.name} model, fitted to {of.fit_words}, at {many(of.fit.lines, 'line')} from {low:g} "
+        rows.append(
+            (recognised(name.replace("_", " ")), *mean, *late, recognised(units.get(name) or (now.unit if now else "")))
         )
-        words += f"to {high:g} Hz. Model error ε = {100 * of.fit.epsilon:.2g} % of |G|"
-        words += f"; reduced χ² {of.fit.chi2:.3g} from sigma alone." if isfinite(of.fit.chi2) else "."
-        parts.append(Paragraph(words))
-    else:
-        parts.append(Paragraph(of.fit_words))
+    note = tr("± covers 95 % if the model is complete.")
+    if of.fit:
+        note = tr("Of the mean: {bounds}.", bounds=recognised(of.fit.about_bounds))
+    at = next((n.time_s for n in newest.values()), float("nan"))
+    late_at = tr("newest, at {time}", time=moment(at, 2)) if newest else tr("newest")
+    headings = ("", tr("of the mean"), "±", late_at, "±", tr("unit"))
+    parts.append(Paragraph(of.fit_words if of.fit is None else _fitted(of.fit, of.fit_words)))
     parts.append(Table(headings, tuple(rows), (1, 2, 3, 4), note))
-    parts.extend(_over_time(of, track, "Parameters") for track in tracks if _moving(track))
-    return Section("Parameters", tuple(parts))
+    parts.extend(_over_time(of, track, tr("Parameters")) for track in tracks if _moving(track))
+    return Section(tr("Parameters"), tuple(parts))
+
+
+def _fitted(fit: Fit, what: str) -> str:
+    low, high = fit.band_hz
+    values = {
+        "model": recognised(fit.model.name), "what": recognised(what), "lines": lines_of(fit.lines), "low": low,
+        "high": high, "percent": 100 * fit.epsilon, "chi2": fit.chi2,
+    }  # fmt: skip
+    if isfinite(fit.chi2):
+        return tr(
+            "The {model} model, fitted to {what}, at {lines} from {low:g} to {high:g} Hz. Model error ε = "
+            "{percent:.2g} % of |G|; reduced χ² {chi2:.3g} from sigma alone.",
+            **values,
+        )
+    return tr(
+        "The {model} model, fitted to {what}, at {lines} from {low:g} to {high:g} Hz. Model error ε = "
+        "{percent:.2g} % of |G|.",
+        **values,
+    )
 
 
 def motion(of: Material) -> Section | None:
@@ -100,13 +129,14 @@ def motion(of: Material) -> Section | None:
     model = of.run.found.get("motion", {}).get("model")
     if model is None:
         return None
-    words = (
-        f"The newest chunk's model: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg; by position:"
-    )
+    words = tr(
+        "The newest chunk's model: Js {inertia:.5g} kg m², mL {load:.5g} kg; by position:",
+        inertia=model["inertia_kg_m2"], load=model["load_kg"],
+    )  # fmt: skip
     columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
-    rows = tuple((f"{x:.4g}", f"{k:.5g}", f"{b:.4g}") for x, k, b in columns)
-    table = Table(("position in m", "Keff in N/m", "bs in N s/m"), rows, (0, 1, 2))
-    return Section("Motion", (Paragraph(words), table))
+    rows = tuple((number(x, ".4g"), number(k, ".5g"), number(b, ".4g")) for x, k, b in columns)
+    table = Table((tr("position in m"), tr("Keff in N/m"), tr("bs in N s/m")), rows, (0, 1, 2))
+    return Section(tr("Motion"), (Paragraph(words), table))
 
 
 def margins(of: Material) -> Section | str:
@@ -114,29 +144,39 @@ def margins(of: Material) -> Section | str:
     if of.loop is None:
         return of.loop_words
     if of.loop.message:
-        return f"No margins: {of.loop.message}."
+        return tr("No margins: {why}.", why=recognised(of.loop.message))
     found = of.loop.margins
     bound = found.bound()[0]
     rows = []
     for i, (name, unit) in enumerate(zip(found.names, found.units)):
         value, at = found.value[0, i], found.frequency_hz[0, i]
         if isnan(at):
-            rows.append((WORDS[name], "any amount" if isinf(value) else "none", "", unit, "", "no crossing"))
+            size = tr("any amount") if isinf(value) else tr("none")
+            rows.append((recognised(WORDS[name]), size, "", recognised(unit), "", tr("no crossing")))
             continue
-        mark = "between the lines" if found.place[0, i] == "interpolated" else "EXTRAPOLATED: no line checks it"
-        rows.append((WORDS[name], *with_bound(value, bound[i]), unit, f"{at:.4g}", mark))
-    size, around, at_hz = of.loop.at_lines
-    about = "" if of.fit is None else f"Of the fit: {of.fit.about_bounds}. "
-    note = f"{about}From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} "
-    note += f"(at {at_hz:g} Hz). Tuning {of.loop.tuning.verdict}: {of.loop.tuning.sentence}"
-    table = Table(("margin", "value", "±", "unit", "at Hz", "range"), tuple(rows), (1, 2, 4), note)
-    caption = (
+        between = found.place[0, i] == "interpolated"
+        mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
+        rows.append((recognised(WORDS[name]), *with_bound(value, bound[i]), recognised(unit), number(at, ".4g"), mark))
+    headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
+    table = Table(headings, tuple(rows), (1, 2, 4), _about_margins(of.loop, of.fit))
+    caption = tr(
         "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
     )
     parts: list[Part] = [table, Picture("loop", {"found": of.loop}, caption)]
     if MARGINS in of.tracks and _moving(of.tracks[MARGINS]):
-        parts.append(_over_time(of, of.tracks[MARGINS], "Margins"))
-    return Section("Margins of the loop", tuple(parts))
+        parts.append(_over_time(of, of.tracks[MARGINS], tr("Margins")))
+    return Section(tr("Margins of the loop"), tuple(parts))
+
+
+def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
+    size, around, at_hz = loop.at_lines
+    about = "" if fit is None else tr("Of the fit: {bounds}. ", bounds=recognised(fit.about_bounds))
+    return about + tr(
+        "From the lines alone, without a model, Ms is at least {size:.3g} ± {around:.2g} (at {at:g} Hz). Tuning "
+        "{verdict}: {sentence}",
+        size=size, around=around, at=at_hz, verdict=recognised(loop.tuning.verdict),
+        sentence=recognised(loop.tuning.sentence),
+    )  # fmt: skip
 
 
 def events(of: Material) -> Section:
@@ -144,75 +184,88 @@ def events(of: Material) -> Section:
     monitoring = of.run.summary.get("monitoring", {})
     words = alarms(of.run, of.happenings)[0].text
     if monitoring.get("baseline"):
-        words += f" Baseline {monitoring['baseline']}, judged by {monitoring.get('judged_by', '—')}; false alarms: "
-        words += f"{monitoring.get('false_alarms', '—')}."
+        words += " " + tr(
+            "Baseline {baseline}, judged by {judge}; false alarms: {rate}.",
+            baseline=monitoring["baseline"], judge=recognised(str(monitoring.get("judged_by", "—"))),
+            rate=recognised(str(monitoring.get("false_alarms", "—"))),
+        )  # fmt: skip
         if covariates := monitoring.get("covariates"):
-            words += f" Covariates: {', '.join(covariates)}."
-    return Section("Alarms and events", (Paragraph(words), *of.happenings.parts()))
+            words += " " + tr("Covariates: {names}.", names=listed(covariates))
+    return Section(tr("Alarms and events"), (Paragraph(words), *of.happenings.parts()))
 
 
 def quality(of: Material) -> Section:
     """Gaps, bad samples, invalid responses and the state of the source."""
     counts = of.run.summary.get("counts", {})
     rows = [
-        ("samples", f"{of.samples:,}"),
-        *((words, f"{counts[key]:,}") for key, words in _COUNTS.items() if counts.get(key) is not None),
-        ("responses", f"{of.of.count:,}"),
-        ("with an invalid line", f"{of.of.incomplete:,} ({share(of.of.incomplete, of.of.count)})"),
+        (tr("samples"), number(of.samples, ",")),
+        *(
+            (recognised(words), number(counts[key], ","))
+            for key, words in _COUNTS.items()
+            if counts.get(key) is not None
+        ),
+        (tr("responses"), number(of.of.count, ",")),
+        (tr("with an invalid line"), f"{number(of.of.incomplete, ',')} ({share(of.of.incomplete, of.of.count)})"),
     ]
     table = pairs(rows)
     parts: list[Part] = [table]
     if "counts" not in of.run.summary:
-        parts.append(Paragraph("The counts of samples are written at the end of the run."))
+        parts.append(Paragraph(tr("The counts of samples are written at the end of the run.")))
     if source := of.run.summary.get("source"):
-        parts.append(pairs([(_SOURCE.get(key, key), _plain(value)) for key, value in source.items()]))
+        parts.append(pairs([(recognised(_SOURCE.get(key, key)), _plain(value)) for key, value in source.items()]))
     if (speed := of.run.summary.get("speed")) is not None:
-        words = f"{speed['recorded_s']:.4g} s of signals were tracked in {speed['run_s']:.3g} s"
-        parts.append(Paragraph(f"{words} ({speed['times_real_time']:.3g} times real time)."))
-    return Section("Data quality", tuple(parts))
+        words = tr(
+            "{recorded:.4g} s of signals were tracked in {run:.3g} s ({times:.3g} times real time).",
+            recorded=speed["recorded_s"], run=speed["run_s"], times=speed["times_real_time"],
+        )  # fmt: skip
+        parts.append(Paragraph(words))
+    return Section(tr("Data quality"), tuple(parts))
 
 
 _COUNTS = {
-    "gaps": "gaps", "missing": "missing samples", "non-finite": "samples that are not finite",
-    "implausible": "implausibly large samples", "spike": "spikes",
+    "gaps": marked("gaps"), "missing": marked("missing samples"), "non-finite": marked("samples that are not finite"),
+    "implausible": marked("implausibly large samples"), "spike": marked("spikes"),
 }  # fmt: skip
 _SOURCE = {
-    "connected": "connected at the end", "lost": "lost samples", "silent_s": "silent, s",
-    "measured_hz": "rate of arrival, Hz", "clock_offset_s": "sender's clock at sample 0",
-    "latency_s": "latency, s", "waiting_bytes": "bytes waiting", "waiting_s": "backlog, s",
-    "first_sample": "first sample", "counts": "events",
+    "connected": marked("connected at the end"), "lost": marked("lost samples"), "silent_s": marked("silent, s"),
+    "measured_hz": marked("rate of arrival, Hz"), "clock_offset_s": marked("sender's clock at sample 0"),
+    "latency_s": marked("latency, s"), "waiting_bytes": marked("bytes waiting"), "waiting_s": marked("backlog, s"),
+    "first_sample": marked("first sample"), "counts": marked("events"),
 }  # fmt: skip
 
 
 def validation(of: Material) -> Section | str:
     """Validation of the model on independent data, or why there is none."""
     if of.judged is None:
-        return "No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`."
-    parts: list[Part] = [Paragraph(f"{v.sentence}.") for v in of.judged.found]
+        return tr("No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`.")
+    parts: list[Part] = [Paragraph(f"{recognised(v.sentence)}.") for v in of.judged.found]
     rows = tuple(
         (
-            v.model, c.name, f"{100 * c.share:.0f} %", f"{c.largest:.3g}", f"{c.p:.2g}",
-            "yes" if c.name in v.judged_by else "no",
+            recognised(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
+            number(c.p, ".2g"), tr("yes") if c.name in v.judged_by else tr("no"),
         )
         for v in of.judged.found
         for c in v.correlations
     )  # fmt: skip
-    headings = ("model", "ε with", "lags inside", "largest", "joint p", "counts")
-    parts.append(Table(headings, rows, (2, 3, 4), " ".join(f"{n}." for n in of.judged.notes)))
-    caption = f"On {of.judged.on}: measured and simulated output, and the residual's correlations with their limits."
+    headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
+    parts.append(Table(headings, rows, (2, 3, 4), " ".join(f"{recognised(n)}." for n in of.judged.notes)))
+    caption = tr(
+        "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
+        recording=of.judged.on,
+    )
     parts.append(Picture("validation", {"found": of.judged.found}, caption))
-    return Section("Validation", tuple(parts))
+    return Section(tr("Validation"), tuple(parts))
 
 
 def settings(of: Material) -> Section:
     """The complete configuration as TOML, with all defaults."""
-    return Section("Settings", (Listing(to_toml(of.configuration) or "# none"),))
+    return Section(tr("Settings"), (Listing(to_toml(of.configuration) or "# none"),))
 
 
 def versions(of: Material) -> Section:
     """Versions of the software."""
     rows = [(name.replace("_", " "), str(value)) for name, value in of.run.summary.get("versions", {}).items()]
-    return Section("Versions", (pairs(rows),))
+    return Section(tr("Versions"), (pairs(rows),))
 
 
 def _over_time(of: Material, track: Track, what: str) -> Picture:
@@ -224,28 +277,28 @@ def _over_time(of: Material, track: Track, what: str) -> Picture:
         "time_s": time_s,
         "curves": [(n, track.newest[n].unit, track.values[n][every], 1.96 * track.sigmas[n][every]) for n in shown],
     }
-    return Picture("parameters", data, f"{what} over time, with 95 % bounds{_drawn(of, len(time_s))}.")
+    thinned = _drawn(of, len(time_s))
+    caption = tr("{what} over time, with 95 % bounds{thinned}.", what=what, thinned=thinned)
+    return Picture("parameters", data, caption)
 
 
 def _moving(track: Track) -> bool:
     return any(np.count_nonzero(np.isfinite(v)) > 1 and track.newest[n].sigma > 0 for n, v in track.values.items())
 
 
-def _thinned(of: Material) -> str:
-    return _drawn(of, len(of.of.overview))
-
-
 def _drawn(of: Material, kept: int) -> str:
-    return f" (thinned: {kept:,} of {of.of.count:,} responses)" if kept < of.of.count else ""
+    return tr(" (thinned: {kept:,} of {all:,} responses)", kept=kept, all=of.of.count) if kept < of.of.count else ""
 
 
 def _re(of: Material) -> str:
-    return f" re 1 {of.run.found['unit']}" if of.run.found["unit"] else ""
+    return tr(" re 1 {unit}", unit=of.run.found["unit"]) if of.run.found["unit"] else ""
 
 
 def _plain(value: Any) -> str:
     if isinstance(value, dict):
-        return ", ".join(f"{name} {_plain(count)}" for name, count in value.items() if count) or "none"
+        return listed(f"{recognised(name)} {_plain(count)}" for name, count in value.items() if count) or tr("none")
     if value is None:
         return ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    if isinstance(value, bool):
+        return tr("yes") if value else tr("no")
+    return number(value, ".6g") if isinstance(value, float) else str(value)

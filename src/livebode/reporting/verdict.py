@@ -6,10 +6,11 @@ from math import isfinite
 
 from livebode.analysis.parameter_track import MARGINS, failed
 from livebode.core.document import Finding, Tone
+from livebode.language import listed, number, recognised, tr, trn
 from livebode.margins import worst
 from livebode.reporting.alarms import alarms
 from livebode.reporting.material import Material
-from livebode.reporting.wording import many, share
+from livebode.reporting.wording import lines_of, share
 
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
 _INVALID_MANY = 0.05
@@ -39,17 +40,25 @@ def _record(of: Material) -> list[Finding]:
         found.append(
             Finding(
                 "check",
-                "The run is not finished: it is still recording, or it was stopped. The report covers the data so far.",
+                tr(
+                    "The run is not finished: it is still recording, or it was stopped. The report covers the data so "
+                    "far."
+                ),
             )
         )
     found += [
-        Finding("check", f"The signals are doubtful: {event.message}.")
+        Finding("check", tr("The signals are doubtful: {why}.", why=recognised(event.message)))
         for event in of.happenings.in_full
         if event.kind == "doubtful"
     ]
     lost = of.happenings.count("record-paused")
     if lost:
-        found.append(Finding("check", f"The record paused {lost} times because the disk was full or failed."))
+        text = trn(
+            "The record paused {n} time because the disk was full or failed.",
+            "The record paused {n} times because the disk was full or failed.",
+            lost,
+        )
+        found.append(Finding("check", text))
     return found
 
 
@@ -57,40 +66,71 @@ def _signals(of: Material) -> list[Finding]:
     counts = of.run.summary.get("counts", {})
     found = []
     if counts.get("gaps"):
-        missing = f", with {many(counts['missing'], 'sample')} missing" if counts.get("missing") else ""
-        found.append(Finding("check", f"The signals have {many(counts['gaps'], 'gap')}{missing}."))
-    for key, words in (("non-finite", "Not finite"), ("implausible", "Implausibly large"), ("spike", "Spikes")):
+        found.append(Finding("check", _gaps(counts["gaps"], counts.get("missing", 0))))
+    for key, words in (
+        ("non-finite", tr("Not finite")), ("implausible", tr("Implausibly large")), ("spike", tr("Spikes")),
+    ):  # fmt: skip
         if counts.get(key):
-            found.append(Finding("check", f"{words}: {many(counts[key], 'sample')} of {of.samples:,}."))
+            text = trn(
+                "{what}: {n:,} sample of {all:,}.", "{what}: {n:,} samples of {all:,}.", counts[key],
+                what=words, all=of.samples,
+            )  # fmt: skip
+            found.append(Finding("check", text))
     if counts and not found:
-        found.append(Finding("ok", "The signals have no gap, no sample that is not finite, and no spike."))
+        found.append(Finding("ok", tr("The signals have no gap, no sample that is not finite, and no spike.")))
     return found
+
+
+def _gaps(gaps: int, missing: int) -> str:
+    if not missing:
+        return trn("The signals have {n:,} gap.", "The signals have {n:,} gaps.", gaps)
+    samples = trn("{n:,} sample", "{n:,} samples", missing)
+    return trn(
+        "The signals have {n:,} gap, with {samples} missing.", "The signals have {n:,} gaps, with {samples} missing.",
+        gaps, samples=samples,
+    )  # fmt: skip
 
 
 def _valid(of: Material) -> list[Finding]:
     bad, every = of.of.incomplete, of.of.count
-    text = f"{many(every, 'response')} at {many(len(of.run.lines), 'line')}; {bad:,} of them ({share(bad, every)}) "
-    text += "have an invalid line (the first window after a start or a gap is always invalid)."
+    text = trn(
+        "{n:,} response at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start or "
+        "a gap is always invalid).",
+        "{n:,} responses at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start "
+        "or a gap is always invalid).",
+        every, lines=lines_of(len(of.run.lines)), bad=bad, share=share(bad, every),
+    )  # fmt: skip
     found = [Finding("check" if bad > _INVALID_MANY * every else "ok", text)]
-    if never := [f"{f:g} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
-        found.append(Finding("check", f"Never valid: {', '.join(never[:8])}{' …' * (len(never) > 8)}."))
+    if never := [f"{number(f, 'g')} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
+        lines = listed(never[:8]) + " …" * (len(never) > 8)
+        found.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
     return found
 
 
 def _fits(of: Material) -> list[Finding]:
     if of.fit is None:
         return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
-    lacks = f"model error ε = {100 * of.fit.epsilon:.2g} % of |G|"
     rough = of.fit.epsilon > _EPSILON_LARGE
+    values = {"model": recognised(of.fit.model.name), "percent": 100 * of.fit.epsilon}
+    text = tr("The {model} model, fitted to the run's mean: model error ε = {percent:.2g} % of |G|.", **values)
     if rough and of.of.moved:
-        lacks += "; the axis moved, so one model of the mean is not valid: see the fits over the run"
-    found = [Finding("check" if rough else "ok", f"The {of.fit.model.name} model, fitted to the run's mean: {lacks}.")]
+        text = tr(
+            "The {model} model, fitted to the run's mean: model error ε = {percent:.2g} % of |G|; the axis moved, so "
+            "one model of the mean is not valid: see the fits over the run.",
+            **values,
+        )
+    found = [Finding("check" if rough else "ok", text)]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
-            reasons = ", ".join(f"{count:,} {word}" for word, count in why.items())
-            tone = "check" if not_ok > _INVALID_MANY * every else "ok"
-            found.append(Finding(tone, f"Of {many(every, 'fit')} over the run, {not_ok:,} were rejected: {reasons}."))  # type: ignore[arg-type]
+            reasons = listed(f"{number(count, ',')} {recognised(word)}" for word, count in why.items())
+            tone: Tone = "check" if not_ok > _INVALID_MANY * every else "ok"
+            text = trn(
+                "Of {n:,} fit over the run, {rejected:,} were rejected: {reasons}.",
+                "Of {n:,} fits over the run, {rejected:,} were rejected: {reasons}.",
+                every, rejected=not_ok, reasons=reasons,
+            )  # fmt: skip
+            found.append(Finding(tone, text))
     return found
 
 
@@ -99,23 +139,34 @@ def _margins(of: Material) -> list[Finding]:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
     if not least:
-        return [Finding("check", f"No margins: {of.loop.message}.")]
+        return [Finding("check", tr("No margins: {why}.", why=recognised(of.loop.message)))]
     small = least["phase_margin"] < _PHASE_MIN_DEG or least["peak_sensitivity"] > _MS_MAX
-    where = f"of {many(len(of.loop.places), 'fit')} over the run" if len(of.loop.places) > 1 else "of the fit"
-    sizes = [
-        f"{words} {least[name]:.3g}{unit}" if isfinite(least[name]) else f"{words} without limit"
+    sizes = listed(
+        f"{words} {number(least[name], '.3g')}{unit}"
+        if isfinite(least[name])
+        else tr("{margin} without limit", margin=words)
         for words, name, unit in (
-            ("gain", "gain_margin", " dB"),
-            ("phase", "phase_margin", "°"),
-            ("delay", "delay_margin", " ms"),
+            (tr("gain"), "gain_margin", " dB"),
+            (tr("phase"), "phase_margin", "°"),
+            (tr("delay"), "delay_margin", " ms"),
             ("Ms", "peak_sensitivity", ""),
         )
-    ]
-    return [Finding("check" if small else "ok", f"Worst margins {where}: {', '.join(sizes)}.")]
+    )
+    fits = len(of.loop.places)
+    over = trn(
+        "Worst margins of {n:,} fit over the run: {sizes}.", "Worst margins of {n:,} fits over the run: {sizes}.",
+        fits, sizes=sizes,
+    )  # fmt: skip
+    text = over if fits > 1 else tr("Worst margins of the fit: {sizes}.", sizes=sizes)
+    return [Finding("check" if small else "ok", text)]
 
 
 def _validated(of: Material) -> list[Finding]:
     if of.judged is None:
-        text = "The model was not validated on independent data; use `livebode report RUN --on LOG`."
+        text = tr("The model was not validated on independent data; use `livebode report RUN --on LOG`.")
         return [Finding("open", text)] if of.fit is not None else []
-    return [Finding(_TRUSTED[v.verdict], f"On {of.judged.on}: {v.sentence}.") for v in of.judged.found]
+    on = of.judged.on
+    return [
+        Finding(_TRUSTED[v.verdict], tr("On {recording}: {sentence}.", recording=on, sentence=recognised(v.sentence)))
+        for v in of.judged.found
+    ]

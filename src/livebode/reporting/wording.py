@@ -11,18 +11,19 @@ import numpy as np
 
 from livebode.core import Response
 from livebode.core.document import Table
+from livebode.language import number, tr, trn
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 BOUND_95 = float(np.sqrt(np.log(20.0)))
 """`Response.bound(BOUND_95)` covers the true value with 95 %."""
 
 
-def many(number: int, noun: str) -> str:
+def lines_of(number: int) -> str:
     """
-    >>> many(1, "gap"), many(1234, "response")
-    ('1 gap', '1,234 responses')
+    >>> lines_of(1), lines_of(1234)
+    ('1 line', '1,234 lines')
     """
-    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+    return trn("{n:,} line", "{n:,} lines", number)
 
 
 def share(part: float, whole: float) -> str:
@@ -31,7 +32,7 @@ def share(part: float, whole: float) -> str:
     ('0.33 %', '0 %')
     """
     percent = 100 * part / whole if whole else 0.0
-    return f"{percent:.2g} %" if percent < 10 else f"{percent:.0f} %"
+    return f"{number(percent, '.2g' if percent < 10 else '.0f')} %"
 
 
 def duration(of_s: float) -> str:
@@ -40,7 +41,7 @@ def duration(of_s: float) -> str:
     ('22.6 s', '2 h 2 min 5 s')
     """
     if of_s < 120:
-        return f"{of_s:.3g} s"
+        return f"{number(of_s, '.3g')} s"
     minutes, rest = divmod(round(of_s), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes} min {rest} s" if hours else f"{minutes} min {rest} s"
@@ -55,11 +56,12 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
     if not isfinite(value):
         return "—", "—"
     if not isfinite(bound) or bound <= 0:
-        return f"{value:.5g}", "fixed" if bound == 0 else "not known"
+        return number(value, ".5g"), tr("fixed") if bound == 0 else tr("not known")
     digits = 1 - floor(log10(bound))
     if abs(value) >= 1e7 or digits > 9:
-        return f"{value:.5g}", f"{bound:.2g}"
-    return f"{round(value, digits):.{max(digits, 0)}f}", f"{round(bound, digits):.{max(digits, 0)}f}"
+        return number(value, ".5g"), number(bound, ".2g")
+    places = f".{max(digits, 0)}f"
+    return number(round(value, digits), places), number(round(bound, digits), places)
 
 
 def decibels(size: float) -> float:
@@ -75,12 +77,13 @@ def polar(value: complex, radius: float) -> tuple[str, str, str, str]:
     size = abs(value)
     if not isfinite(size) or size == 0:
         return "—", "—", "—", "—"
-    db, deg = f"{decibels(size):.2f}", f"{np.degrees(np.angle(value)):.2f}"
+    db, deg = number(decibels(size), ".2f"), number(np.degrees(np.angle(value)), ".2f")
     if not isfinite(radius):
-        return db, "not known", deg, "not known"
+        return db, tr("not known"), deg, tr("not known")
     if radius >= size:
-        return db, "unbounded", deg, "unbounded"
-    return db, f"{-decibels(1 - radius / size):.2g}", deg, f"{np.degrees(np.arcsin(radius / size)):.2g}"
+        return db, tr("unbounded"), deg, tr("unbounded")
+    half_db, half_deg = -decibels(1 - radius / size), np.degrees(np.arcsin(radius / size))
+    return db, number(half_db, ".2g"), deg, number(half_deg, ".2g")
 
 
 def signed(number: str) -> str:

@@ -1,22 +1,21 @@
 """The run loop: from a source to the record, for one axis or several."""
 
-from livebode.runtime.audience import Audience, Relay
 from livebode.runtime.destination import Destination, Draw
-from livebode.runtime.following import Outcome
-from livebode.runtime.live import run_live
-from livebode.runtime.orders import Orders, StoppedError
-from livebode.runtime.recording import run
+from livebode.runtime.documents import Document, Subscriber
+from livebode.runtime.run import run
+from livebode.runtime.run_control import RunControl, StoppedError
+from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.runtime.session import Session
 
 __all__ = [
-    "Audience",
     "Destination",
+    "Document",
     "Draw",
-    "Orders",
     "Outcome",
-    "Relay",
+    "RunControl",
+    "RunLoop",
     "Session",
     "StoppedError",
+    "Subscriber",
     "run",
-    "run_live",
 ]

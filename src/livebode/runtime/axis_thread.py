@@ -8,10 +8,9 @@ import threading
 from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError
 from livebode.runtime.destination import Destination
-from livebode.runtime.following import Outcome
-from livebode.runtime.live import run_live
-from livebode.runtime.orders import Orders, StoppedError
-from livebode.runtime.recording import run
+from livebode.runtime.run import run
+from livebode.runtime.run_control import RunControl, StoppedError
+from livebode.runtime.run_loop import Outcome
 from livebode.runtime.status import Status
 
 _logger = logging.getLogger(__name__)
@@ -24,7 +23,7 @@ class AxisThread:
     ----------
     axis
         Its present configuration.
-    orders
+    control
         Requests to it.
     status
         Its status.
@@ -36,7 +35,7 @@ class AxisThread:
 
     def __init__(self, name: str, axis: Axis, to: Destination, status: Status) -> None:
         self.name, self.axis, self.status = name, axis, status
-        self.orders = Orders()
+        self.control = RunControl()
         self.outcome: Outcome | None = None
         self.error: Exception | None = None
         self.ended_early = False
@@ -55,7 +54,7 @@ class AxisThread:
         """Request its end."""
         if self.alive:
             self.status.state = "finishing"
-        self.orders.end()
+        self.control.end()
 
     def result(self) -> Outcome:
         """Its result after the end; raises the error with which it failed."""
@@ -68,12 +67,11 @@ class AxisThread:
         name = self.name or "axis"
         _logger.info("%s begins", name)
         try:
-            job = run_live if self.axis.source.live else run
-            self.outcome = job(self.axis, self._to, self.orders)
+            self.outcome = run(self.axis, self._to, self.control)
         except Exception as error:  # a usage error or an internal error: the other axes continue
             self.error = error
             nothing = isinstance(error, StoppedError) or self.status.directory is None
-            self.ended_early = self.orders.ended and nothing
+            self.ended_early = self.control.ended and nothing
             level = logging.INFO if self.ended_early else logging.ERROR
             internal = not isinstance(error, (LivebodeError, StoppedError))
             _logger.log(level, "%s: %s", name, error, exc_info=error if internal else None)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from livebode.configuration.axis import Axis, RecordSection
 from livebode.core import ConfigError, Event
-from livebode.runtime.orders import Orders
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_control import RunControl
 from livebode.sources.live import LiveSource
 
 _KIND = "configuration-applied"
@@ -15,10 +15,10 @@ _KIND = "configuration-applied"
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Request to an axis: use other record settings (`kept`), or continue in another run (`pipeline`)."""
+    """Request to an axis: use other settings of the record, or continue in another run with another pipeline."""
 
     sections: tuple[str, ...]
-    kept: RecordSection | None = None
+    record: RecordSection | None = None
     pipeline: Pipeline | None = None
 
     @property
@@ -28,13 +28,13 @@ class Change:
         how = "in place" if self.pipeline is None else "in another run, from the next sample"
         return Event(_KIND, 0, 0.0, f"{names} changed: applied {how}", {"sections": list(self.sections)})
 
-    def tell(self, orders: Orders) -> None:
+    def request(self, control: RunControl) -> None:
         """Send the request; the event goes to the current record."""
-        orders.say(_KIND, self.event.message, **self.event.details)
-        if self.kept is not None:
-            orders.keep(self.kept)
+        control.report(_KIND, self.event.message, **self.event.details)
+        if self.record is not None:
+            control.limit_record(self.record)
         if self.pipeline is not None:
-            orders.change(self.pipeline)
+            control.change(self.pipeline)
 
 
 def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
@@ -76,7 +76,7 @@ def change_of(old: Axis, new: Axis, source: LiveSource | None) -> Change | None:
             "stop livebode first",
             keys=["serve"],
         )
-    kept, before = new.record or RecordSection(), old.record or RecordSection()
-    if sections == ("record",) and kept.samples == before.samples:
-        return Change(sections, kept=kept)
+    record, before = new.record or RecordSection(), old.record or RecordSection()
+    if sections == ("record",) and record.samples == before.samples:
+        return Change(sections, record=record)
     return Change(sections, pipeline=Pipeline.live(new, source))

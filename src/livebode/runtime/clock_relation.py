@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from math import inf
 
-from livebode.core import Event
+from livebode.core import Emit, Event, ignore
 from livebode.core.clock import RunClock
 from livebode.sources.live import LiveBlock, Origin
 
@@ -42,10 +42,9 @@ class ClockRelation:
         self._stop = 0
         self._origin: Origin | None = None
         self._least = self._least_from_s = self._least_since_s = self._followed = inf
-        self._set: list[Event] = []
 
-    def take(self, block: LiveBlock) -> bool:
-        """Whether the clock is to be recorded again with this Block."""
+    def take(self, block: LiveBlock, emit: Emit = ignore) -> bool:
+        """Whether the clock is to be recorded again with this Block; `emit` receives steps of the computer's clock."""
         if not len(block):
             return False
         arrived_s, start_s = block.arrived_s, block.origin_s + block.start / block.rate_hz
@@ -62,12 +61,7 @@ class ClockRelation:
         if arrived_s - self._since_s <= REFINED_FOR_S:
             pieces[-1] = pieces[-1][0], min(unix_s, pieces[-1][1])
             return self._is_to_be_recorded(REFINED_S)
-        return self._is_to_be_recorded(0.0) or self._judged(unix_s, start_s, block)
-
-    def drain_events(self) -> list[Event]:
-        """Events on this computer's clock since the last call."""
-        found, self._set = self._set, []
-        return found
+        return self._is_to_be_recorded(0.0) or self._judged(unix_s, start_s, block, emit)
 
     def _is_to_be_recorded(self, by_more_than_s: float) -> bool:
         newest_s = self.clock.pieces[-1][1]
@@ -81,7 +75,7 @@ class ClockRelation:
         self._since_s, self._least, self._recorded_s = arrived_s, inf, unix_s
         self._followed = inf
 
-    def _judged(self, unix_s: float, start_s: float, block: LiveBlock) -> bool:
+    def _judged(self, unix_s: float, start_s: float, block: LiveBlock, emit: Emit) -> bool:
         """Whether the relation changed after a minute: the sender drifts, waited, or the clock was set."""
         if self._least == inf:
             self._least_from_s, self._least_since_s = start_s, block.arrived_s
@@ -89,7 +83,7 @@ class ClockRelation:
         if block.arrived_s - self._least_since_s <= _JUDGED_S:
             return False
         least, self._least = self._least, inf
-        if self._was_set(start_s, block):
+        if self._was_set(start_s, block, emit):
             return True
         piece_s = self.clock.pieces[-1][1]
         before_s = piece_s if self._followed == inf else self._followed
@@ -102,14 +96,14 @@ class ClockRelation:
         self._begin(self._least_from_s, self._followed, -inf)
         return True
 
-    def _was_set(self, start_s: float, block: LiveBlock) -> bool:
+    def _was_set(self, start_s: float, block: LiveBlock, emit: Emit) -> bool:
         """Whether this computer's clock was set in the last minute; then a new piece begins here."""
         by_s = _unix_s_of_monotonic() - self._unix_s
         if abs(by_s) <= STEP_S:
             return False
         self._unix_s += by_s
         message = f"this computer's clock was set by {by_s:+.4g} s; times of day before {start_s:.6g} s are unchanged"
-        self._set.append(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
+        emit(Event("computer-clock", block.start, start_s, message, {"set_by_s": by_s}))
         self._begin(start_s, self._unix_s + block.arrived_s - (block.origin_s + block.stop / block.rate_hz), -inf)
         return True
 

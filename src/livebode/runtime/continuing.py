@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ SOURCE = "source"
 
 
 @dataclass(frozen=True, eq=False)
-class Before:
+class PreviousRun:
     """The run that another run continues with the next sample.
 
     `name` is its directory, `sample` and `time_s` are those of the next sample, `counts` are the counts of its
@@ -27,20 +26,6 @@ class Before:
     sample: int
     time_s: float
     counts: dict[str, int]
-
-
-def offered_again(blocks: Iterable[Block], sample: int) -> Iterator[Block]:
-    """Blocks from number `sample` of a source that begins with the same samples again."""
-    for block in blocks:
-        if block.stop > sample:
-            yield block if block.start >= sample else block.cut(sample - block.start, len(block))
-
-
-def in_pieces(blocks: Iterable[Block], samples: int) -> Iterator[Block]:
-    """The same samples in Blocks of at most so many."""
-    for block in blocks:
-        for first in range(0, len(block), samples):
-            yield block.cut(first, first + samples)
 
 
 class StreamPosition:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 from livebode.configuration.axis import FitSection, LoopSection, PIDSection
 from livebode.core import Lines, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
-from livebode.runtime.audience import Audience
-from livebode.runtime.destination import Draw, Progress
+from livebode.runtime.change_detection import ChangeDetection
+from livebode.runtime.destination import Destination
 from livebode.runtime.fits import Fits
-from livebode.runtime.following import Outcome
-from livebode.runtime.tracking import record
-from livebode.runtime.watching import Watching
+from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.simulation import BeltAxis, Drive, Fault, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss
 
 RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 800, 200, 0.1
@@ -72,21 +70,10 @@ def demo_baseline(seed: int) -> Baseline:
     return Baseline(_lines(), HOP, signals, "joint", "plant", (), machine)
 
 
-def demo(
-    directory: Path,
-    *,
-    seconds: float,
-    seed: int,
-    real_time: bool,
-    baseline: Baseline,
-    progress: Progress,
-    audience: Audience,
-    draw: Draw,
-) -> Outcome:
+def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baseline: Baseline) -> Outcome:
     """Track the simulated axis into a run directory; halfway its belt loses 10 % of its stiffness.
 
-    `audience` receives what is published. An earlier demo in `directory` is replaced. The baseline's alarm is in the
-    run's events and summary.
+    The baseline's alarm is in the run's events and summary.
 
     Raises
     ------
@@ -102,20 +89,13 @@ def demo(
         "loop": loop.model_dump(mode="json"),
     }
     settings = demo_settings()
-    return record(
-        SimulatedAxis(axis),
+    pipeline = Pipeline(
         Tracker(settings),
-        directory,
-        about={"configuration": configuration},
-        fits=Fits(fit, loop.build(RATE_HZ)),
-        watching=Watching(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
-        block_samples=400,
-        real_time=real_time,
-        force=True,
-        progress=progress,
-        audience=audience,
-        draw=draw,
+        Fits(fit, loop.build(RATE_HZ)),
+        ChangeDetection(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
     )
+    about = {"configuration": configuration}
+    return RunLoop(SimulatedAxis(axis), pipeline, to, about=about, block_samples=400, real_time=real_time).run()
 
 
 def _described(drive: Drive) -> LoopSection:

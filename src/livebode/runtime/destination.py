@@ -1,22 +1,20 @@
-"""Destination: directory and receivers of a run."""
+"""Destination: directory and subscribers of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-from livebode.core import Event, Model, Responses
-from livebode.runtime.audience import Audience
+from livebode.core import Model, Responses
+from livebode.runtime.documents import Subscriber
 
-Progress = Callable[[int, int | None], None]
 Draw = Callable[[Responses, Path, str, Model | None], None]
-Tell = Callable[[Event], None]
 
 
 @dataclass(frozen=True)
 class Destination:
-    """Directory and receivers of a run.
+    """Directory and subscribers of a run.
 
     Parameters
     ----------
@@ -28,17 +26,11 @@ class Destination:
         name with its unit, and the newest fit.
     force
         Replace an earlier run there.
-    progress
-        Called after each block with the number of tracked samples and of all samples (None if not known).
-    tell
-        Called with messages of the record in segments: it continues, pauses, or removes its oldest segments.
-    audience
-        Receives everything that the run publishes.
+    subscribers
+        Each receives every document that the run publishes.
     """
 
     directory: Path
     draw: Draw
     force: bool = False
-    progress: Progress = lambda *_: None
-    tell: Tell = lambda _: None
-    audience: Audience = field(default_factory=Audience)
+    subscribers: tuple[Subscriber, ...] = ()

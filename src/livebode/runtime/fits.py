@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -20,16 +20,8 @@ _UNUSUAL = 3.0
 _EPSILON_MIN = 0.003  # of |G|: an ε that no fit is rejected for
 
 
-class Out(Protocol):
-    """Where parameters and events go: a RunDirectory, or a SegmentedRun."""
-
-    def write_parameters(self, *parts: Parameters) -> None: ...
-
-    def write_event(self, event: Event) -> None: ...
-
-
 class Fits:
-    """The fits of one run, and the margins of a known loop with them: written to its directory and summarized.
+    """The fits of one run, and the margins of a known loop with them.
 
     The model is chosen at the first responses: from the configuration, else from their unit.
     """
@@ -47,14 +39,12 @@ class Fits:
         """From a configuration; with margins if its loop describes the feedback."""
         return None if section is None else cls(section, loop if loop.feedback else None)
 
-    def take(self, responses: Responses, out: Out) -> Parameters:
-        """Fit a batch, and write its parameters and events."""
+    def process(self, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
+        """Parameters of a batch: its fits, the quantities derived from them, the margins; and events."""
         fitter = self._fitter or self._begin(responses.unit)
-        found = fitter.process(responses)
+        events: list[Event] = []
+        found = fitter.process(responses, events.append)
         around = () if self.loop is None else _margins(found, responses, fitter, self.loop)
-        out.write_parameters(found, fitter.derived(found), *around)
-        for event in fitter.drain_events():
-            out.write_event(event)
         for word, count in zip(*np.unique(found.status, return_counts=True)):
             self._counts[str(word)] = self._counts.get(str(word), 0) + int(count)
         good = np.flatnonzero(found.ok)
@@ -65,7 +55,7 @@ class Fits:
             if usual.size or self._newest is None:
                 at = (usual if usual.size else good)[-1:]
                 self._newest, self._newest_response = found[at], responses[at]
-        return found
+        return (found, fitter.derived(found), *around), events
 
     def snapshot(self) -> bytes:
         """State that the next fit depends on, as bytes; see `restore`."""

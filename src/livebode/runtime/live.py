@@ -15,49 +15,38 @@ from livebode.core import Event, LivebodeError
 from livebode.core.clock import moments_by
 from livebode.runtime import successors
 from livebode.runtime.clock_relation import ClockRelation
-from livebode.runtime.continuing import Before, StreamPosition, stream_position
+from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
 from livebode.runtime.destination import Destination
-from livebode.runtime.following import Outcome, Tracking
-from livebode.runtime.orders import Orders
 from livebode.runtime.pipeline import Pipeline
+from livebode.runtime.run_control import RunControl
+from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.sources.live import LiveSource, make_source
 
 _logger = logging.getLogger(__name__)
 
 
-def run_live(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
-    """Track a machine while it works and write a run directory in segments.
-
-    Ends with the source, or when `orders` request it; all received samples are then recorded. The same axis in the same
-    directory continues the run with the sender's next sample; missing samples are a gap whose length follows from the
-    sender's numbers. A change by `orders` finishes the run, and a new run next to it (NAME-2 and so on) continues with
-    the next sample of the same source; the result is that of the last run.
-
-    It waits for a machine that is not switched on yet, and reports this after `timeout_s`.
-
-    Raises
-    ------
-    LivebodeError
-        If the configuration is invalid, the machine rejects the connection, or the run is stopped before samples
-        arrive.
-    """
-    orders = orders or Orders()
+def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
+    """Track a machine until its source ends or is stopped, in as many runs as its configuration has changes."""
     source = make_source(axis.source)
-    orders.of(source)
+    control.controls(source)
     position = StreamPosition() if to.force else stream_position(successors.newest(to.directory))
     if position.left_at is not None:
         source.resume(position.left_at)
-    with source.open(partial(_late, to)), contextlib.ExitStack() as finishing:
+    with source.open(partial(_report_late, to)), contextlib.ExitStack() as finishing:
         pipeline = Pipeline.live(axis, source)
-        return _Succession(source, position, to, orders, finishing).run(pipeline)
+        return _Succession(source, position, to, control, finishing).run(pipeline)
 
 
-def _late(to: Destination, why: str) -> None:
+def _report_late(to: Destination, why: str) -> None:
     """Report that a machine has not sent yet; without a run, the time is that of this computer."""
     event = Event("waiting", 0, time.time(), f"{why}; the axis waits: switch the machine on, or check the address")
     _logger.warning("%s", event.message)
-    to.tell(event)
-    to.audience.write_event(event)
+    _announce(to, event)
+
+
+def _announce(to: Destination, event: Event) -> None:
+    for subscriber in to.subscribers:
+        subscriber(event)
 
 
 class _Succession:
@@ -68,11 +57,11 @@ class _Succession:
         source: LiveSource,
         position: StreamPosition,
         to: Destination,
-        orders: Orders,
+        control: RunControl,
         finishing: contextlib.ExitStack,
     ) -> None:
         self._source, self._position, self._to = source, position, to
-        self._orders, self._finishing = orders, finishing
+        self._control, self._finishing = control, finishing
         self._relation = ClockRelation()
 
     def run(self, pipeline: Pipeline) -> Outcome:
@@ -83,7 +72,7 @@ class _Succession:
     def _run(self, pipeline: Pipeline) -> Outcome:
         from livebode.runtime.segmented import make_way  # needs a POSIX system
 
-        directory, before, force = self._to.directory, None, self._to.force
+        directory, previous, force = self._to.directory, None, self._to.force
         if force:
             for later in successors.all_of(directory)[:0:-1]:
                 make_way(later)  # the newest first, so that after a kill the remaining ones are still consecutive
@@ -91,23 +80,23 @@ class _Succession:
             directory = successors.newest(directory)
         while True:
             to = replace(self._to, directory=directory, force=force)
-            tracking = self._tracking(pipeline, to, before)
+            loop = self._loop(pipeline, to, previous)
             with contextlib.ExitStack() as leaving:
-                leaving.enter_context(tracking)
-                tracking.follow()
-                following = None if self._orders.ended else self._orders.take_next()
+                leaving.enter_context(loop)
+                loop.follow()
+                following = None if self._control.ended else self._control.take_next()
                 if following is None:
-                    tracking.end()
-                    outcome = tracking.finish()
+                    loop.end()
+                    outcome = loop.finish()
                     break
                 directory, force = successors.free(self._to.directory), False
-                before = self._handed_over(tracking, following, directory)
-                self._finish_beside(tracking, leaving.pop_all())
+                previous = self._hand_over(loop, following, directory)
+                self._finish_beside(loop, leaving.pop_all())
                 pipeline = following
-        to.audience.finish(outcome.summary)
+        loop.publish_end()
         return outcome
 
-    def _tracking(self, pipeline: Pipeline, to: Destination, before: Before | None) -> Tracking:
+    def _loop(self, pipeline: Pipeline, to: Destination, previous: PreviousRun | None) -> RunLoop:
         axis = pipeline.axis
         assert axis is not None
         about = {
@@ -116,38 +105,37 @@ class _Succession:
             | {"source": axis.source.model_dump(mode="json", exclude_defaults=True)},
             "found": {"format": self._source.format, "rate_from": "the sender"},
         }
-        return Tracking(
+        return RunLoop(
             self._source,
             pipeline,
             to,
             about=about,
-            kept=axis.record or RecordSection(),
+            segments=axis.record or RecordSection(),
             again=False,
-            orders=self._orders,
+            control=self._control,
             position=self._position,
-            before=before,
+            previous=previous,
             relation=self._relation,
-            until=self._orders.changing,
         )
 
-    def _handed_over(self, tracking: Tracking, following: Pipeline, directory: Path) -> Before:
+    def _hand_over(self, loop: RunLoop, following: Pipeline, directory: Path) -> PreviousRun:
         """End a run; the next one continues with as much of its state as possible."""
-        goes_on = following.take_over(tracking.pipeline)
-        tracking.end(directory.name, handed_over=goes_on)
-        tracking.to.audience.finish(tracking.summary)
-        counts = dict(following.follower.counts) if goes_on else {}
-        return Before(tracking.to.directory.name, *tracking.position, counts)
+        continues = following.take_over(loop.pipeline)
+        loop.end(directory.name, handed_over=continues)
+        loop.publish_end()
+        counts = dict(following.follower.counts) if continues else {}
+        return PreviousRun(loop.to.directory.name, *loop.position, counts)
 
-    def _finish_beside(self, tracking: Tracking, leaving: contextlib.ExitStack) -> None:
+    def _finish_beside(self, loop: RunLoop, leaving: contextlib.ExitStack) -> None:
         """Draw its pictures and close it while the next one continues."""
 
         def finish() -> None:
             try:
                 with moments_by(self._relation.clock), leaving:
-                    tracking.finish()
+                    loop.finish()
             except LivebodeError as error:
-                _logger.error("%s: %s", tracking.to.directory, error)
-                self._to.tell(Event("record-unfinished", *tracking.position, str(error)))
+                _logger.error("%s: %s", loop.to.directory, error)
+                _announce(self._to, Event("record-unfinished", *loop.position, str(error)))
 
         thread = threading.Thread(target=finish, name="livebode finishing")
         thread.start()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +53,6 @@ class LiveChecks:
         self._reference = settings.excitation if settings.method.reference == "excitation" else None
         self._slips = SlipSearch(lines.window)
         self._searched = _Stretch()
-
-    def over(self, blocks: Iterable[Block], say: Callable[[Event], None]) -> Iterator[Block]:
-        """The same Blocks; findings are reported before the next one is requested."""
-        for block in blocks:
-            yield block
-            for event in self.take(block):
-                say(event)
 
     def take(self, block: Block) -> Iterator[Event]:
         """Findings with this Block."""

@@ -9,9 +9,9 @@ from livebode.configuration.axis import Axis
 from livebode.core import LivebodeError, SignalError, nearest_name
 from livebode.preparation.follower import Follower
 from livebode.preparation.plan import live_follower
+from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.fits import Fits
 from livebode.runtime.stateful import Stateful
-from livebode.runtime.watching import Watching, make_watching
 from livebode.sources.live import LiveSource
 
 
@@ -27,20 +27,20 @@ class Pipeline:
         Turns samples into responses.
     fits
         A model fitted to each response, if one is configured.
-    watching
+    detection
         Detects changes, or reports that it cannot.
     """
 
     follower: Follower
     fits: Fits | None = None
-    watching: Watching | None = None
+    detection: ChangeDetection | None = None
     axis: Axis | None = None
 
     @classmethod
     def of(cls, axis: Axis, follower: Follower, *, samples: bool = True) -> Pipeline:
         """The configured stages after the follower, with or without `samples`; LivebodeError if one is not possible."""
         settings = follower.settings
-        return cls(follower, Fits.of(axis.fit, settings.loop), make_watching(axis, settings, samples=samples), axis)
+        return cls(follower, Fits.of(axis.fit, settings.loop), change_detection(axis, settings, samples=samples), axis)
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Pipeline:
@@ -68,13 +68,13 @@ class Pipeline:
     def channels(self) -> list[str]:
         """All channels in use, each once."""
         schedule = self.follower.settings.schedule
-        covariates = self.watching.covariates if self.watching is not None else ()
+        covariates = self.detection.covariates if self.detection is not None else ()
         return list(dict.fromkeys([*self.signals, *([schedule] if schedule else []), *covariates]))
 
     @property
     def parts(self) -> Mapping[str, Stateful]:
         """Stages with a state, by name."""
-        optional = {"fits": self.fits, "watching": self.watching}
+        optional = {"fits": self.fits, "detection": self.detection}
         return {"tracker": self.follower} | {name: part for name, part in optional.items() if part}
 
     def take_over(self, before: Pipeline) -> bool:
@@ -89,8 +89,8 @@ class Pipeline:
         if self._same(before, "signals", "tracking", "loop", "motion"):
             if self.fits and before.fits and self._same(before, "fit"):
                 self.fits.restore(before.fits.snapshot())
-            if self.watching and before.watching and self._same(before, "monitoring", "fit"):
-                self.watching.restore(before.watching.snapshot())
+            if self.detection and before.detection and self._same(before, "monitoring", "fit"):
+                self.detection.restore(before.detection.snapshot())
         return True
 
     def _same(self, other: Pipeline, *sections: str) -> bool:

@@ -1,4 +1,4 @@
-"""One run on a recording."""
+"""The run on a recording."""
 
 from __future__ import annotations
 
@@ -13,24 +13,14 @@ from livebode.preparation.early_spikes import early_spikes
 from livebode.preparation.plan import make_follower, roles_in_doubt
 from livebode.preparation.transients import leading_transient, transient_event
 from livebode.runtime.destination import Destination
-from livebode.runtime.following import Outcome, Tracking
-from livebode.runtime.orders import Orders
 from livebode.runtime.pipeline import Pipeline
-from livebode.runtime.tracking import whole
+from livebode.runtime.run_control import RunControl
+from livebode.runtime.run_loop import Outcome, RunLoop
 from livebode.sources import open_log
 
 
-def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
-    """Track a recording and write a run directory; in segments if the axis has a [record].
-
-    Raises
-    ------
-    LivebodeError
-        For any error in the recording or the configuration; then nothing is written, or in segments what was recorded
-        so far remains.
-    StoppedError
-        If `orders` end it; the directory is as for an error.
-    """
+def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
+    """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
     assert axis.source.log is not None
     log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
@@ -49,9 +39,7 @@ def run(axis: Axis, to: Destination, orders: Orders | None = None) -> Outcome:
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found["left_out_samples"] = source.first
     about = {"configuration": axis.model_dump(mode="json", exclude={"serve"}), "found": found}
-    outcome = whole(
-        Tracking(source, pipeline, to, about=about, kept=axis.record, started=started, orders=orders, noticed=noticed)
+    loop = RunLoop(
+        source, pipeline, to, about=about, segments=axis.record, started=started, control=control, noticed=noticed
     )
-    for event in noticed:
-        to.tell(event)
-    return outcome
+    return loop.run()

@@ -1,4 +1,4 @@
-"""The record of a run in segments, and the states that continue at its end: the tracker and the session's counts."""
+"""SegmentedRecord: the record of a run in segments, and the states that continue at its end."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from livebode.configuration.axis import RecordSection
-from livebode.core import Block, Channel, Event, Parameters, RecordError, Responses
+from livebode.core import Block, Channel, Event, RecordError, Responses
 from livebode.core.clock import RunClock
 from livebode.records import PARAMETERS, RESPONSES, Run, as_batch, parameter_rows, to_json
 from livebode.records.inside import check_folder
@@ -22,8 +22,9 @@ from livebode.records.segments.journal import FOLDER
 from livebode.records.segments.limits import Limits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.store import Store
-from livebode.runtime.continuing import SOURCE, Before, StreamPosition, in_pieces, offered_again
-from livebode.runtime.orders import StoppedError
+from livebode.runtime.continuing import SOURCE, PreviousRun, StreamPosition
+from livebode.runtime.documents import Document, Fitted
+from livebode.runtime.run_control import StoppedError
 from livebode.runtime.stateful import Stateful
 
 FOUND_ON_THE_WAY = "clock", "left_out_samples"
@@ -32,17 +33,16 @@ _PIECE_S = 0.25  # with the interval 0.75 s: most data that a kill can cost
 _SEEN_AGAIN_BYTES = 256 << 20  # previous responses for a picture of a continued run, in addition to new ones
 
 
-class SegmentedRun:
+class SegmentedRecord:
     """Responses, events and, on request, samples of one run; an unfinished run in the directory is continued.
 
-    Used like `RunDirectory`, except that the Blocks pass through `feed`, and that all committed data remains after an
-    exception.
+    All committed data remains after an exception.
 
     Parameters
     ----------
     path
         Directory of the run.
-    kept
+    section
         Settings of the record.
     summary
         run.json at the beginning: configuration and findings.
@@ -56,20 +56,20 @@ class SegmentedRun:
         Whether the source begins with the same samples again each time; else its numbers continue.
     ends
         Whether the source has an end, at which the run is finished; without an end a stopped run can continue.
-    tell
+    publish
         Called immediately with events of the record itself.
     waiting
         Events that are not passed to `write_event` yet; they are stored with every commit.
     position
         Position of a live source, stored with every commit.
-    before
+    previous
         The run that this one continues with the next sample.
     """
 
     def __init__(
         self,
         path: Path,
-        kept: RecordSection,
+        section: RecordSection,
         *,
         summary: Mapping[str, Any],
         channels: Sequence[Channel],
@@ -78,28 +78,30 @@ class SegmentedRun:
         force: bool,
         again: bool,
         ends: bool,
-        tell: Callable[[Event], None],
+        publish: Callable[[Event], None],
         waiting: Callable[[], Sequence[Event]] = tuple,
         position: StreamPosition | None = None,
-        before: Before | None = None,
+        previous: PreviousRun | None = None,
     ) -> None:
         self.path = path
         self._position, self._waiting = position, waiting
-        self._followed: tuple[int, float] | None = None
+        self._tracked: tuple[int, float] | None = None
         self._new, self._waited = False, waiting()
-        self._first = (0, 0.0) if before is None else (before.sample, before.time_s)
-        self._more: dict[str, Any] = {} if before is None else {"continues": before.name}
+        self._first = (0, 0.0) if previous is None else (previous.sample, previous.time_s)
+        self._more: dict[str, Any] = {} if previous is None else {"continues": previous.name}
         self._summary, self._rate_hz = dict(summary), rate_hz
         self._parts = dict(parts) | ({} if position is None else {SOURCE: position})
-        self._force, self._again, self._ends, self._tell = force, again, ends, tell
-        self._samples = samples_of(channels) if kept.samples else None
+        self._force, self._again, self._ends, self._publish = force, again, ends, publish
+        self._samples = samples_of(channels) if section.samples else None
         tables = {"responses": RESPONSES, "parameters": PARAMETERS} | (
             {"samples": self._samples} if self._samples else {}
         )
-        self._store = Store(path, tables, self._limits(kept))
+        self._store = Store(path, tables, self._limits(section), publish)
+        self._due_from = 0
+        self._piece = max(1, round(_PIECE_S * rate_hz))
         self.partial = path / ".pictures.partial"
 
-    def __enter__(self) -> SegmentedRun:
+    def __enter__(self) -> Self:
         if self._force:
             make_way(self.path)
         with contextlib.ExitStack() as undo:
@@ -110,15 +112,27 @@ class SegmentedRun:
             else:
                 self._restore(self._store.last.states)
                 self._continued = self._new = True  # the continuation is reported as an event
-                self._followed = self._store.last.sample, self._store.last.time_s
+                self._tracked = self._store.last.sample, self._store.last.time_s
+                self._due_from = self._store.last.sample if self._again else 0
             self._undo = undo.pop_all()
-        self._hear()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         self._undo.close()
         if kind in (KeyboardInterrupt, SystemExit, StoppedError) and self._store.last is not None:
-            self._tell(self.stopped())
+            self._publish(self.stopped())
+
+    def take(self, document: Document) -> None:
+        match document:
+            case Responses() if len(document):
+                self._store.write("responses", as_batch(document))
+            case Fitted(parts):
+                for parameters in parts:
+                    if len(parameters):
+                        self._store.write("parameters", parameter_rows(parameters))
+            case Event():
+                self._store.write_event(document)
+                self._new = True
 
     def stopped(self) -> Event:
         """Message for a run that stops here, before it is finished."""
@@ -127,19 +141,19 @@ class SegmentedRun:
         message = f"stopped at sample {last.sample}; the same command continues the run in {str(self.path)!r}"
         return Event("record-stopped", last.sample, last.time_s, message)
 
-    def keep(self, kept: RecordSection) -> None:
-        """Use other record settings from now; the selection of recorded samples does not change."""
-        self._store.limits = self._limits(kept)
+    def limit(self, section: RecordSection) -> None:
+        """Use other settings of the record from now; the selection of recorded samples does not change."""
+        self._store.limits = self._limits(section)
 
-    def _limits(self, kept: RecordSection) -> Limits:
+    def _limits(self, section: RecordSection) -> Limits:
         return Limits(
             interval_samples=max(1, round(_INTERVAL_S * self._rate_hz)),
-            segment_samples=max(1, round(kept.segment_s * self._rate_hz)),
+            segment_samples=max(1, round(section.segment_s * self._rate_hz)),
             interval_s=_INTERVAL_S,
-            budget_bytes=kept.budget_bytes,
+            budget_bytes=section.budget_bytes,
         )
 
-    def before(self) -> Iterator[Responses]:
+    def previous(self) -> Iterator[Responses]:
         """The newest responses of the continued run."""
         if self._continued or "continues" in self._more:
             run = Run.open(self.path, self._found_damaged)
@@ -148,9 +162,8 @@ class SegmentedRun:
             yield from newest
 
     @property
-    def continued(self) -> bool:
-        """Whether the run existed before."""
-        return self._continued
+    def continues(self) -> bool:
+        return True
 
     @property
     def clock(self) -> list[tuple[float, float]]:
@@ -162,54 +175,41 @@ class SegmentedRun:
         self._more |= found
         self._store.renew(self._named(self._summary))
 
-    def feed(self, blocks: Iterable[Block]) -> Iterator[Block]:
-        """The Blocks that are not tracked yet; each request records all results of the previous Block.
+    def pieces(self, block: Block) -> Iterator[Block]:
+        """The samples of a Block that are not in the record yet, in pieces whose loss by a kill is short."""
+        for first in range(max(0, self._due_from - block.start), len(block), self._piece):
+            yield block.cut(first, first + self._piece)
 
-        Raises
-        ------
-        RecordError
-            At the end, if the last results cannot be written.
-        """
-        for block in in_pieces(self._still_due(blocks), max(1, round(_PIECE_S * self._rate_hz))):
-            if self._samples:
-                self._store.write("samples", as_rows(block, self._samples))
-            if self._position is not None:
-                self._position.take(block)
-            yield block
-            self._followed, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
-            if self._store.due(block.stop):
-                self._commit(*self._followed)
-        if self._followed is not None:
-            self._commit(*self._followed)
+    def write_samples(self, block: Block) -> None:
+        """Append the samples if they are recorded; the source continues after this Block."""
+        if self._samples:
+            self._store.write("samples", as_rows(block, self._samples))
+        if self._position is not None:
+            self._position.take(block)
+
+    def commit(self, block: Block) -> None:
+        """Store all results up to the end of this Block if a commit is due."""
+        self._tracked, self._new = (block.stop, block.origin_s + block.stop / block.rate_hz), True
+        if self._store.due(block.stop):
+            self._commit(*self._tracked)
+
+    def commit_last(self) -> None:
+        """Store the last results; RecordError if they cannot be written."""
+        if self._tracked is not None:
+            self._commit(*self._tracked)
 
     def commit_while_silent(self) -> None:
         """Record the results of the last Block, and later events, while waiting for the next one.
 
         The last Block may be from before the run was continued.
         """
-        if self._followed is None or not self._store.due(self._followed[0]):
+        if self._tracked is None or not self._store.due(self._tracked[0]):
             return
         if self._new or self._waiting() != self._waited:
-            self._commit(*self._followed)
+            self._commit(*self._tracked)
 
-    def write(self, responses: Responses) -> None:
-        """Append responses."""
-        if len(responses):
-            self._store.write("responses", as_batch(responses))
-
-    def write_parameters(self, *parts: Parameters) -> None:
-        """Append fitted parameters and derived quantities."""
-        for parameters in parts:
-            if len(parameters):
-                self._store.write("parameters", parameter_rows(parameters))
-
-    def write_event(self, event: Event) -> None:
-        """Append an event."""
-        self._store.write_event(event)
-        self._new = True
-
-    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None], *, ends: bool = False) -> None:
-        """Draw the pictures, close open files and write run.json; `ends`: another run continues."""
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        """Draw the pictures, close open files and write run.json."""
         check_folder(self.path, f"{self.partial.name}/bode.png")  # rmtree would block at a pipe of that name
         try:
             shutil.rmtree(self.partial, ignore_errors=True)
@@ -230,27 +230,15 @@ class SegmentedRun:
         assert last is not None
         # Results that were delayed until the end were written after the last commit, and belong to the present states.
         self._store.commit(last.sample, last.time_s, self._states())
-        self._store.finish(self._named(summary), finished=self._ends or ends)
-        self._hear()
-
-    def _still_due(self, blocks: Iterable[Block]) -> Iterator[Block]:
-        last = self._store.last
-        if last is not None and self._continued and self._again:
-            return offered_again(blocks, last.sample)
-        return iter(blocks)
+        self._store.finish(self._named(summary), finished=self._ends or "continued_in" in summary)
 
     def _commit(self, sample: int, time_s: float) -> None:
         self._new, self._waited = False, self._waiting()
         self._store.commit(sample, time_s, self._states(), self._waited)
-        self._hear()
-
-    def _hear(self) -> None:
-        for event in self._store.drain_events():
-            self._tell(event)
 
     def _found_damaged(self, damage: Event) -> None:
         if not str(damage.details["file"]).startswith(f"{FOLDER}/"):  # the store reports damaged journals
-            self._tell(damage)
+            self._publish(damage)
 
     def _states(self) -> dict[str, bytes]:
         return {name: part.snapshot() for name, part in self._parts.items()}

@@ -39,7 +39,7 @@ class Session:
     to
         Destination of an axis, by name and configuration.
     tell
-        Called with an axis's name and an event.
+        Called with an axis's name and the event of an edit of the file.
     file
         File of `axes`, if they may change.
     leave
@@ -91,11 +91,11 @@ class Session:
         for thread in self.all:
             thread.end()
 
-    def _add(self, name: str, axis: Axis, *, anew: bool = True) -> AxisThread:
+    def _add(self, name: str, axis: Axis, *, replaces: bool = True) -> AxisThread:
         """Start an axis that may replace records from before this session, but none of this session."""
         to = self._to(name, axis)
-        status = Status(to.audience)
-        to = replace(to, force=to.force and anew, audience=status, tell=lambda event: self._tell(name, event))
+        status = Status()
+        to = replace(to, force=to.force and replaces, subscribers=(status, *to.subscribers))
         self.threads[name] = AxisThread(name, axis, to, status)
         return self.threads[name]
 
@@ -146,7 +146,7 @@ class Session:
             if name not in axes or not thread.alive:
                 continue
             try:
-                changes[name] = change_of(thread.axis, axes[name], thread.orders.source)
+                changes[name] = change_of(thread.axis, axes[name], thread.control.source)
             except LivebodeError as error:
                 raise (error.at(f"axis {name}") if name else error) from None
         return changes
@@ -155,7 +155,7 @@ class Session:
         for name, change in changes.items():
             thread = self.threads[name]
             if change is not None:
-                change.tell(thread.orders)
+                change.request(thread.control)
                 thread.axis = axes[name]
                 self._report(name, change.event)
         for name in [name for name in self.threads if name not in axes]:
@@ -166,13 +166,13 @@ class Session:
             old = self.threads.get(name)
             if old is None or (not old.alive and old.axis != axis):
                 self._report(name, Event("configuration-applied", 0, 0.0, "the axis begins"))
-                self._add(name, axis, anew=False).start()
+                self._add(name, axis, replaces=False).start()
 
     def _say(self, kind: str, message: str, *, record: bool = True) -> None:
         self._report("", Event(kind, 0, 0.0, message))
         for thread in self.threads.values() if record else ():
             if thread.alive:
-                thread.orders.say(kind, message)
+                thread.control.report(kind, message)
 
     def _report(self, name: str, event: Event) -> None:
         """Log and publish the result of an edit."""
@@ -197,7 +197,8 @@ class Session:
 
     def _heard(self, number: int, _frame: object) -> None:
         if self.ended_by:
-            left = {t.name: t.orders.left() for t in self.all if t.alive and t.orders.left is not None}
-            self._leave(number, left)
+            controls = {thread.name: thread.control for thread in self.all if thread.alive}
+            stopped = {name: one.stopped() for name, one in controls.items() if one.stopped is not None}
+            self._leave(number, {name: event for name, event in stopped.items() if event is not None})
         self.ended_by = number
         self.end()

@@ -80,7 +80,7 @@ class LoadShedding:
         with self._budget.spending(len(fitted)):
             yield fitted
 
-    def drain_events(self, sample: int, time_s: float) -> list[Event]:
+    def take_events(self, sample: int, time_s: float) -> list[Event]:
         """Events at this sample: the backlog, and omitted work."""
         return [*self._backlog(sample, time_s), *self._thinned(sample, time_s, REPORT_S)]
 

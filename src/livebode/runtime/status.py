@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from livebode.core import Block, Event, Responses
-from livebode.runtime.audience import Audience, Relay
+from livebode.runtime.documents import Channels, Document, RunStarted, Tracked
+from livebode.runtime.run_control import RunControl
 from livebode.sources.live import Health, LiveBlock
 
 _LATENCY_OVER_S = 2.0
 
 
-class Status(Relay):
-    """Keeps the data for a status line of the axis, and forwards everything to the audience.
+class Status:
+    """A subscriber that keeps the data for a status line of the axis.
 
     Attributes
     ----------
@@ -26,23 +25,25 @@ class Status(Relay):
     samples, responses
         Number of tracked samples and published responses.
     rate_hz
-        Samples per second of the Blocks; None before the first.
+        Samples per second of the run; None before it began.
     event
         The newest event.
-    health
-        State of its live source; None for a recording.
     """
 
-    def __init__(self, audience: Audience) -> None:
-        super().__init__(audience)
+    def __init__(self) -> None:
         self.state = "waiting"
         self.directory: Path | None = None
         self.samples = self.responses = 0
         self.rate_hz: float | None = None
         self.event: Event | None = None
-        self.health: Callable[[], Health] | None = None
+        self._control: RunControl | None = None
         self._since_s = 0.0
         self._latest: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def health(self) -> Health | None:
+        """State of its live source; None for a recording, or before the run began."""
+        return None if self._control is None else self._control.health
 
     @property
     def latency_s(self) -> float | None:
@@ -50,24 +51,23 @@ class Status(Relay):
         longest = max(self._latest)
         return longest if longest > 0 else None
 
-    def begin(self, directory: Path, summary: Mapping[str, Any], health: Callable[[], Health] | None) -> None:
-        self.state, self.directory, self.health = "tracking", directory, health
-        super().begin(directory, summary, health)
+    def __call__(self, document: Document) -> None:
+        match document:
+            case RunStarted():
+                self.state, self.directory, self._control = "tracking", document.directory, document.control
+            case Channels():
+                self.rate_hz = document.rate_hz
+            case Responses():
+                self.responses += len(document)
+            case Event():
+                self.event = document
+            case Tracked(block):
+                self._followed(block)
 
-    def write(self, responses: Responses) -> None:
-        self.responses += len(responses)
-        super().write(responses)
-
-    def write_event(self, event: Event) -> None:
-        self.event = event
-        super().write_event(event)
-
-    def followed(self, block: Block) -> None:
+    def _followed(self, block: Block) -> None:
         self.samples += len(block)
-        self.rate_hz = block.rate_hz
         if isinstance(block, LiveBlock):
             now = time.monotonic()
             if now - self._since_s > _LATENCY_OVER_S:
                 self._since_s, self._latest = now, (0.0, self._latest[0])
             self._latest = (max(self._latest[0], now - block.arrived_s), self._latest[1])
-        super().followed(block)

@@ -17,7 +17,7 @@ from livebode.fitting import Fit
 from livebode.kernel import instruction_set
 from livebode.preparation.follower import Follower
 from livebode.runtime.fits import Fits
-from livebode.runtime.tally import Tally
+from livebode.runtime.run_counts import RunCounts
 from livebode.sources.live import LiveSource
 
 
@@ -33,18 +33,18 @@ def begun(about: Mapping[str, Any], tracker: Follower, unit: str) -> dict[str, A
     return dict(about) | {"found": about.get("found", {}) | found, "versions": versions}
 
 
-def done(tracker: Follower, tally: Tally) -> dict[str, Any]:
+def done(tracker: Follower, run: RunCounts) -> dict[str, Any]:
     """Entries at the end: counts and speed."""
-    counts, run_s = tally.counts(tracker.counts), tally.run_s
+    counts, run_s = run.counts(tracker.counts), run.run_s
     recorded_s = counts["samples"] / tracker.settings.lines.rate_hz
     speed = {
         "recorded_s": recorded_s,
         "run_s": run_s,
-        "tracking_s": tally.tracked_s,
+        "tracking_s": run.tracked_s,
         "times_real_time": recorded_s / run_s,
-        "samples_per_s": counts["samples"] / tally.tracked_s,
+        "samples_per_s": counts["samples"] / run.tracked_s,
     }
-    counts |= {"responses": tally.responses, "invalid_responses": tally.invalid}
+    counts |= {"responses": run.responses, "invalid_responses": run.invalid}
     return {"counts": counts, "speed": speed}
 
 

@@ -146,10 +146,14 @@ class NotifyPeer(AdsPeer):
 
     def wait_ready(self) -> None:
         until(lambda: self._served(constants.ADSCOMMAND_ADDDEVICENOTE), "a request for notifications")
+        until(lambda: bool(self._watched().notifications), "a handle for them")
 
     def send(self, batch: Batch) -> None:
         stamps = FILETIME_1970 + np.round((batch.first_sample / RATE_HZ + np.arange(len(batch.data.T)) / RATE_HZ) * 1e7)
         self._notify([(int(stamp), row.tobytes()) for stamp, row in zip(stamps, batch.data.T)])
+
+    def _watched(self) -> PLCVariable:
+        return next(iter(self._memory._data.values()))
 
     def send_rubbish(self) -> None:
         self._notify([(1, bytes(16))])
@@ -161,10 +165,10 @@ class NotifyPeer(AdsPeer):
             for packet in reversed(self._server.request_history)
             if packet.ams_header.command_id == struct.pack("<H", constants.ADSCOMMAND_ADDDEVICENOTE)
         )
-        variable = next(iter(self._memory._data.values()))
-        body = b"".join(
-            struct.pack("<QIII", stamp, 1, variable.notifications[-1], len(row)) + row for stamp, row in samples
-        )
+        handles = list(self._watched().notifications)
+        if not handles:  # the source has stopped, and a PLC sends nothing then
+            return
+        body = b"".join(struct.pack("<QIII", stamp, 1, handles[-1], len(row)) + row for stamp, row in samples)
         stream = struct.pack("<II", len(body) + 4, len(samples)) + body
         ams = (
             asked.source_net_id + asked.source_port + asked.target_net_id + asked.target_port

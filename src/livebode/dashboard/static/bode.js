@@ -3,7 +3,9 @@
 import { axis, chart, degreeTicks, frequencyAxis, steady } from "./chart.js";
 import { extent, moved, NAMES, overGrid, turns } from "./curves.js";
 import { byFinger } from "./finger.js";
+import { tr } from "./language.js";
 import { colour } from "./theme.js";
+import { mark } from "./words.js";
 
 /** @import { Chart, Range } from "./chart.js" */
 /** @import { Curve, Values } from "./curves.js" */
@@ -72,12 +74,12 @@ export class Bode {
     this.charts = [
       this.panel(
         0,
-        `|${symbol}| in dB${unit ? ` re 1 ${unit}` : ""}`,
+        unit ? tr("|{symbol}| in dB re 1 {unit}", { symbol, unit }) : tr("|{symbol}| in dB", { symbol }),
         { range: () => this.limits(0, MAGNITUDE) },
         false,
       ),
-      this.panel(1, "phase in °", { range: () => this.limits(1, PHASE) }, false, { splits: degreeTicks }),
-      this.panel(2, "coherence", { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
+      this.panel(1, tr("phase in °"), { range: () => this.limits(1, PHASE) }, false, { splits: degreeTicks }),
+      this.panel(2, tr("coherence"), { range: [-0.05, 1.08] }, true, { splits: () => [0, 0.5, 1] }),
     ];
   }
 
@@ -129,8 +131,8 @@ export class Bode {
       {
         scales: { x: { distr: 3, time: false, range: () => this.sight }, y },
         axes: [
-          frequencyAxis(lines, last ? "frequency in Hz" : ""),
-          axis(label, { size: 44, values: (_u, s) => s.map((v) => String(v).replace("-", "−")), ...more }),
+          frequencyAxis(lines, last ? tr("frequency in Hz") : ""),
+          axis(label, { size: 44, values: (_u, s) => s.map(mark), ...more }),
         ],
         series,
         bands,

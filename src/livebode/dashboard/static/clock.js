@@ -1,13 +1,22 @@
 // @ts-check
 // Times of a run: time of day in the viewer's zone if the run has a clock, otherwise the run's own time in s.
+import { language, tr } from "./language.js";
+import { fixed, mark } from "./words.js";
+
+const LOCALE = language.code === "en" ? "en-GB" : language.code;
 /** @type {Intl.DateTimeFormatOptions} */
 const PLAIN = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" };
 /** @param {Intl.DateTimeFormatOptions} more */
-const format = (more) => new Intl.DateTimeFormat("en-GB", { ...PLAIN, ...more });
+const format = (more) => new Intl.DateTimeFormat(LOCALE, { ...PLAIN, ...more });
 const TIME = format({}),
   TENTHS = format({ fractionalSecondDigits: 1 }),
   HUNDREDTHS = format({ fractionalSecondDigits: 2 }),
-  DAY = new Intl.DateTimeFormat("sv-SE", { dateStyle: "short" }), // year-month-day
+  // In English year-month-day, as in messages and reports.
+  DAY = new Intl.DateTimeFormat(language.code === "en" ? "sv-SE" : language.code, {
+    year: "numeric",
+    month: "2-digit",
+    day: "2-digit",
+  }),
   ZONE = format({ timeZoneName: "short" });
 
 /** @typedef {[fromS: number, since1970S: number][]} Clock Second of the run from which it is valid, and seconds since 1970 at second 0 of the run. */
@@ -50,7 +59,7 @@ export function moment(timeS, fine = false) {
 function seconds(timeS) {
   const sign = timeS < 0 ? "−" : "",
     size = Math.abs(timeS);
-  if (size < 120) return `${sign}${size.toFixed(2)} s`;
+  if (size < 120) return `${sign}${fixed(size, 2)} s`;
   const whole = Math.floor(size),
     hours = Math.floor(whole / 3600),
     minutes = Math.floor(whole / 60) % 60;
@@ -64,12 +73,12 @@ function seconds(timeS) {
  * @param {number} stepS
  */
 export function ticks(splits, stepS) {
-  if (!clock.length) return splits.map((v) => Number(v.toFixed(6)).toString().replace("-", "−"));
+  if (!clock.length) return splits.map(mark);
   return splits.map((v) => (stepS < 0.1 ? HUNDREDTHS : stepS < 1 ? TENTHS : TIME).format(dateOf(v + 1e-6)));
 }
 
 /** @param {number} timeS */
 export function timeLabel(timeS) {
-  if (!clock.length) return "time in s";
-  return Number.isFinite(timeS) ? `time, ${zoneOf(dateOf(timeS))}` : "time";
+  if (!clock.length) return tr("time in s");
+  return Number.isFinite(timeS) ? tr("time, {zone}", { zone: zoneOf(dateOf(timeS)) }) : tr("time");
 }

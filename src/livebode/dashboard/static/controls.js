@@ -3,23 +3,26 @@
 import { moment } from "./clock.js";
 import { Menu, numbers, picture } from "./download.js";
 import { keys } from "./keys.js";
+import { choose as chooseLanguage, language, tr } from "./language.js";
 import { reason } from "./link.js";
 import { byId as $, choose, element, segments } from "./make.js";
+import { recognised } from "./recognition.js";
 import { nextTheme } from "./theme.js";
+import { fixed } from "./words.js";
 
 /** @import { Page, Quantity } from "./messages.js" */
 
 /** @type {[value: string, text: string][]} */
 const TABS = [
-  ["map", "Map"],
-  ["parameters", "Parameters"],
-  ["margins", "Margins"],
+  ["map", tr("Map")],
+  ["parameters", tr("Parameters")],
+  ["margins", tr("Margins")],
 ];
 /** @type {[value: string, text: string][]} */
 const SPANS = [
   ["20", "20 s"],
   ["120", "2 min"],
-  ["whole", "all"],
+  ["whole", tr("all")],
 ];
 
 /**
@@ -101,8 +104,8 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   option(
     "tracking-over",
     [
-      ["time", "time"],
-      ["position", "position"],
+      ["time", tr("time")],
+      ["position", tr("position")],
     ],
     "time",
     (value) => {
@@ -119,8 +122,8 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   option(
     "map-what",
     [
-      ["level", "level"],
-      ["change", "change"],
+      ["level", tr("level")],
+      ["change", tr("change")],
     ],
     "level",
     (value) => {
@@ -142,7 +145,7 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     return { axis: page.axis, quantity: page.quantity, format, from, to };
   };
   /** @param {() => void} act */
-  const ready = (act) => () => (page.facts?.begun ? act() : complain("The run has not started."));
+  const ready = (act) => () => (page.facts?.begun ? act() : complain(tr("The run has not started.")));
   /**
    * @param {"csv" | "mat"} format
    * @param {boolean} whole
@@ -153,20 +156,20 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     );
   const menu = new Menu($("download"), $("download-menu"), [
     [
-      "Bode plot as PNG",
+      tr("Bode plot as PNG"),
       ready(() =>
         picture(
           `${stem()}.png`,
-          `${title()}: ${page.quantity}`,
-          `at ${moment(bode.curves.measured?.frame.timeS[0], true)}, bands are ±3σ`,
+          `${title()}: ${recognised(page.quantity ?? "")}`,
+          tr("at {time}, bands are ±3σ", { time: moment(bode.curves.measured?.frame.timeS[0], true) }),
           bode.charts,
         ),
       ),
     ],
-    ["this response as CSV", ready(() => get("csv", false))],
-    ["this response as .mat", ready(() => get("mat", false))],
-    ["all responses in the time span as CSV", ready(() => get("csv", true))],
-    ["all responses in the time span as .mat", ready(() => get("mat", true))],
+    [tr("this response as CSV"), ready(() => get("csv", false))],
+    [tr("this response as .mat"), ready(() => get("mat", false))],
+    [tr("all responses in the time span as CSV"), ready(() => get("csv", true))],
+    [tr("all responses in the time span as .mat"), ready(() => get("mat", true))],
   ]);
   const axis = $("axis", HTMLSelectElement);
   axis.addEventListener("change", () => {
@@ -179,6 +182,11 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
   });
   $("freeze").addEventListener("click", freeze);
   $("theme").addEventListener("click", nextTheme);
+  const languages = $("language", HTMLSelectElement);
+  const names = Object.entries(language.languages);
+  languages.append(...names.map(([value, name]) => element("option", { value, lang: value }, name)));
+  languages.value = language.code;
+  languages.addEventListener("change", () => chooseLanguage(languages.value));
   const help = $("keys", HTMLDialogElement);
   $("help").addEventListener("click", () => help.showModal());
   /** @param {number} i */
@@ -190,24 +198,24 @@ export function controls(page, { bode, tracking, map, timeline }, { watch, freez
     help,
     $("keys-list"),
     [
-      [["?"], "this help", () => help.showModal()],
-      [[" "], "pause or resume", () => timeline.toggle()],
-      [["←", "→"], "move the cursor to the next line", null],
-      [[",", "."], "0.1 s backward or forward in the record", null],
-      [["1", "2", "3", "4"], "plant, open loop, closed loop, sensitivity", null],
-      [["F"], "freeze this curve as a reference, or release it", freeze],
-      [["M", "P", "G"], "map, parameters, margins", null],
+      [["?"], tr("this help"), () => help.showModal()],
+      [[" "], tr("pause or resume"), () => timeline.toggle()],
+      [["←", "→"], tr("move the cursor to the next line"), null],
+      [[",", "."], tr("{seconds} s backward or forward in the record", { seconds: fixed(0.1, 1) }), null],
+      [["1", "2", "3", "4"], tr("plant, open loop, closed loop, sensitivity"), null],
+      [["F"], tr("freeze this curve as a reference, or release it"), freeze],
+      [["M", "P", "G"], tr("map, parameters, margins"), null],
       [
         ["A"],
-        "alarms only; go to the events",
+        tr("alarms only; go to the events"),
         () => {
           $("alarms-only").click();
           $("events").focus();
         },
       ],
-      [["D"], "download", () => menu.show(true)],
-      [["0"], "full frequency band", () => bode.zoom(bode.whole)],
-      [["T"], "light or dark", nextTheme],
+      [["D"], tr("download"), () => menu.show(true)],
+      [["0"], tr("full frequency band"), () => bode.zoom(bode.whole)],
+      [["T"], tr("light or dark"), nextTheme],
     ],
     {
       "←": () => bode.step(-1),

@@ -2,8 +2,10 @@
 // Events, one row for each cause, newest first; alarms can be acknowledged.
 
 import { moment } from "./clock.js";
+import { tr, trn } from "./language.js";
 import { post, reason } from "./link.js";
 import { element } from "./make.js";
+import { recognised } from "./recognition.js";
 
 /** @import { Notice } from "./messages.js" */
 
@@ -86,13 +88,14 @@ export class Events {
     const open = list.filter((n) => alarm(n) && n.seen < n.count).length;
     this.open = open;
     this.count.hidden = !open;
-    this.count.textContent = `⚠ ${open} ${open === 1 ? "alarm" : "alarms"}`;
+    const alarms = trn("{n} alarm", "{n} alarms", open);
+    this.count.textContent = `⚠ ${alarms}`;
     const shown = list.filter((n) => !this.only.checked || alarm(n)).slice(0, SHOWN_MAX);
     const kept = document.activeElement?.getAttribute("data-event");
     this.host.replaceChildren(
       ...(shown.length
         ? shown.map((n) => this.item(n, alarm(n)))
-        : [element("li", {}, element("p", {}, this.only.checked ? "no alarms" : "no events yet"))]),
+        : [element("li", {}, element("p", {}, this.only.checked ? tr("no alarms") : tr("no events yet")))]),
     );
     if (!kept) return;
     /** @type {HTMLElement | null} */
@@ -105,24 +108,32 @@ export class Events {
    * @param {boolean} alarm
    */
   item(notice, alarm) {
-    const { id, cause, kind, first_s: firstS, last_s: lastS, message, count, seen } = notice;
+    const { id, cause, kind, first_s: firstS, last_s: lastS, count, seen } = notice;
+    const message = recognised(notice.message);
     const open = seen < count;
     /** @type {HTMLElement} */
-    let act = element("span", {}, open ? "" : "✓ acknowledged");
+    let act = element("span", {}, open ? "" : `✓ ${tr("acknowledged")}`);
     if (open && this.may && alarm) {
       act = element(
         "button",
         {
           type: "button",
           "data-event": cause,
-          "aria-label": `Acknowledge${count > 1 ? ` all ${count}` : ""}: ${message}`,
+          "aria-label":
+            count > 1
+              ? tr("Acknowledge all {count}: {message}", { count, message })
+              : tr("Acknowledge: {message}", { message }),
           disabled: this.waiting.has(cause),
           onclick: () => this.acknowledge(cause, id),
         },
-        count - seen > 1 ? `Acknowledge ${count - seen}` : "Acknowledge",
+        count - seen > 1 ? tr("Acknowledge {count}", { count: count - seen }) : tr("Acknowledge"),
       );
     }
-    const often = element("span", { class: "often" }, `${count} times since ${moment(firstS)}`);
+    const often = element(
+      "span",
+      { class: "often" },
+      tr("{count} times since {time}", { count, time: moment(firstS) }),
+    );
     return element(
       "li",
       { class: `${alarm && open ? "alarm" : ""}${open ? "" : " seen"}`, "data-cause": cause },
@@ -130,7 +141,7 @@ export class Events {
       element(
         "p",
         {},
-        element("span", { class: "kind" }, `${alarm ? "⚠ " : ""}${kind}`),
+        element("span", { class: "kind" }, `${alarm ? "⚠ " : ""}${recognised(kind)}`),
         message,
         ...(count > 1 ? [often] : []),
       ),

@@ -1,7 +1,8 @@
 // @ts-check
 // State of the source and of the tracking, in one line.
+import { tr } from "./language.js";
 import { element } from "./make.js";
-import { plain } from "./words.js";
+import { fixed, plain } from "./words.js";
 
 /** @import { Health, Run } from "./messages.js" */
 /** @typedef {[name: string, value: string, bad: boolean, title: string]} Tile */
@@ -9,7 +10,7 @@ import { plain } from "./words.js";
 /** @param {number} n */
 const whole = (n) => (Number.isFinite(n) ? Math.round(n).toLocaleString("en-GB").replaceAll(",", " ") : "–");
 /** @param {number | null | undefined} v */
-const ms = (v) => (v === null || v === undefined ? "–" : `${v < 10 ? v.toFixed(1) : Math.round(v)} ms`);
+const ms = (v) => (v === null || v === undefined ? "–" : `${v < 10 ? fixed(v, 1) : Math.round(v)} ms`);
 
 /**
  * @param {Health} found
@@ -25,47 +26,60 @@ function tilesOf(found, facts, live) {
    * @param {string} value
    */
   const tile = (name, value, bad = false, title = "") => tiles.push([name, value, bad, title]);
-  if (live && source) tile("source", source.connected ? "connected" : "not connected", !source.connected);
+  if (live && source) tile(tr("source"), source.connected ? tr("connected") : tr("not connected"), !source.connected);
   const measured = source?.measured_hz;
   tile(
-    "rate",
-    `${plain(facts.rate_hz, 6)} Hz${measured ? `, measured ${plain(measured, 5)} Hz` : ""}`,
+    tr("rate"),
+    measured
+      ? tr("{rate} Hz, measured {measured} Hz", { rate: plain(facts.rate_hz, 6), measured: plain(measured, 5) })
+      : `${plain(facts.rate_hz, 6)} Hz`,
     Boolean(measured && Math.abs(measured / facts.rate_hz - 1) > 0.02),
-    "samples per second",
+    tr("samples per second"),
   );
-  if (live) tile("responses", found.responses_per_s === null ? "–" : `${plain(found.responses_per_s, 3)} per s`);
-  else tile("responses", whole(found.responses));
+  const perS = found.responses_per_s;
+  if (live) tile(tr("responses"), perS === null ? "–" : tr("{count} per s", { count: plain(perS, 3) }));
+  else tile(tr("responses"), whole(found.responses));
   const samples = found.samples ?? counts?.samples,
     gaps = found.gaps ?? counts?.gaps;
-  if (samples !== undefined) tile("samples", whole(samples));
-  if (gaps !== undefined) tile("gaps", whole(gaps), gaps > 0);
+  if (samples !== undefined) tile(tr("samples"), whole(samples));
+  if (gaps !== undefined) tile(tr("gaps"), whole(gaps), gaps > 0);
   if (source) {
-    tile("lost", `${whole(source.lost)} samples`, source.lost > 0);
+    tile(tr("lost"), tr("{count} samples", { count: whole(source.lost) }), source.lost > 0);
     if (live) {
       tile(
-        "silent",
+        tr("silent"),
         source.silent_s === null ? "–" : ms(1000 * source.silent_s),
         Boolean(found.stale),
-        "time since the last batch",
+        tr("time since the last batch"),
       );
       if (source.latency_s !== null)
-        tile("latency", ms(1000 * source.latency_s), false, "clock of this computer minus clock of the sender");
-      tile("waiting", `${plain(source.waiting_bytes / 1024, 3)} KiB`, source.waiting_bytes > 1 << 20);
+        tile(tr("latency"), ms(1000 * source.latency_s), false, tr("clock of this computer minus clock of the sender"));
+      tile(tr("waiting"), `${plain(source.waiting_bytes / 1024, 3)} KiB`, source.waiting_bytes > 1 << 20);
       if (source.waiting_s !== undefined)
-        tile("backlog", `${source.waiting_s.toFixed(1)} s`, source.waiting_s > 2, "received, but not yet tracked");
+        tile(
+          tr("backlog"),
+          `${fixed(source.waiting_s, 1)} s`,
+          source.waiting_s > 2,
+          tr("received, but not yet tracked"),
+        );
     }
   }
   if (found.behind_p99_ms !== undefined)
-    tile("arrival to response", `${ms(found.behind_ms)}, p99 ${ms(found.behind_p99_ms)}`, found.behind_p99_ms > 1000);
+    tile(
+      tr("arrival to response"),
+      `${ms(found.behind_ms)}, p99 ${ms(found.behind_p99_ms)}`,
+      found.behind_p99_ms > 1000,
+    );
   if (found.given_up)
     tile(
-      "not shown",
+      tr("not shown"),
       whole(found.given_up),
       true,
-      "updates that arrived faster than they could be shown; the record contains them",
+      tr("updates that arrived faster than they could be shown; the record contains them"),
     );
-  if (found.refused) tile("wrong tokens", whole(found.refused), true);
-  tile("window", `${whole(facts.window)} samples, ${plain((1000 * facts.window) / facts.rate_hz, 4)} ms`);
+  if (found.refused) tile(tr("wrong tokens"), whole(found.refused), true);
+  const windowMs = plain((1000 * facts.window) / facts.rate_hz, 4);
+  tile(tr("window"), tr("{count} samples, {ms} ms", { count: whole(facts.window), ms: windowMs }));
   return tiles;
 }
 

@@ -1,5 +1,6 @@
 // @ts-check
 // The keyboard and its help.
+import { tr } from "./language.js";
 import { element } from "./make.js";
 
 /** @typedef {() => void} Act */
@@ -31,7 +32,7 @@ function uses(focus, key) {
 export function keys(dialog, list, actions, each) {
   list.replaceChildren(
     ...actions.flatMap(([names, words]) => [
-      element("dt", {}, ...names.flatMap((n) => [element("kbd", {}, n === " " ? "Space" : n), " "])),
+      element("dt", {}, ...names.flatMap((n) => [element("kbd", {}, n === " " ? tr("Space") : n), " "])),
       element("dd", {}, words),
     ]),
   );

@@ -5,12 +5,14 @@ import { setClock } from "./clock.js";
 import { controls } from "./controls.js";
 import { Events } from "./events.js";
 import { health } from "./health.js";
+import { tr } from "./language.js";
 import { Link } from "./link.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { Margins } from "./margins.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
+import { recognised } from "./recognition.js";
 import { Rows } from "./rows.js";
 import { applyTheme } from "./theme.js";
 import { Timeline } from "./timeline.js";
@@ -24,13 +26,15 @@ import { named } from "./words.js";
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
-const REFERENCE_GONE = "A new run with other lines or another quantity has started: the frozen reference was released.";
+const REFERENCE_GONE = tr(
+  "A new run with other lines or another quantity has started: the frozen reference was released.",
+);
 /** @type {[name: Curves, words: string, line: string][]} */
 const LEGEND = [
-  ["measured", "measured ±3σ", ""],
-  ["reference", "reference", "dashed"],
-  ["baseline", "baseline", "dotted"],
-  ["model", "fitted model", "dashed"],
+  ["measured", tr("measured ±3σ"), ""],
+  ["reference", tr("reference"), "dashed"],
+  ["baseline", tr("baseline"), "dotted"],
+  ["model", tr("fitted model"), "dashed"],
 ];
 
 applyTheme();
@@ -65,7 +69,7 @@ const map = new LineMap($("map", HTMLCanvasElement), $("map-hover"));
 const parameters = new Trends(
   $("pane-parameters"),
   (t) => t.model !== "margins",
-  "No model is fitted: add [fit] to the configuration.",
+  tr("No model is fitted: add [fit] to the configuration."),
 );
 const margins = new Margins($("pane-margins"));
 const events = new Events($("events"), $("alarms-only", HTMLInputElement), $("alarm-count"), (text) => complain(text));
@@ -82,7 +86,7 @@ const timeline = new Timeline(
 
 /** @param {string} text */
 function complain(text) {
-  $("notice").textContent = text;
+  $("notice").textContent = recognised(text);
   $("notice").hidden = !text;
   clearTimeout(page.silence);
   page.silence = setTimeout(() => {
@@ -166,7 +170,11 @@ function begin({ facts, axes, trends }) {
   document.title = `${facts.name} · livebode`;
   segments(
     $("quantities"),
-    facts.quantities.map(({ name, symbol, why_not: why }) => ({ value: name, text: `${name} ${symbol}`, why })),
+    facts.quantities.map(({ name, symbol, why_not: why }) => ({
+      value: name,
+      text: `${recognised(name)} ${symbol}`,
+      why: why && recognised(why),
+    })),
     page.quantity,
     watch,
   );
@@ -202,7 +210,7 @@ function clear() {
   for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
   parameters.begin([]);
   margins.lines = null;
-  margins.begin([], "No samples have arrived yet.");
+  margins.begin([], tr("No samples have arrived yet."));
   events.begin(page.axis, false);
   timeline.take({ first_s: null, last_s: null, live: false, growing: false });
   status();
@@ -217,8 +225,8 @@ function newClock() {
 /** @param {Run} facts */
 const whyNoMargins = (facts) =>
   facts.quantities.find((q) => q.name === "open loop")?.why_not
-    ? "Margins need the loop: describe its controllers under [loop]."
-    : "Margins need a fitted model: add [fit] to the configuration.";
+    ? tr("Margins need the loop: describe its controllers under [loop].")
+    : tr("Margins need a fitted model: add [fit] to the configuration.");
 
 const say = () => link.wish({ kind: "watch", axis: page.axis, quantity: page.quantity }, "watch");
 
@@ -228,7 +236,7 @@ const say = () => link.wish({ kind: "watch", axis: page.axis, quantity: page.qua
  */
 function watch(quantity, why) {
   if (why) {
-    complain(`${quantity}: ${why}`);
+    complain(`${recognised(quantity)}: ${recognised(why)}`);
     return;
   }
   if (quantity === page.quantity) return;
@@ -304,7 +312,7 @@ function letGo() {
 /** @param {boolean} is */
 function frozen(is) {
   page.frozen = is;
-  $("freeze").textContent = is ? "Unfreeze" : "Freeze";
+  $("freeze").textContent = is ? tr("Unfreeze") : tr("Freeze");
   $("freeze").classList.toggle("primary", is);
   legend();
 }

@@ -1,9 +1,10 @@
 // @ts-check
 // Position × frequency (time × frequency at standstill): the level, or its change from the median of the place.
 import { moment, ticks, timeLabel } from "./clock.js";
+import { tr } from "./language.js";
 import { between } from "./rows.js";
 import { colour, drawing, onTheme } from "./theme.js";
-import { hertz, signed } from "./words.js";
+import { fixed, hertz, label, mark, signed } from "./words.js";
 
 /** @import { History, Named } from "./messages.js" */
 /** @typedef {[red: number, green: number, blue: number]} Colour */
@@ -208,7 +209,7 @@ export class LineMap {
     ctx.font = '12px system-ui, "DejaVu Sans", sans-serif';
     ctx.fillStyle = colour("muted");
     if (!cells) {
-      ctx.fillText("no valid response", left, top + 20);
+      ctx.fillText(tr("no valid response"), left, top + 20);
       return;
     }
     const values = cells[this.what],
@@ -255,22 +256,17 @@ export class LineMap {
     ctx.translate(11, (top + bottom) / 2);
     ctx.rotate(-Math.PI / 2);
     ctx.textAlign = "center";
-    ctx.fillText("frequency in Hz", 0, 0);
+    ctx.fillText(tr("frequency in Hz"), 0, 0);
     ctx.restore();
     ctx.textAlign = "center";
     ctx.textBaseline = "top";
     const reach = cells.step * cells.columns,
       places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(reach / 4)))),
       values = Array.from({ length: 5 }, (_, i) => Number((cells.low + (reach * i) / 4).toFixed(places)));
-    (cells.moving ? values.map(String) : ticks(values, reach / 4)).forEach((text, i) => {
+    (cells.moving ? values.map(mark) : ticks(values, reach / 4)).forEach((text, i) => {
       ctx.fillText(text, left + ((right - left) * i) / 4, bottom + 4);
     });
-    const unit = this.schedule.unit ? ` in ${this.schedule.unit}` : "";
-    ctx.fillText(
-      cells.moving ? `${this.schedule.name || "schedule"}${unit}` : timeLabel(cells.low),
-      (left + right) / 2,
-      h - 15,
-    );
+    ctx.fillText(cells.moving ? label(this.schedule) : timeLabel(cells.low), (left + right) / 2, h - 15);
     for (let i = 0; i < 60; i++) {
       ctx.fillStyle = shade(stops, i / 59);
       ctx.fillRect(right + 10, bottom - ((i + 1) * (bottom - top)) / 60, 12, (bottom - top) / 60 + 0.6);
@@ -281,7 +277,7 @@ export class LineMap {
     for (const share of [0, 0.5, 1]) {
       const value = low + share * (high - low);
       ctx.fillText(
-        change ? signed(value, reachDigits(high)) : value.toFixed(high - low < 3 ? 1 : 0).replace("-", "−"),
+        change ? signed(value, reachDigits(high)) : fixed(value, high - low < 3 ? 1 : 0).replace("-", "−"),
         right + 26,
         bottom - share * (bottom - top),
       );
@@ -306,7 +302,7 @@ export class LineMap {
     const line = Math.min(this.lines.length - 1, Math.max(0, edges.findIndex((e) => e > log) - 1)),
       i = Math.floor(((x - left) / (right - left)) * cells.columns);
     const place = cells.low + (i + 0.5) * cells.step;
-    this.hover.textContent = `${cells.moving ? `${place.toFixed(3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
+    this.hover.textContent = `${cells.moving ? `${fixed(place, 3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${signed(cells[this.what][i][line], 2)} dB`;
   }
 }
 

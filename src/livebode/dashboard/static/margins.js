@@ -1,6 +1,8 @@
 // @ts-check
 // The margins of the loop with their bounds; small ones are marked.
+import { tr } from "./language.js";
 import { element } from "./make.js";
+import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { bounded } from "./trends.js";
 import { hertz, plain } from "./words.js";
@@ -13,12 +15,12 @@ import { hertz, plain } from "./words.js";
  * @type {[name: string, words: string, small: (v: number) => boolean][]}
  */
 const ROWS = [
-  ["gain_margin", "gain may rise by", (v) => v < 6],
-  ["gain_reduction", "gain may fall by", (v) => Math.abs(v) < 6],
-  ["phase_margin", "phase margin", (v) => Math.abs(v) < 30],
-  ["delay_margin", "delay margin", () => false],
-  ["peak_sensitivity", "peak sensitivity Ms", (v) => v > 2],
-  ["bandwidth", "bandwidth", () => false],
+  ["gain_margin", tr("gain may rise by"), (v) => v < 6],
+  ["gain_reduction", tr("gain may fall by"), (v) => Math.abs(v) < 6],
+  ["phase_margin", tr("phase margin"), (v) => Math.abs(v) < 30],
+  ["delay_margin", tr("delay margin"), () => false],
+  ["peak_sensitivity", tr("peak sensitivity Ms"), (v) => v > 2],
+  ["bandwidth", tr("bandwidth"), () => false],
 ];
 
 export class Margins {
@@ -72,10 +74,10 @@ export class Margins {
           element(
             "td",
             { class: mark ? "small" : "" },
-            none ? "no limit" : `${bounded(value, found.s[row], found.unit)}${mark ? " ⚠ small" : ""}`,
+            none ? tr("no limit") : `${bounded(value, found.s[row], found.unit)}${mark ? ` ⚠ ${tr("small")}` : ""}`,
           ),
           element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""),
-          element("td", {}, none ? "no crossing" : found.status[row]),
+          element("td", {}, none ? tr("no crossing") : recognised(found.status[row])),
         ),
       );
     }
@@ -85,23 +87,22 @@ export class Margins {
         element(
           "tr",
           { "data-name": "at_lines" },
-          element("th", { scope: "row" }, "largest |S| at a line"),
+          element("th", { scope: "row" }, tr("largest |S| at a line")),
           element(
             "td",
             { class: lines.value > 2 ? "small" : "" },
-            `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? " ⚠ large" : ""}`,
+            `${plain(lines.value, 3)} ± ${plain(lines.bound, 2)}${lines.value > 2 ? ` ⚠ ${tr("large")}` : ""}`,
           ),
           element("td", {}, `${hertz(lines.frequency_hz)} Hz`),
-          element("td", {}, "measured, without a model"),
+          element("td", {}, tr("measured, without a model")),
         ),
       );
     if (!rows.length) {
       this.host.replaceChildren(element("p", { class: "empty" }, this.why));
       return;
     }
-    const head = ["margin", "value, ± 95 % if the model is complete", "at", "source"].map((t) =>
-      element("th", { scope: "col" }, t),
-    );
+    const titles = [tr("margin"), tr("value, ± 95 % if the model is complete"), tr("at"), tr("source")];
+    const head = titles.map((t) => element("th", { scope: "col" }, t));
     this.host.replaceChildren(
       element(
         "table",

@@ -2,12 +2,18 @@
 // The values at the cursor: Hz, dB, degrees, their bounds, coherence, and the difference from the reference.
 import { moment } from "./clock.js";
 import { halfDeg, highDb, holds, lowDb } from "./frames.js";
+import { tr } from "./language.js";
 import { element } from "./make.js";
-import { hertz, signed } from "./words.js";
+import { fixed, hertz, signed } from "./words.js";
 
-/** @import { AtCursor, Curves, Found, Named } from "./messages.js" */
+/** @import { AtCursor, Curves, Found, Frame, Named } from "./messages.js" */
 
-const WORDS = { measured: "measured", reference: "reference", baseline: "baseline", model: "fitted model" };
+const WORDS = {
+  measured: tr("measured"),
+  reference: tr("reference"),
+  baseline: tr("baseline"),
+  model: tr("fitted model"),
+};
 
 /**
  * @param {number} low
@@ -15,8 +21,28 @@ const WORDS = { measured: "measured", reference: "reference", baseline: "baselin
  * @param {number} high
  */
 function around(low, value, high) {
-  if (!Number.isFinite(value - low) || low <= -999) return Number.isFinite(high) ? "includes zero" : "bound not known";
-  return `−${(value - low).toFixed(2)} … +${(high - value).toFixed(2)} dB`;
+  if (!Number.isFinite(value - low) || low <= -999)
+    return Number.isFinite(high) ? tr("includes zero") : tr("bound not known");
+  return `−${fixed(value - low, 2)} … +${fixed(high - value, 2)} dB`;
+}
+
+/**
+ * @param {Frame} frame
+ * @param {Named} schedule
+ */
+function where(frame, schedule) {
+  const time = moment(frame.timeS[0], true),
+    [at] = frame.schedule;
+  if (!Number.isFinite(at)) return tr("at {time}", { time });
+  const place = `${schedule.name || tr("schedule")} ${fixed(at, 3)} ${schedule.unit}`;
+  return tr("at {time}, {place}", { time, place });
+}
+
+/** @param {Frame} frame */
+function bands(frame) {
+  const [dof] = frame.dof;
+  if (Number.isNaN(dof)) return tr("bands are ±3σ");
+  return tr("bands are ±3σ and cover the true value with {percent} %", { percent: fixed(100 * holds(dof), 2) });
 }
 
 /**
@@ -36,16 +62,17 @@ export function readout(host, hz, found, schedule) {
       element("td", {}, `${signed(db, 2)} dB`),
       element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach))),
       element("td", {}, `${signed(deg, 1)}°`),
-      element("td", {}, Number.isFinite(reach) ? `± ${halfDeg(reach).toFixed(1)}°` : ""),
-      element("td", {}, Number.isFinite(coherence) ? `γ² ${coherence.toFixed(3)}` : ""),
-      element("td", {}, away ? `measured ${signed(-away[0], 2)} dB, ${signed(-away[1], 1)}° off` : ""),
+      element("td", {}, Number.isFinite(reach) ? `± ${fixed(halfDeg(reach), 1)}°` : ""),
+      element("td", {}, Number.isFinite(coherence) ? `γ² ${fixed(coherence, 3)}` : ""),
+      element(
+        "td",
+        {},
+        away ? tr("measured {db} dB, {deg}° off", { db: signed(-away[0], 2), deg: signed(-away[1], 1) }) : "",
+      ),
     );
   });
   const frame = found.measured?.frame;
-  const words = frame
-    ? `at ${moment(frame.timeS[0], true)}${Number.isFinite(frame.schedule[0]) ? `, ${schedule.name || "schedule"} ${frame.schedule[0].toFixed(3)} ${schedule.unit}` : ""}` +
-      `; bands are ±3σ${Number.isFinite(frame.dof[0]) || frame.dof[0] === Infinity ? ` and cover the true value with ${(100 * holds(frame.dof[0])).toFixed(2)} %` : ""}`
-    : "no response yet";
+  const words = frame ? `${where(frame, schedule)}; ${bands(frame)}` : tr("no response yet");
   host.replaceChildren(
     element(
       "table",

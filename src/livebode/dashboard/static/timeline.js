@@ -1,6 +1,7 @@
 // @ts-check
 // The time that is shown: the newest, or a time in the record.
 import { moment } from "./clock.js";
+import { tr } from "./language.js";
 
 /** @typedef {Omit<import("./messages.js").Span, "clock">} Span */
 
@@ -76,11 +77,11 @@ export class Timeline {
     this.now.textContent = !Number.isFinite(first)
       ? ""
       : paused
-        ? `shown: ${moment(shown, true)}`
+        ? tr("shown: {time}", { time: moment(shown, true) })
         : live
-          ? "newest"
-          : "end";
-    this.pause.textContent = paused ? (live ? "Live" : "End") : "Pause";
+          ? tr("newest")
+          : tr("end");
+    this.pause.textContent = paused ? (live ? tr("Live") : tr("End")) : tr("Pause");
     this.pause.classList.toggle("primary", paused);
   }
 }

@@ -3,16 +3,15 @@
 import { axis, chart, steady } from "./chart.js";
 import { moment, ticks, timeLabel } from "./clock.js";
 import { halfDeg, highDb, lowDb } from "./frames.js";
+import { tr } from "./language.js";
 import { element } from "./make.js";
 import { between } from "./rows.js";
 import { colour } from "./theme.js";
-import { hertz } from "./words.js";
+import { hertz, label, mark } from "./words.js";
 
 /** @import { Chart } from "./chart.js" */
 /** @import { History, Named, Run } from "./messages.js" */
 
-/** @param {number} v */
-const number = (v) => Number(v.toFixed(6)).toString().replace("-", "−");
 const COLOURS = 10,
   LINES_MAX = 10,
   AT_FIRST = 6,
@@ -95,7 +94,7 @@ export class Tracking {
             "aria-pressed": String(place >= 0),
             "data-line": i,
             onclick: () => this.toggle(i),
-            title: place >= 0 ? "Hide this line" : "Track this line",
+            title: place >= 0 ? tr("Hide this line") : tr("Track this line"),
           },
           ...(place >= 0 ? [swatch] : []),
           `${hertz(f)} Hz`,
@@ -136,7 +135,7 @@ export class Tracking {
         series.push({ label: edge, stroke: () => "transparent", width: 0, points: { show: false } });
       bands.push({ series: [first + 1, first + 2], fill: () => `${ink()}2e` });
     });
-    const place = `${this.schedule.name}${this.schedule.unit ? ` in ${this.schedule.unit}` : ""}`;
+    const place = label(this.schedule);
     this.made = chart(
       this.host,
       {
@@ -148,11 +147,11 @@ export class Tracking {
           axis(() => (byPlace ? place : timeLabel(this.fromS)), {
             size: 28,
             space: byPlace ? 50 : 74,
-            values: (_u, splits, _i, _space, step) => (byPlace ? splits.map(number) : ticks(splits, step)),
+            values: (_u, splits, _i, _space, step) => (byPlace ? splits.map(mark) : ticks(splits, step)),
           }),
-          axis(deg ? "phase in °" : "magnitude in dB", {
+          axis(deg ? tr("phase in °") : tr("magnitude in dB"), {
             size: 46,
-            values: (_u, s) => s.map(number),
+            values: (_u, s) => s.map(mark),
           }),
         ],
         series,

@@ -3,6 +3,7 @@
 import { axis, chart } from "./chart.js";
 import { ticks } from "./clock.js";
 import { element } from "./make.js";
+import { recognised } from "./recognition.js";
 import { Series } from "./series.js";
 import { colour } from "./theme.js";
 import { plain } from "./words.js";
@@ -18,7 +19,7 @@ const BOUND = 1.959964;
  */
 export const bounded = (value, sigma, unit) =>
   Number.isFinite(value)
-    ? `${plain(value)}${Number.isFinite(sigma) && sigma > 0 ? ` ± ${plain(BOUND * sigma, 2)}` : ""}${unit ? ` ${unit}` : ""}`
+    ? `${plain(value)}${Number.isFinite(sigma) && sigma > 0 ? ` ± ${plain(BOUND * sigma, 2)}` : ""}${unit ? ` ${recognised(unit)}` : ""}`
     : "–";
 
 // A parameter with its chart, which is built when it is first drawn.
@@ -74,7 +75,7 @@ export class Trends {
       element(
         "div",
         { class: "trend", "data-name": item.name },
-        element("h3", {}, item.name.replaceAll("_", " "), item.words),
+        element("h3", {}, recognised(item.name.replaceAll("_", " ")), item.words),
         host,
       ),
     );
@@ -113,7 +114,7 @@ export class Trends {
       item.made ??= this.build(item);
       const at = item.known(atS);
       const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
-      item.words.textContent = Number.isFinite(item.v[at]) ? words : item.status[at];
+      item.words.textContent = Number.isFinite(item.v[at]) ? words : recognised(item.status[at] ?? "");
       if (!item.dirty) continue;
       item.dirty = false;
       /** @param {number} v */

@@ -1,5 +1,19 @@
 // @ts-check
 // Numbers and names for people.
+import { numeral, tr } from "./language.js";
+
+/**
+ * @param {number} value
+ * @param {number} digits
+ */
+export const fixed = (value, digits) => numeral(value.toFixed(digits));
+
+/**
+ * The number of a mark on an axis.
+ *
+ * @param {number} value
+ */
+export const mark = (value) => numeral(String(Number(value.toFixed(6)))).replace("-", "−");
 
 /** @param {number | null | undefined} value */
 export function plain(value, digits = 4) {
@@ -9,17 +23,27 @@ export function plain(value, digits = 4) {
     Math.abs(value) >= 1e6 || (value !== 0 && Math.abs(value) < 1e-3)
       ? Number(value.toPrecision(digits)).toExponential().replace("e+", "e")
       : Number(value.toPrecision(digits)).toString();
-  return text.replace("-", "−");
+  return numeral(text).replace("-", "−");
 }
 
 /** @param {number} value */
 export const signed = (value, digits = 1) =>
-  Number.isFinite(value) ? `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}` : "–";
+  Number.isFinite(value) ? `${value < 0 ? "−" : "+"}${fixed(Math.abs(value), digits)}` : "–";
 
 /** @param {number} f */
 export function hertz(f) {
-  if (f >= 1e5) return `${Number((f / 1000).toPrecision(4))}k`;
-  return Number(f.toPrecision(5)).toString();
+  if (f >= 1e5) return `${numeral(String(Number((f / 1000).toPrecision(4))))}k`;
+  return numeral(String(Number(f.toPrecision(5))));
+}
+
+/**
+ * The label of an axis of the scheduling signal.
+ *
+ * @param {import("./messages.js").Named} schedule
+ */
+export function label({ name, unit }) {
+  const known = name || tr("schedule");
+  return unit ? tr("{name} in {unit}", { name: known, unit }) : known;
 }
 
 /**

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from livebode.core import Event
+from livebode.core import Emit, Event
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.json_lines import to_line
 
@@ -23,12 +23,13 @@ class EventLog:
     ----------
     run
         The directory of the run.
+    emit
+        Receives the events of the record itself.
     """
 
-    def __init__(self, run: Path) -> None:
-        self._run = run
+    def __init__(self, run: Path, emit: Emit) -> None:
+        self._run, self._emit = run, emit
         self._waiting: list[bytes] = []
-        self._said: list[Event] = []
         self._given_up = 0
 
     def add(self, event: Event) -> None:
@@ -38,22 +39,17 @@ class EventLog:
         else:
             self._given_up += 1
 
-    def say(self, kind: str, sample: int, time_s: float, message: str, **details: Any) -> Event:
-        """Append an event of the record itself, and store it for `drain`."""
-        return self.say_event(Event(kind, sample, time_s, message, details))
+    def report(self, kind: str, sample: int, time_s: float, message: str, **details: Any) -> Event:
+        """Append an event of the record itself, and emit it."""
+        return self.report_event(Event(kind, sample, time_s, message, details))
 
-    def say_event(self, event: Event) -> Event:
+    def report_event(self, event: Event) -> Event:
         """The same with an existing event."""
         level = logging.INFO if event.kind in _EXPECTED else logging.WARNING
         _logger.log(level, "%s: %s", self._run, event.message)
-        self._said.append(event)
         self.add(event)
+        self._emit(event)
         return event
-
-    def drain(self) -> list[Event]:
-        """Events of the record itself since the last call."""
-        said, self._said = self._said, []
-        return said
 
     def take_given_up(self) -> int:
         given_up, self._given_up = self._given_up, 0

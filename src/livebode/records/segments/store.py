@@ -13,7 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from livebode.core import Event, LivebodeError, RecordError
+from livebode.core import Emit, Event, LivebodeError, RecordError, ignore
 from livebode.records.inside import check_own
 from livebode.records.segments import journal
 from livebode.records.segments.closing import Closing
@@ -64,12 +64,12 @@ class Store:
         damaged.
     """
 
-    def __init__(self, path: Path, tables: Mapping[str, Table], limits: Limits) -> None:
+    def __init__(self, path: Path, tables: Mapping[str, Table], limits: Limits, emit: Emit = ignore) -> None:
         self.path, self.limits = path, limits
         self.last: Commit | None = None
         self._tables = dict(tables)
         self._waiting = Waiting(tuple(self._tables))
-        self._log = EventLog(path)
+        self._log = EventLog(path, emit)
         self._pause: Event | None = None
         self._attempts = 0  # failed attempts to close a segment since the last closed one
         self._committed_s = self._synced_s = 0.0
@@ -114,10 +114,6 @@ class Store:
     def write_event(self, event: Event) -> None:
         """Append an event with the next commit."""
         self._log.add(event)
-
-    def drain_events(self) -> list[Event]:
-        """Events of the record itself since the last call; they are written already, or will be."""
-        return self._log.drain()
 
     def due(self, sample: int) -> bool:
         """Whether a commit is due when the next sample has this number."""
@@ -218,7 +214,7 @@ class Store:
                 f"at a time {-away_s:.1f} s before it ended there: this computer's clock was set back, so "
                 "the length of the pause is not known; check its date and time"
             )
-        self._log.say(
+        self._log.report(
             "record-continued",
             found.commit.sample,
             found.commit.time_s,
@@ -288,12 +284,12 @@ class Store:
         """Wait until the previous journal is converted, and report removed and damaged parts; returns an error."""
         gone, error = self._closing.result()
         for retained in self._shelf.retained[self._named :]:
-            self._log.say_event(retained.event)
+            self._log.report_event(retained.event)
             self._named += 1
         if gone:
             assert self.last is not None
             names = f"{gone[0].name} and {len(gone) - 1} more" if len(gone) > 1 else gone[0].name
-            self._log.say(
+            self._log.report(
                 "record-removed",
                 self.last.sample,
                 self.last.time_s,
@@ -305,7 +301,7 @@ class Store:
                 error, f"when the next journal is full, at sample {self._began + self.limits.segment_samples}"
             )
         elif self._attempts and not self._shelf.sealed and not self._full(self._committed):
-            self._say_closed()
+            self._report_closed()
         return error
 
     def _not_closed(self, error: OSError | LivebodeError, retried: str) -> None:
@@ -315,7 +311,7 @@ class Store:
             return
         assert self.last is not None
         waiting = [*self._shelf.sealed, self._number]
-        self._log.say(
+        self._log.report(
             "record-unclosed",
             self.last.sample,
             self.last.time_s,
@@ -326,10 +322,10 @@ class Store:
             errno=getattr(error, "errno", None),
         )
 
-    def _say_closed(self) -> None:
+    def _report_closed(self) -> None:
         assert self.last is not None
         message = f"segments are closed again, after {self._attempts} failed attempt{'s' * (self._attempts > 1)}"
-        self._log.say("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
+        self._log.report("record-closed", self.last.sample, self.last.time_s, message, attempts=self._attempts)
         self._attempts = 0
 
     def _failed(self, error: OSError, sample: int, time_s: float) -> None:
@@ -338,7 +334,7 @@ class Store:
         self._journal.back_to(self._safe_bytes)
         self._waiting.failed(self.limits.held_bytes)
         if self._pause is None:
-            self._pause = self._log.say(
+            self._pause = self._log.report(
                 "record-paused",
                 sample,
                 time_s,
@@ -354,7 +350,7 @@ class Store:
             f"{sums['rows']} rows of {table} of samples {sums['first_sample']} to {sums['last_sample']}"
             for table, sums in lost.items()
         )
-        self._log.say(
+        self._log.report(
             "record-resumed",
             sample,
             time_s,

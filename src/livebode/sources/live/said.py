@@ -79,7 +79,7 @@ class Said:
             self._events.append(Event(kind, at, time_s, message, details))
         self._log(LEVELS.get(kind, logging.WARNING), f"{message} ({held} more of this kind)" if held else message)
 
-    def drain(self) -> list[Event]:
+    def take(self) -> list[Event]:
         """Events since the last call."""
         with self._lock:
             events, self._events = self._events, []

@@ -179,14 +179,11 @@ class LiveSource(ABC):
         self._log(logging.INFO, f"{len(self.channels)} channels at {self.rate_hz:.9g} Hz")
         return self
 
-    def blocks(
-        self, channels: Sequence[str] | None = None, until: Callable[[], bool] = lambda: False
-    ) -> Iterator[LiveBlock]:
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock]:
         """The samples of `channels` as they arrive, from the first received; ends with the sender or with `close`.
 
         For a drive that sends spectra they are LiveSpectra, with the sums of all its signals.
-        There is one stream: samples read by one iteration are not available to another. An iteration that ends because
-        `until` is true (checked before each Block and ten times a second) reads nothing more: the next iteration
+        There is one stream: samples read by one iteration are not available to another, and the next iteration
         continues with the next sample.
 
         Raises
@@ -194,6 +191,10 @@ class LiveSource(ABC):
         SourceError
             At once for a missing channel.
         """
+        return (block for block in self.stream(channels) if block is not None)
+
+    def stream(self, channels: Sequence[str] | None = None) -> Iterator[LiveBlock | None]:
+        """The same, and None at least ten times a second while the machine sends nothing."""
         names = [channel.name for channel in self.channels]
         for name in channels or ():
             if name not in names:
@@ -206,11 +207,13 @@ class LiveSource(ABC):
                 )
         rows = [names.index(name) for name in (names if channels is None else channels)]
         labels = tuple(self.channels[row] for row in rows)
-        return (replace(block, data=block.data[rows], channels=labels) for block in self._stream(until))
+        if rows == list(range(len(names))):
+            return self._stream()
+        return (None if block is None else _rows(block, rows, labels) for block in self._stream())
 
-    def drain_events(self) -> list[Event]:
+    def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
-        return self._said.drain()
+        return self._said.take()
 
     def stop(self) -> None:
         """Request the end: `blocks` returns what was received and then ends. May be called from a signal handler."""
@@ -229,16 +232,14 @@ class LiveSource(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stream(self, until: Callable[[], bool]) -> Iterator[LiveBlock]:
-        while not until():
+    def _stream(self) -> Iterator[LiveBlock | None]:
+        while self._ready or not self._inbox.ended:
             if self._ready:
                 yield self._ready.popleft()
-            elif self._inbox.ended:
-                break
             else:
                 self._take(TICK_S)
-        else:
-            return
+                if not self._ready:
+                    yield None
         yield from self._sequencer.finish()
         self._raise_failure()
 
@@ -328,3 +329,7 @@ class LiveSource(ABC):
             self._dropped.finish()
         elif not self._stop.is_set():
             self._dropped.take(batch)
+
+
+def _rows(block: LiveBlock, rows: list[int], channels: tuple[Channel, ...]) -> LiveBlock:
+    return replace(block, data=block.data[rows], channels=channels)

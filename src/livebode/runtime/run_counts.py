@@ -10,11 +10,11 @@ import numpy as np
 
 from livebode.core import Responses
 from livebode.preparation.checks import ChannelCheck
-from livebode.runtime.continuing import Before
+from livebode.runtime.continuing import PreviousRun
 from livebode.runtime.event_groups import EventGroups
 
 
-class Tally:
+class RunCounts:
     """Counts over a whole run, also over a continued one.
 
     Parameters
@@ -40,7 +40,7 @@ class Tally:
         Whether the signals of a live run were judged at its beginning.
     """
 
-    def __init__(self, check: ChannelCheck, started: float, before: Before | None = None) -> None:
+    def __init__(self, check: ChannelCheck, started: float, before: PreviousRun | None = None) -> None:
         self.check, self.groups = check, EventGroups()
         self._before = {} if before is None else before.counts
         self.responses = self.invalid = self.valid_lines = 0

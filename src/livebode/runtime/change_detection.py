@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +13,15 @@ from livebode.estimation import Settings
 if TYPE_CHECKING:
     from livebode.monitoring import Monitor
 
-_CANNOT_TELL = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
+_NO_BASELINE = "Without a baseline no change can be detected; `livebode learn` creates one from healthy runs."
 _NOT_FITTED = " The baseline's fitted parameters are not judged: the run has no [fit]."
 _NO_SAMPLES = " The baseline's model of the machine is not used: it needs samples, but the drive sends spectra."
 _ALARMS = {"change", "change-corrected", "change-cleared", "baseline-unknown"}
-_KEPT = 100  # sentences in run.json; events.jsonl has all
-
-Write = Callable[[Event], None]
+_ALARMS_MAX = 100  # sentences in run.json; events.jsonl has all
 
 
-class Watching:
-    """Passes a run's samples and responses to a Monitor, if there is one, and records its messages."""
+class ChangeDetection:
+    """Passes a run's samples and responses to a Monitor, if there is one, and lists its alarms for run.json."""
 
     def __init__(
         self, monitor: Monitor | None, baseline: str | None, remark: str = "", covariates: tuple[str, ...] = ()
@@ -34,33 +31,34 @@ class Watching:
         """Channels that it needs in addition to those of the follower."""
         self._alarms: list[str] = []
 
-    def over(
-        self, blocks: Iterator[Block], write: Write, has_time: Callable[[], bool] = lambda: True
-    ) -> Iterator[Block]:
-        """The same blocks, each monitored first; those that there is no time for are a gap for the Monitor."""
-        for block in blocks:
-            if self._monitor is not None and has_time():
-                self._publish(self._monitor.process_samples(block), write)
-            yield block
+    def take_samples(self, block: Block) -> list[Event]:
+        """Monitor the next samples; without this call they are a gap for the Monitor."""
+        return [] if self._monitor is None else self._listed(self._monitor.process_samples(block))
 
-    def follow(self, responses: Responses, parameters: Parameters | None, write: Write) -> None:
+    def take_responses(self, responses: Responses, parameters: Parameters | None) -> list[Event]:
         """Monitor the results of the samples."""
-        if self._monitor is not None:
-            self._publish(self._monitor.process_responses(responses, parameters), write)
+        return [] if self._monitor is None else self._listed(self._monitor.process_responses(responses, parameters))
 
-    def finish(self, write: Write) -> dict[str, Any]:
+    def finish(self) -> list[Event]:
+        """The last events, at the end of the run."""
+        return [] if self._monitor is None else self._listed(self._monitor.finish())
+
+    def summary(self) -> dict[str, Any]:
         """Entries of run.json."""
         if self._monitor is None:
-            return {"baseline": None, "message": _CANNOT_TELL + self._remark}
-        self._publish(self._monitor.finish(), write)
+            return {"baseline": None, "message": _NO_BASELINE + self._remark}
         found = self._monitor.summary()
         message = {"message": found["message"] + self._remark}
         return {"baseline": self._baseline} | found | message | {"alarms": self._alarms}
 
     def snapshot(self) -> bytes:
         """Its messages, and the state that the next event depends on; see `restore`."""
-        said = json.dumps(self._alarms).encode()
-        return len(said).to_bytes(4, "little") + said + (self._monitor.snapshot() if self._monitor is not None else b"")
+        alarms = json.dumps(self._alarms).encode()
+        return (
+            len(alarms).to_bytes(4, "little")
+            + alarms
+            + (self._monitor.snapshot() if self._monitor is not None else b"")
+        )
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot with the same baseline; RecordError if it belongs to another one."""
@@ -75,13 +73,12 @@ class Watching:
             self._monitor.restore(snapshot[rest:])
         self._alarms = json.loads(snapshot[4:rest])
 
-    def _publish(self, events: list[Event], write: Write) -> None:
-        for event in events:
-            write(event)
-        self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_KEPT]
+    def _listed(self, events: list[Event]) -> list[Event]:
+        self._alarms = [*self._alarms, *(e.message for e in events if e.kind in _ALARMS)][:_ALARMS_MAX]
+        return events
 
 
-def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Watching:
+def change_detection(axis: Axis, settings: Settings, *, samples: bool = True) -> ChangeDetection:
     """For these settings; BaselineError if the baseline cannot be read or does not fit.
 
     Without `samples` only its tables are used, because the model of the machine needs samples.
@@ -91,7 +88,7 @@ def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Wa
     if section.baseline is None:
         asked = section.false_alarms != MonitoringSection().false_alarms
         remark = f" false_alarms = {section.false_alarms!r} has no effect without one." * asked
-        return Watching(None, None, remark, covariates)
+        return ChangeDetection(None, None, remark, covariates)
     from livebode.monitoring import Baseline, Monitor  # with the simulation
 
     baseline = Baseline.load(section.baseline)
@@ -102,4 +99,4 @@ def make_watching(axis: Axis, settings: Settings, *, samples: bool = True) -> Wa
     monitor = Monitor(baseline, settings, section.false_alarms, corrected=axis.motion is not None)
     blind = axis.fit is None and "parameters" in monitor.tables
     remark = _NOT_FITTED * blind + _NO_SAMPLES * left_out
-    return Watching(monitor, str(section.baseline), remark, baseline.covariates)
+    return ChangeDetection(monitor, str(section.baseline), remark, baseline.covariates)

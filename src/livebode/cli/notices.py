@@ -1,0 +1,32 @@
+"""Notices: the events of a run that the terminal shows immediately."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from livebode.core import Event
+from livebode.runtime import Document
+
+_KINDS = {
+    "roles-doubtful", "transient", "phase-slip", "phase-slips", "restart", "replaced", "computer-clock", "foreign",
+    "backlog", "backlog-cleared", "waiting",
+}  # fmt: skip
+_ONCE = {"foreign"}
+
+
+class Notices:
+    """A subscriber that prints events on which a person must act: on the record, the signals, the sender.
+
+    Of a kind that repeats with every batch only the first is shown.
+    """
+
+    def __init__(self, show: Callable[[str], None]) -> None:
+        self._show = show
+        self._shown: set[str] = set()
+
+    def __call__(self, document: Document) -> None:
+        if not isinstance(document, Event) or (document.kind in _ONCE and document.kind in self._shown):
+            return
+        if document.kind in _KINDS or document.kind.startswith("record-"):
+            self._shown.add(document.kind)
+            self._show(document.message)

@@ -1,0 +1,94 @@
+"""Documents: what a run publishes while it runs, in this order, to each of its subscribers.
+
+A subscriber is any function of one document. It is called in the thread that tracks, after the record was written, so
+it must return at once and must not raise; longer work belongs to another thread. All documents are immutable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from livebode.core import Block, Channel, Event, Parameters, Responses
+
+if TYPE_CHECKING:
+    from livebode.analysis.overview import Overview
+    from livebode.runtime.run_control import RunControl
+
+VERSION = 1
+"""Version of the documents; it is raised when the meaning of one changes, not when one gets another field."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunStarted:
+    """The run begins.
+
+    It comes again, after `RunEnded`, where an edited configuration makes another run continue with the next sample.
+
+    Attributes
+    ----------
+    directory
+        Directory of the run.
+    summary
+        run.json at the beginning: configuration, findings, versions.
+    control
+        Requests to the run, and the health of its source; in this process only.
+    overview
+        Thinned copy of its responses, which grows with the run; in this process only.
+    version
+        Version of the documents.
+    """
+
+    directory: Path
+    summary: Mapping[str, Any]
+    control: RunControl
+    overview: Overview
+    version: int = VERSION
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """The channels in use, each with its unit, and their rate in samples per second."""
+
+    channels: tuple[Channel, ...]
+    rate_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class ClockSet:
+    """Relation of the run's seconds to the time of day, as in `RunClock`; again when it is more accurate."""
+
+    pieces: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The fits of the responses before, quantities derived from them, and margins: one Parameters each."""
+
+    parts: tuple[Parameters, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """All results of this Block were published; a LiveBlock contains its time of arrival.
+
+    `samples` is the number of tracked samples, `samples_total` that of the whole source (None if it is not known).
+    """
+
+    block: Block
+    samples: int
+    samples_total: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class RunEnded:
+    """The run ended; `summary` is the final run.json."""
+
+    summary: Mapping[str, Any]
+
+
+Document = RunStarted | Channels | ClockSet | Responses | Fitted | Event | Tracked | RunEnded
+"""New `Responses` (when a run continues, first the newest previous ones), an `Event`, or one of the classes here."""
+Subscriber = Callable[[Document], None]

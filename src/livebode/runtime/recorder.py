@@ -1,0 +1,62 @@
+"""Recorder: the record of a run, as the run loop uses it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+from livebode.configuration.axis import RecordSection
+from livebode.core import Block, Event, Responses
+from livebode.runtime.documents import Document
+
+
+class Recorder(Protocol):
+    """The record of a run, in one piece or in segments. Used as a context manager around the run."""
+
+    path: Path
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None: ...
+
+    @property
+    def continues(self) -> bool:
+        """Whether an unfinished run can be continued."""
+
+    @property
+    def clock(self) -> Sequence[tuple[float, float]]:
+        """The clock of the run that it continues, as in `RunClock`."""
+
+    def previous(self) -> Iterator[Responses]:
+        """The newest responses of the run that it continues."""
+
+    def pieces(self, block: Block) -> Iterator[Block]:
+        """The samples of a Block that are not in the record yet, in Blocks that are short enough for a commit."""
+
+    def write_samples(self, block: Block) -> None:
+        """Append the samples, if they are recorded, before they are tracked."""
+
+    def take(self, document: Document) -> None:
+        """Append a document, if it is recorded."""
+
+    def commit(self, block: Block) -> None:
+        """Store everything up to the end of this Block, if a commit is due."""
+
+    def commit_while_silent(self) -> None:
+        """The same while no samples come."""
+
+    def commit_last(self) -> None:
+        """Store everything after the last Block; RecordError if it cannot be written."""
+
+    def renew(self, **found: Any) -> None:
+        """Write findings during the run to run.json now."""
+
+    def limit(self, section: RecordSection) -> None:
+        """Use other settings of the record from now."""
+
+    def stopped(self) -> Event | None:
+        """Message for a run that stops here, before it is finished; None if nothing of it remains."""
+
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        """Let `draw` add pictures, close all files and write run.json."""

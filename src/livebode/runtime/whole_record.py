@@ -1,0 +1,66 @@
+"""WholeRecord: the record of a run in one piece, which appears when the run is complete."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Self
+
+from livebode.configuration.axis import RecordSection
+from livebode.core import Block, Event, Responses
+from livebode.records import RunDirectory
+from livebode.runtime.documents import Document, Fitted
+
+
+class WholeRecord:
+    """Writes the documents of a run to a `RunDirectory`; an exception leaves nothing behind.
+
+    There is nothing to continue and nothing to commit, and samples are not recorded.
+    """
+
+    continues = False
+    clock = ()
+
+    def __init__(self, path: Path, *, force: bool) -> None:
+        self.path = path
+        self._directory = RunDirectory(path, force=force)
+
+    def __enter__(self) -> Self:
+        self._directory.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        self._directory.__exit__(kind, error, trace)
+
+    def take(self, document: Document) -> None:
+        match document:
+            case Responses():
+                self._directory.write(document)
+            case Fitted(parts):
+                self._directory.write_parameters(*parts)
+            case Event():
+                self._directory.write_event(document)
+
+    def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
+        self._directory.finish(summary, draw)
+
+    def previous(self) -> Iterator[Responses]:
+        return iter(())
+
+    def pieces(self, block: Block) -> Iterator[Block]:
+        yield block
+
+    def write_samples(self, block: Block) -> None: ...
+
+    def commit(self, block: Block) -> None: ...
+
+    def commit_while_silent(self) -> None: ...
+
+    def commit_last(self) -> None: ...
+
+    def renew(self, **found: Any) -> None: ...
+
+    def limit(self, section: RecordSection) -> None: ...
+
+    def stopped(self) -> Event | None:
+        return None

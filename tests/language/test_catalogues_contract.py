@@ -1,0 +1,142 @@
+"""The catalogues: every sentence in each language, with its values and plural forms, and nothing else."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+
+import pytest
+
+from livebode.dashboard.quantities import QUANTITIES
+from livebode.fitting.extended import WORDS as EFFECTS
+from livebode.fitting.extended import Extended
+from livebode.fitting.models import MODELS
+from livebode.fitting.rows import SENTENCES as FITS
+from livebode.language import available
+from livebode.language.recorded import NAMES, SENTENCES
+from livebode.margins.margins import NAMES as MARGINS
+from livebode.margins.words import WORDS as MARGIN_WORDS
+from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.monitoring.sentences import WHAT
+from tools.catalogues import FOLDER, PACKAGE, STATIC, catalogues, extracted, json_text, po_text, translated, updated
+
+_PLACE = re.compile(r"\{\w*(?::[^}]*)?\}")
+LANGUAGES = sorted(catalogues())
+
+
+@cache
+def keys() -> dict[str, object]:
+    """The extracted sentences, by the English singular."""
+    return {key if isinstance(key, str) else key[0]: key for key in extracted()}
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_each_sentence_is_translated_and_none_is_superfluous(code: str) -> None:
+    catalogue = catalogues()[code]
+    known = {m.id if isinstance(m.id, str) else m.id[0]: m for m in catalogue if m.id}
+    assert not keys().keys() - known.keys(), "missing: run make catalogues"
+    assert not known.keys() - keys().keys(), "superfluous: run make catalogues"
+    assert not [key for key, message in known.items() if not translated(message)], "without translation"
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_translation_has_the_values_of_the_sentence_and_all_plural_forms(code: str) -> None:
+    catalogue = catalogues()[code]
+    for message in catalogue:
+        if not message.id:
+            continue
+        every = [message.id] if isinstance(message.id, str) else list(message.id)
+        found = [message.string] if isinstance(message.id, str) else list(message.string)
+        assert len(found) == (1 if isinstance(message.id, str) else catalogue.num_plurals), message.id
+        for text in found:
+            assert set(_PLACE.findall(text)) == set(_PLACE.findall(every[-1])), (message.id, text)
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_the_files_are_those_that_make_catalogues_writes(code: str) -> None:
+    new = updated(catalogues()[code])
+    assert (FOLDER / f"{code}.po").read_bytes() == po_text(new)
+    assert (FOLDER / f"{code}.json").read_text("utf-8") == json_text(new)
+    assert code.replace("_", "-") in available()
+
+
+@cache
+def sources() -> tuple[str, ...]:
+    """The text of the package's modules, without that of the recorded sentences."""
+    return tuple(path.read_text("utf-8") for path in PACKAGE.rglob("*.py") if path.name != "recorded.py")
+
+
+@cache
+def texts() -> str:
+    """The same, with texts of several lines joined."""
+    return re.sub(r'"\s*\n\s*f?"', "", "\n".join(sources()))
+
+
+@cache
+def calls() -> tuple[ast.Call, ...]:
+    """The calls of modules that translate or report, also within f-strings."""
+    used = (text for text in sources() if re.search(r"\b(?:trn?|marked|Event|_?say(?:_event)?)\(", text))
+    return tuple(n for text in used for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Call) and n.args)
+
+
+def called() -> Iterator[str]:
+    """First arguments of `tr`, `trn` and `marked`."""
+    for node in calls():
+        if isinstance(node.func, ast.Name) and node.func.id in ("tr", "trn", "marked"):
+            first = node.args[0]
+            assert isinstance(first, ast.Constant), ast.unparse(node)
+            yield first.value
+
+
+def test_every_call_is_found_by_the_extraction() -> None:
+    python = set(called())
+    script = "\n".join(path.read_text("utf-8") for path in STATIC.glob("*.js") if path.name != "language.js")
+    assert set(re.findall(r"\btrn?\(\s*(.)", script)) == {'"'}, "an argument of tr is not a literal"
+    called_there = set(re.findall(r'\btrn?\(\s*"((?:[^"\\]|\\.)*)"', script))
+    assert len(called_there) > 100
+    assert not (python | called_there) - keys().keys()
+
+
+def kinds() -> set[str]:
+    """The kinds of events that the package writes: first argument of Event(…), say(…) and the like."""
+    found = set()
+    for node in calls():
+        if isinstance(node.args[0], ast.Constant):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            kind = str(node.args[0].value)
+            if name in ("Event", "say", "_say", "say_event") and re.fullmatch("[a-z]+(-[a-z]+)*", kind):
+                found.add(kind)
+    alarms = re.search(r"ALARMS = new Set\(\[(.*?)\]", (STATIC / "events.js").read_text("utf-8"), re.S)
+    assert alarms is not None
+    return found | set(re.findall(r'"([a-z-]+)"', alarms[1]))
+
+
+def test_kinds_parameters_statuses_and_margins_have_names() -> None:
+    shown = {*QUANTITIES, *DIRECTIONS, *WHAT.values(), *EFFECTS.values(), *FITS, *MARGIN_WORDS.values(), *kinds()}
+    for model in (make() for make in MODELS.values()):
+        extended = Extended(
+            model, tuple(e for e in EFFECTS if e in ("lag", "residual compliance", "further mode")), 100.0
+        )
+        shown |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)} | {model.name}
+    shown |= {name.replace("_", " ") for name in MARGINS}
+    assert not shown - keys().keys()
+    assert not set(FITS.values()) - set(SENTENCES)
+
+
+def test_a_template_has_words_of_a_message_that_the_package_writes() -> None:
+    stale = []
+    for template in SENTENCES:
+        parts = [part.split() for part in _PLACE.split(template)]
+        most = min(3, max(1, max(map(len, parts)) - 2))
+        runs = [" ".join(words[i : i + most]) for words in parts for i in range(len(words) - most + 1)]
+        if not any(run.strip(" ,;:.()") in texts() for run in runs):
+            stale.append(template)
+    assert not stale
+
+
+def test_a_name_is_one_that_the_package_writes() -> None:
+    every = texts().replace("_", " ") + "\n".join(path.read_text("utf-8") for path in STATIC.glob("*.js"))
+    derived = {name.replace("_", " ") for make in MODELS.values() for name in make().derived_names}
+    assert not [name for name in NAMES if name not in every and name not in derived]

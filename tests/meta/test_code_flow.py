@@ -1,0 +1,38 @@
+"""The page that follows a batch of samples through the code names what exists, in the order in which it is called."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from pkgutil import resolve_name
+
+import pytest
+
+from livebode.runtime import documents
+from livebode.runtime.run_loop import RunLoop
+
+PAGE = (Path(__file__).parents[2] / "docs" / "explanation" / "code-flow.md").read_text("utf-8")
+NAMES = sorted(set(re.findall(r"`(livebode(?:\.\w+)+)`", PAGE)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_on_the_page_exists(name: str) -> None:
+    resolve_name(name)
+
+
+def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
+    steps = re.findall(r"self\.(?:_recorder\.|_stream\.)?(\w+)\(", inspect.getsource(RunLoop._process))
+    assert steps == [
+        "write_samples", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events", "_check_signals",
+        "announce", "commit",
+    ]  # fmt: skip
+    order = ("number", "split", "monitor", "estimate", "record and publish", "events", "check signals", "commit")
+    places = [PAGE.index(f"| {word} |") for word in order]
+    assert places == sorted(places)
+
+
+def test_every_document_is_on_the_page() -> None:
+    kinds = {kind.__name__ for kind in documents.Document.__args__}  # type: ignore[attr-defined]
+    rows = re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE)
+    assert set(rows) == kinds
