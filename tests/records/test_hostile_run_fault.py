@@ -243,6 +243,18 @@ def test_a_broken_summary_ends_in_a_sentence(tmp_path: Path, runs: dict[str, Pat
                 assert done.code in (0, 2, 3)
 
 
+def test_a_run_without_its_number_of_samples_is_reported(tmp_path: Path, runs: dict[str, Path]) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(runs["piece"], run)
+    (run / "run-copy.json").unlink()
+    whole = json.loads((run / "run.json").read_text())
+    del whole["crc32"]
+    (run / "run.json").write_bytes(to_document(whole | {"counts": whole["counts"] | {"samples": None}}))
+    assert livebode("report", run).code == 0
+    last = Run.open(run).responses().sample[-1]
+    assert f"{last + 1:,}" in (run / "report.html").read_text()
+
+
 def _broken(summary: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     """The summary with one value somewhere in it replaced, or left out."""
     place: Any = summary

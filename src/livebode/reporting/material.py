@@ -83,8 +83,9 @@ class Material:
 
     @property
     def samples(self) -> int:
-        """Number of tracked samples; of an unfinished run, up to its last response."""
-        return int(self.run.summary.get("counts", {}).get("samples", self.of.response.sample + 1))
+        """Number of tracked samples; of a run that does not contain it (unfinished), up to its last response."""
+        counted = self.run.summary.get("counts", {}).get("samples")
+        return int(self.of.response.sample + 1 if counted is None else counted)
 
     @property
     def channels(self) -> dict[str, str]:
