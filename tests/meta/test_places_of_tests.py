@@ -34,7 +34,7 @@ def test_a_test_file_is_named_by_package_subject_and_kind(folder: str) -> None:
         return
     assert folder in PACKAGES | {"examples", "studies"}
     for path in (TESTS / folder).iterdir():
-        assert re.fullmatch(rf"test_[a-z_]+_({'|'.join(KINDS)})\.py|__pycache__", path.name), path
+        assert re.fullmatch(rf"test_[a-z_]+_({'|'.join(KINDS)})\.py|__pycache__|stored", path.name), path
 
 
 def test_what_tests_share_is_in_support_and_not_in_another_test_or_a_program() -> None:

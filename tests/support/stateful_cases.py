@@ -26,9 +26,9 @@ from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, Tensio
 from livebode.sources.live import LiveBlock
 from livebode.sources.live.kernel_drive import KernelDrive
 from livebode.sources.live.position import Origin
-from studies.monitoring_axis import LINES as AXIS_LINES
-from tests.fitting.test_fits_truth import LINES as FITTED
-from tests.fitting.test_fits_truth import TRUTH, noisy
+from tests.support.axes import LINES as AXIS_LINES
+from tests.support.fitted import LINES as FITTED
+from tests.support.fitted import TRUTH, noisy
 from tests.support.monitored import ideal, recorded
 from tests.support.stateful import Case
 
