@@ -53,7 +53,7 @@ def offset(recording: Recording, by: float) -> Recording:
 
 
 @dataclass(frozen=True)
-class Apart:
+class NonOverlappingWindows:
     """One way through float32: |G| against float64 in dB (rows, lines), where, and the error of both in dB."""
 
     db: Floats
@@ -62,7 +62,7 @@ class Apart:
     error64_db: float
 
     @classmethod
-    def of(cls, way: ways.Way, recording: Recording, truth: Local) -> Apart:
+    def of(cls, way: ways.Way, recording: Recording, truth: Local) -> NonOverlappingWindows:
         (single, at), (double, _) = way(recording, dtype="float32"), way(recording)
         errors = (float(rms(error_db(found, truth(at)))) for found in (single, double))
         return cls(decibels(single.value / double.value), at, *errors)
@@ -88,7 +88,7 @@ def measure(short: bool = False) -> Result:
     chosen = dict(list(WAYS.items())[: 2 if short else None])
     found = {
         name: {
-            by: [Apart.of(way, offset(record, by), truth) for record in records]
+            by: [NonOverlappingWindows.of(way, offset(record, by), truth) for record in records]
             for by in offsets
             if way is not ways.by_model or by <= OF_MODEL_MAX
         }
@@ -115,7 +115,7 @@ def measure(short: bool = False) -> Result:
     return Result([Table(caption, header, rows)], verdicts, {"found": found})
 
 
-def judged(found: dict[str, dict[float, list[Apart]]], offsets: list[Recording]) -> list[Verdict]:
+def judged(found: dict[str, dict[float, list[NonOverlappingWindows]]], offsets: list[Recording]) -> list[Verdict]:
     verdicts = []
     for name, each in found.items():
         for by, target in LIMITS_DB.items():

@@ -13,7 +13,15 @@ import numpy as np
 from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.monitoring import DEFAULT_INTERVAL_S, Apart, Rows, Table, TableMonitor, learn_table, places
+from livebode.monitoring import (
+    DEFAULT_INTERVAL_S,
+    NonOverlappingWindows,
+    Rows,
+    Table,
+    TableMonitor,
+    learn_table,
+    places,
+)
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Standstill, TensionLoss
 
 RATE_HZ, WINDOW, START_S = 4000.0, 1000, 30.0
@@ -34,7 +42,7 @@ def rows(seed: int, seconds: float, *faults: TensionLoss) -> tuple[BeltAxis, lis
     )
     tracker = Tracker(SETTINGS)
     whole = Responses.join([tracker.process(b) for b in SimulatedAxis(axis).blocks(["w", "u", "velocity", "x"])])
-    return axis, [Apart(WINDOW, place).of_responses(whole) for place in places(WINDOW, SETTINGS.step)]
+    return axis, [NonOverlappingWindows(WINDOW, place).of_responses(whole) for place in places(WINDOW, SETTINGS.step)]
 
 
 def learned() -> Table:

@@ -227,6 +227,6 @@ def test_the_table_gives_each_choice_with_its_reason(tmp_path):
 def test_the_picture_is_drawn_light_and_dark_for_every_kind(tmp_path):
     for kind in ("odd", "prbs", "stepped"):
         asked = Experiment.read(described(tmp_path, KINDS[kind]))
-        design = choose(asked.wish(), asked.machine(), asked.bearable())
+        design = choose(asked.spec(), asked.machine(), asked.machine_limits())
         for dark in (False, True):
             assert save_excitation_picture(design, tmp_path / f"{kind}{dark}.png", dark=dark).stat().st_size > 20_000

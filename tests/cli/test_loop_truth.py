@@ -57,7 +57,7 @@ def test_a_loop_that_is_described_beside_the_run_is_judged_and_tuned(run: Path) 
     assert "at 4000 Hz:" in done.out
     assert "EXTRAPOLATED" in done.out
     assert "lines alone" in done.out
-    assert livebode("margins", run, "--ms", 1.0).code == 2
+    assert livebode("margins", run, "--max-sensitivity", 1.0).code == 2
 
 
 def test_a_run_with_a_delay_gets_margins_with_it_and_none_where_it_is_held_at_zero(run: Path) -> None:

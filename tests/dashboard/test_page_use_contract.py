@@ -408,7 +408,7 @@ def test_a_late_answer_to_an_earlier_request_does_not_change_the_chosen_axis(
             tab.js(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }}))")
             tab.page.locator("#axis").select_option("1")
             tab.until("page.facts.name === 'other' && bode.curves.measured?.frame.axis === 1")
-            tab.js("new Promise((done) => setTimeout(done, 200))")  # a wish that went astray would be answered by now
+            tab.js("new Promise((done) => setTimeout(done, 200))")  # a stray message would be answered by now
             assert tab.js("[page.axis, page.facts.name]") == [1, "other"]
             tab.page.locator("#axis").select_option("0")
             tab.until("page.facts.name === 'run' && bode.curves.measured?.frame.axis === 0")

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from livebode.core import LivebodeError
-from livebode.dashboard import Dashboard, Serving, asked
+from livebode.dashboard import Dashboard, Serving, queries
 from tests.support.dashboards import Watched
 
 CASES = int(os.environ.get("LIVEBODE_DASHBOARD_FUZZ", "4000"))
@@ -100,7 +100,7 @@ def test_random_messages_are_understood_or_refused() -> None:
     rng, understood = random.Random(1), 0
     for _ in range(CASES):
         with contextlib.suppress(LivebodeError):
-            found = asked.wish(message(rng), axes=2)
+            found = queries.client_message(message(rng), axes=2)
             assert found.axis in (0, 1)
             assert found.time_s is None or abs(found.time_s) <= 1e12
             understood += 1
@@ -116,7 +116,7 @@ def test_random_queries_are_understood_or_refused() -> None:
             if rng.random() < 0.15:
                 query[name] = rng.choice([rng.choice(_WORDS), str(rng.uniform(-1e13, 1e13)), str(rng.randrange(-9, 9))])
         with contextlib.suppress(LivebodeError):
-            found = asked.span(query, axes=2)
+            found = queries.span(query, axes=2)
             assert found.axis in (0, 1)
             assert -1e12 <= found.from_s <= found.to_s <= 1e12
             assert 1 <= found.rows <= 1 << 20
@@ -129,7 +129,7 @@ def test_random_bodies_are_understood_or_refused() -> None:
     for _ in range(CASES):
         data = message(rng).encode("utf-8", "surrogatepass")
         with contextlib.suppress(LivebodeError):
-            axis, event = asked.acknowledged(data, axes=2)
+            axis, event = queries.acknowledged(data, axes=2)
             assert axis in (0, 1)
             assert len(event) <= 64
 

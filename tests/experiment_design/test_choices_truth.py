@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError
 from livebode.estimation.settings import default_hop
-from livebode.experiment_design import Bearable, Wish, belt_machine, choose
+from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose
 from livebode.experiment_design.grid import grid
 from livebode.simulation import BeltAxis, Sensor, Strokes
 from tests.support.errors import refused
@@ -22,7 +22,7 @@ RATE_HZ = 4000.0
 @settings(max_examples=150, deadline=None)
 @given(resolution_hz=st.floats(0.5, 400), kind=st.sampled_from(["multisine", "chirp"]))
 def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divides_it(resolution_hz, kind):
-    lines = grid(Wish(band_hz=(1, 1999), resolution_hz=resolution_hz, kind=kind), RATE_HZ).lines
+    lines = grid(ExperimentSpec(band_hz=(1, 1999), resolution_hz=resolution_hz, kind=kind), RATE_HZ).lines
     apart_hz = lines.resolution_hz * (2 if kind == "multisine" else 1)
     assert resolution_hz / 1.06 - RATE_HZ / lines.window**2 * 2 <= apart_hz <= resolution_hz * (1 + 1e-9)
     if lines.window >= 100:  # of shorter ones none within 5 % need have a divisor near a twentieth
@@ -39,8 +39,8 @@ def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divi
 )
 def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
     def lines(apart_hz):
-        wish = Wish(band_hz=(low, low + width), resolution_hz=apart_hz, kind=kind)
-        return len(grid(wish, RATE_HZ).lines)
+        spec = ExperimentSpec(band_hz=(low, low + width), resolution_hz=apart_hz, kind=kind)
+        return len(grid(spec, RATE_HZ).lines)
 
     try:
         assert lines(resolution_hz) <= 5000
@@ -55,27 +55,27 @@ def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(reso
 @pytest.mark.parametrize("order", [14, 17, 20])
 def test_a_prbs_with_too_many_useful_lines_is_refused_with_an_order_that_passes(order):
     with pytest.raises(GridError) as caught:
-        grid(Wish(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
+        grid(ExperimentSpec(band_hz=(1, 1999), order=order, kind="prbs", held_ticks=1), RATE_HZ)
     assert (caught.value.code, caught.value.lines_max) == ("grid.too-many-lines", 5000)
     named = caught.value.order_max
-    assert len(grid(Wish(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
+    assert len(grid(ExperimentSpec(band_hz=(1, 1999), order=named, kind="prbs", held_ticks=1), RATE_HZ).lines) <= 5000
 
 
 def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_that_passes():
     listed = [1.0, 2.0, 3.0, 2.0, 1.0, 0.5, 0.5]
-    wish = {"lines": "20:140:20", "window": 400, "phases": "schroeder"}
-    design = choose(Wish(**wish, amplitude_n_m=listed), MACHINE)
+    spec = {"lines": "20:140:20", "window": 400, "phases": "schroeder"}
+    design = choose(ExperimentSpec(**spec, amplitude_n_m=listed), MACHINE)
     assert design.plain()["excitation"]["amplitude_n_m"] == listed
     np.testing.assert_allclose(design.waveform.amplitude, listed, rtol=1e-12)
     (row,) = [choice for choice in design.choices if choice.what == "amplitude"]
     assert row.value == "0.5 … 3 N m"
-    limits = Bearable(torque_n_m_max=4.0)
+    limits = MachineLimits(torque_n_m_max=4.0)
     with pytest.raises(DesignError, match="the amplitudes as listed give a torque") as caught:
-        choose(Wish(**wish, amplitude_n_m=listed), MOVING, limits)
+        choose(ExperimentSpec(**spec, amplitude_n_m=listed), MOVING, limits)
     share = caught.value.passing
-    choose(Wish(**wish, amplitude_n_m=[share * a for a in listed]), MOVING, limits)
+    choose(ExperimentSpec(**spec, amplitude_n_m=[share * a for a in listed]), MOVING, limits)
     with refused(DesignError, "limit-exceeded", quantity="torque"):
-        choose(Wish(**wish, amplitude_n_m=[1.01 * share * a for a in listed]), MOVING, limits)
+        choose(ExperimentSpec(**spec, amplitude_n_m=[1.01 * share * a for a in listed]), MOVING, limits)
 
 
 @settings(max_examples=30, deadline=None)
@@ -83,29 +83,29 @@ def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_tha
     step=st.floats(0.01, 0.5), limit=st.floats(2.5, 5.0), kind=st.sampled_from(["multisine", "chirp", "prbs", "odd"]),
 )  # fmt: skip
 def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step, limit, kind):
-    wish = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
-    wish |= {"phases": "schroeder"} if kind == "multisine" else {}
+    spec = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
+    spec |= {"phases": "schroeder"} if kind == "multisine" else {}
     with pytest.raises(DesignError) as caught:
-        choose(Wish(**wish, amplitude_n_m=20.0), MACHINE, Bearable(torque_n_m_max=limit))
+        choose(ExperimentSpec(**spec, amplitude_n_m=20.0), MACHINE, MachineLimits(torque_n_m_max=limit))
     assert caught.value.code == "design.limit-exceeded"
     if caught.value.passing <= 0:
         assert "finer steps of the drive" in caught.value.remedy
         return
-    choose(Wish(**wish, amplitude_n_m=caught.value.passing), MACHINE, Bearable(torque_n_m_max=limit))
+    choose(ExperimentSpec(**spec, amplitude_n_m=caught.value.passing), MACHINE, MachineLimits(torque_n_m_max=limit))
 
 
 def test_the_worst_line_has_the_specified_accuracy():
-    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.3, accuracy=0.02)
-    told = choose(wish, MACHINE).plain()
+    spec = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.3, accuracy=0.02)
+    told = choose(spec, MACHINE).plain()
     bounds = np.sqrt(np.log(20) / told["windows"]) * np.array(told["sigma_relative"])
     np.testing.assert_allclose(told["bound_95_relative"], bounds, rtol=1e-12)
     assert 0.02 * np.sqrt(1 - 1 / told["windows"]) < bounds.max() <= 0.02
 
 
 def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():
-    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05, accuracy=1e-4)
-    design = choose(wish, MACHINE)
+    spec = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05, accuracy=1e-4)
+    design = choose(spec, MACHINE)
     (row,) = [choice for choice in design.choices if choice.what == "recording"]
     reached = float(re.search(r"an hour is enough for (\S+) %", row.why).group(1)) / 100
-    assert choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05,
+    assert choose(ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=0.05,
                        accuracy=1.05 * reached), MACHINE).recording_s <= 3600  # fmt: skip

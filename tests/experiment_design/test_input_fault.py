@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 
 from livebode.core import DesignError, GridError, Lines, LivebodeError, UsageError
 from livebode.excitation import chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, stepped_sine
-from livebode.experiment_design import Bearable, Waveform, Wish, belt_machine, choose, measured_machine, write
+from livebode.experiment_design import (
+    ExperimentSpec,
+    MachineLimits,
+    Waveform,
+    belt_machine,
+    choose,
+    measured_machine,
+    write,
+)
 from livebode.experiment_design.files.c_names import KEYWORDS, identifier
 from livebode.experiments.experiment import Experiment
 from livebode.simulation import BeltAxis, Sensor, Strokes
@@ -22,7 +30,7 @@ FILES = 40
 MACHINE = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.05)))
 MOVING = belt_machine(BeltAxis(motion=Strokes()))
 LINES = Lines.parse("20:140:20", 4000, 400)
-PLAIN = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
+PLAIN = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
 
 
 def refusal(make):
@@ -45,11 +53,13 @@ def refusal(make):
 def test_the_largest_amplitude_that_a_refusal_names_passes_and_a_little_more_does_not(
     amplitude, torque, speed, error_m, moves
 ):
-    limits = Bearable(torque_n_m_max=torque, speed_m_per_s_max=speed, following_error_m_max=error_m)
+    limits = MachineLimits(torque_n_m_max=torque, speed_m_per_s_max=speed, following_error_m_max=error_m)
     machine = MOVING if moves else MACHINE
 
     def design(size):
-        return choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=size), machine, limits)
+        return choose(
+            ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=size), machine, limits
+        )
 
     error = refusal(lambda: design(amplitude))
     if error is not None:
@@ -64,7 +74,7 @@ def test_the_largest_amplitude_that_a_refusal_names_passes_and_a_little_more_doe
 
 def test_a_motion_that_leaves_no_room_is_named_and_not_the_excitation():
     with refused(DesignError, "no-room-in-motion", quantity="torque", limit=-0.5):
-        choose(PLAIN, MOVING, Bearable(torque_n_m_max=0.5))
+        choose(PLAIN, MOVING, MachineLimits(torque_n_m_max=0.5))
 
 
 @settings(max_examples=60, deadline=None)
@@ -75,33 +85,37 @@ def test_a_motion_that_leaves_no_room_is_named_and_not_the_excitation():
 )
 def test_a_band_up_to_the_nyquist_frequency_is_refused(low, width, kind):
     assume(low + width >= 2000)
-    wish = Wish(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0)
+    spec = ExperimentSpec(band_hz=(low, low + width), resolution_hz=10, kind=kind, amplitude_n_m=1.0)
     with refused(GridError, "above-nyquist", high_hz=low + width, rate_hz=4000):
-        choose(wish, MACHINE)
+        choose(spec, MACHINE)
 
 
 @pytest.mark.parametrize("band", [(0.0, 100.0), (-5.0, 100.0), (100.0, 20.0), (float("nan"), 100.0)])
 def test_an_empty_band_is_refused(band):
     with refused(GridError, "band-invalid"):
-        choose(Wish(band_hz=band, resolution_hz=10), MACHINE)
+        choose(ExperimentSpec(band_hz=band, resolution_hz=10), MACHINE)
 
 
 def test_lines_off_or_closer_than_the_grid_are_refused_with_the_nearest_choice():
-    assert "nearest lines are 20 and 30 Hz" in str(refusal(lambda: choose(Wish(lines="20, 25", window=400), MACHINE)))
+    assert "nearest lines are 20 and 30 Hz" in str(
+        refusal(lambda: choose(ExperimentSpec(lines="20, 25", window=400), MACHINE))
+    )
     finest_hz = pytest.approx(2 * 4000 / 2**24)
     with refused(GridError, "window-too-long", resolution_hz_min=finest_hz):
-        choose(Wish(band_hz=(20, 21), resolution_hz=1e-5), MACHINE)
+        choose(ExperimentSpec(band_hz=(20, 21), resolution_hz=1e-5), MACHINE)
     with refused(GridError, "above-nyquist", resolution_hz_max=1600):
-        choose(Wish(band_hz=(20, 1999), resolution_hz=3000), MACHINE)
+        choose(ExperimentSpec(band_hz=(20, 1999), resolution_hz=3000), MACHINE)
     with refused(GridError, "band-without-line", nearest_hz=[30, 50]):
-        choose(Wish(band_hz=(31, 49), resolution_hz=20), MACHINE)
-    assert isinstance(refusal(lambda: choose(Wish(lines="20, 20", window=400), MACHINE)), GridError)
+        choose(ExperimentSpec(band_hz=(31, 49), resolution_hz=20), MACHINE)
+    assert isinstance(refusal(lambda: choose(ExperimentSpec(lines="20, 20", window=400), MACHINE)), GridError)
 
 
 def test_typed_lines_that_no_window_fits_are_refused():
     wild = "20.0001234567, 31.41592653589"
     for lines in (wild, "0.0001"):
-        assert isinstance(refusal(lambda lines=lines: choose(Wish(lines=lines, amplitude_n_m=1.0), MACHINE)), GridError)
+        assert isinstance(
+            refusal(lambda lines=lines: choose(ExperimentSpec(lines=lines, amplitude_n_m=1.0), MACHINE)), GridError
+        )
 
 
 @settings(deadline=None, max_examples=40)
@@ -116,7 +130,7 @@ def test_a_prbs_order_out_of_range_is_refused_with_the_nearest(order):
 
 def test_lines_too_close_for_any_prbs_are_refused():
     with refused(GridError, "window-too-long", order_max=20):
-        choose(Wish(kind="prbs", band_hz=(20, 140), resolution_hz=1e-4), MACHINE)
+        choose(ExperimentSpec(kind="prbs", band_hz=(20, 140), resolution_hz=1e-4), MACHINE)
 
 
 def test_a_line_that_drowns_in_the_rounding_is_refused_and_the_named_step_leaves_it():
@@ -138,18 +152,18 @@ def test_an_amplitude_that_quantises_to_zero_is_refused_and_the_named_step_leave
 
 
 def test_an_experiment_that_the_drive_cannot_resolve_is_refused():
-    wish = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1e-4, resolution_n_m=0.1)
+    spec = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1e-4, resolution_n_m=0.1)
     with refused(DesignError, "rounded-away", step=0.1):
-        choose(wish, MACHINE)
+        choose(spec, MACHINE)
 
 
 def test_a_crest_factor_that_is_not_reached_is_refused_with_the_one_that_is():
-    wish = {"lines": "20:140:20", "window": 400, "amplitude_n_m": 1.0}
-    error = refusal(lambda: choose(Wish(**wish, crest_factor_max=1.2), MACHINE))
+    spec = {"lines": "20:140:20", "window": 400, "amplitude_n_m": 1.0}
+    error = refusal(lambda: choose(ExperimentSpec(**spec, crest_factor_max=1.2), MACHINE))
     assert (error.code, error.crest_factor_max) == ("design.crest-factor-not-reached", 1.2)
     reached = error.crest_factor
-    assert choose(Wish(**wish, crest_factor_max=reached), MACHINE).waveform.crest_factor <= reached
-    other = refusal(lambda: choose(Wish(**wish, phases="schroeder", crest_factor_max=1.5), MACHINE))
+    assert choose(ExperimentSpec(**spec, crest_factor_max=reached), MACHINE).waveform.crest_factor <= reached
+    other = refusal(lambda: choose(ExperimentSpec(**spec, phases="schroeder", crest_factor_max=1.5), MACHINE))
     assert "phases = 'low crest'" in other.remedy
 
 
@@ -225,7 +239,7 @@ WRONG = [
 @pytest.mark.parametrize(("excitation", "code", "argument"), WRONG)
 def test_a_contradictory_specification_is_refused(excitation, code, argument):
     asked = Experiment.of({"excitation": completed(excitation), "belt": {}}, "here")
-    error = refusal(lambda: choose(asked.wish(), MACHINE))
+    error = refusal(lambda: choose(asked.spec(), MACHINE))
     assert (error.code, error.facts.get("argument")) == (code, argument), error
 
 
@@ -243,7 +257,7 @@ def test_a_contradictory_specification_is_refused(excitation, code, argument):
 )
 def test_a_key_of_the_wrong_kind_is_refused_with_what_it_should_be(excitation, words):
     data = {"excitation": completed(excitation), "belt": {}}
-    assert words in str(refusal(lambda: choose(Experiment.of(data, "here").wish(), MACHINE)))
+    assert words in str(refusal(lambda: choose(Experiment.of(data, "here").spec(), MACHINE)))
 
 
 def completed(excitation):
@@ -285,17 +299,17 @@ def completed(excitation):
 def test_a_machine_that_makes_no_sense_is_refused(data, words):
     def read():
         asked = Experiment.of(data, "here")
-        asked.machine(), asked.bearable(), asked.signal_names()
+        asked.machine(), asked.machine_limits(), asked.signal_names()
 
     assert words in str(refusal(read))
 
 
 def test_nothing_known_but_the_lines_is_refused():
     silent = belt_machine(BeltAxis())
-    wish = Wish(lines="20:140:20", window=400, phases="schroeder")
+    spec = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder")
     with refused(DesignError, "amplitude-undetermined"):
-        choose(wish, silent)
-    chosen = choose(wish, silent, Bearable(torque_n_m_max=10))
+        choose(spec, silent)
+    chosen = choose(spec, silent, MachineLimits(torque_n_m_max=10))
     assert 0.5 < max(-p.low for p in chosen.peaks if p.quantity == "torque") < 1.1
     with refused(DesignError, "feedback-unknown"):
         measured_machine(1.0, type(silent.loop)(), 4000.0)
@@ -411,6 +425,6 @@ def test_anything_in_a_file_ends_in_a_design_or_a_sentence(excitation):
 
     def design():
         asked = Experiment.of({"excitation": data, "belt": {}}, "here")
-        choose(asked.wish(), MACHINE, asked.bearable())
+        choose(asked.spec(), MACHINE, asked.machine_limits())
 
     assert "\n" not in str(refusal(design))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from livebode.core import UsageError
 from livebode.excitation import multisine, recognise
-from livebode.experiment_design import Wish, belt_machine, choose
+from livebode.experiment_design import ExperimentSpec, belt_machine, choose
 from livebode.experiment_design.grid import grid
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from tests.support.errors import refused
@@ -23,9 +23,9 @@ RATE_HZ = 4000.0
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.floats(1, 300), st.floats(20, 500), st.sampled_from([2.5, 5.0, 7.0, 10.0, 20.0]), st.integers(0, 2**31))
 def test_a_band_becomes_odd_lines_with_detection_lines_away_from_the_mains(low, width, resolution_hz, seed):
-    wish = Wish(band_hz=(low, low + width), resolution_hz=resolution_hz, seed=seed)
+    spec = ExperimentSpec(band_hz=(low, low + width), resolution_hz=resolution_hz, seed=seed)
     assume(width > 2.5 * resolution_hz)
-    found = grid(wish, RATE_HZ)
+    found = grid(spec, RATE_HZ)
     lines, spacing_hz = found.lines, found.lines.resolution_hz
     assert all(k % 2 for k in lines.bins)
     nearest = [min(abs(f - m * round(f / m)) if f > m / 2 else m - f for m in (50, 60)) for f in lines.frequency_hz]
@@ -40,7 +40,7 @@ def test_a_band_becomes_odd_lines_with_detection_lines_away_from_the_mains(low, 
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(st.sampled_from([200, 400, 500, 800]), st.integers(0, 1000), st.floats(0, 0.3))
 def test_auto_finds_the_period_the_lines_and_the_detection_lines_of_a_design(window, seed, noise):
-    lines = grid(Wish(band_hz=(20, 600), window=window, seed=seed), RATE_HZ).lines
+    lines = grid(ExperimentSpec(band_hz=(20, 600), window=window, seed=seed), RATE_HZ).lines
     assume(gcd(window, *lines.bins) == 1)
     rng = np.random.default_rng(seed)
     played = np.resize(multisine(lines, 1.0, "random", seed=seed), 20 * window + 17)
@@ -50,21 +50,21 @@ def test_auto_finds_the_period_the_lines_and_the_detection_lines_of_a_design(win
 
 def test_lines_at_the_mains_frequency_are_left_out_and_reported():
     machine = belt_machine(BeltAxis(sensor=Sensor(noise_rad_per_s=0.1)))
-    wish = Wish(band_hz=(20, 200), window=400, amplitude_n_m=0.5)
-    avoided = choose(wish, machine)
+    spec = ExperimentSpec(band_hz=(20, 200), window=400, amplitude_n_m=0.5)
+    avoided = choose(spec, machine)
     assert not {50.0, 150.0} & set(avoided.waveform.lines.frequency_hz)
     (row,) = [choice for choice in avoided.choices if choice.what == "mains"]
     assert row.why == "no line at 50, 150 Hz"
-    kept = choose(replace(wish, mains_hz=[], kind="multisine"), machine)
+    kept = choose(replace(spec, mains_hz=[], kind="multisine"), machine)
     assert {50.0, 150.0} <= set(kept.waveform.lines.frequency_hz)
-    given_lines = choose(Wish(lines="20:140:20", window=400, amplitude_n_m=0.5), machine)
+    given_lines = choose(ExperimentSpec(lines="20:140:20", window=400, amplitude_n_m=0.5), machine)
     (row,) = [choice for choice in given_lines.choices if choice.what == "mains"]
     assert row.why == "WARNING: hum adds to the lines at 60, 100, 120 Hz; move them, or refine"
 
 
 def test_the_counts_at_the_encoder_are_those_of_the_simulated_axis():
     axis = BeltAxis(sensor=Sensor(encoder_counts_per_turn=2**12))
-    design = choose(Wish(band_hz=(20, 140), resolution_hz=10, amplitude_n_m=0.2), belt_machine(axis))
+    design = choose(ExperimentSpec(band_hz=(20, 140), resolution_hz=10, amplitude_n_m=0.2), belt_machine(axis))
     exact = replace(axis, sensor=Sensor(), excitation_n_m=design.waveform.samples, seconds=0.4, run_in_s=20.0)
     angle = SimulatedAxis(exact).run()[0]["position"].reshape(2, 800)[1]
     simulated = np.abs(np.fft.rfft(angle)[list(design.waveform.lines.bins)]) / 400 / axis.sensor.encoder_step_rad
@@ -73,14 +73,18 @@ def test_the_counts_at_the_encoder_are_those_of_the_simulated_axis():
     assert row.value.startswith(f"{simulated.min():.2g} counts at ")
     assert "not measurable" in row.why
     moving = choose(
-        Wish(band_hz=(20, 140), resolution_hz=10, amplitude_n_m=0.2), belt_machine(replace(axis, motion=Strokes()))
+        ExperimentSpec(band_hz=(20, 140), resolution_hz=10, amplitude_n_m=0.2),
+        belt_machine(replace(axis, motion=Strokes())),
     )
     (row,) = [choice for choice in moving.choices if choice.what == "encoder"]
     assert "only by the motion" in row.why
-    assert choose(Wish(lines="20", window=400, amplitude_n_m=0.2), belt_machine(BeltAxis())).encoder_counts is None
+    assert (
+        choose(ExperimentSpec(lines="20", window=400, amplitude_n_m=0.2), belt_machine(BeltAxis())).encoder_counts
+        is None
+    )
 
 
 @pytest.mark.parametrize("mains_hz", [[0.0], [float("nan")]])
 def test_mains_that_are_no_frequency_are_refused(mains_hz):
     with refused(UsageError, "out-of-range", argument="mains_hz"):
-        Wish(lines="20", mains_hz=mains_hz)
+        ExperimentSpec(lines="20", mains_hz=mains_hz)

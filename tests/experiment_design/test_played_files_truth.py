@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.core import ConfigError
-from livebode.experiment_design import Bearable, Wish, belt_machine, choose, worst, write
+from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose, worst, write
 from livebode.experiments.experiment import Experiment
 from livebode.records import Run
 from livebode.simulation import BeltAxis, SimulatedAxis, extremes
@@ -32,8 +32,8 @@ rate_hz = 4000
 def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_predicted(resolution_hz, tmp_path):
     """From rest: switched on at once the following error is several times that of the periodic state."""
     axis = BeltAxis()
-    wish = Wish(band_hz=(20, 140), resolution_hz=resolution_hz, amplitude_n_m=1.0)
-    design = choose(wish, belt_machine(axis), Bearable(torque_n_m_max=14.5))
+    spec = ExperimentSpec(band_hz=(20, 140), resolution_hz=resolution_hz, amplitude_n_m=1.0)
+    design = choose(spec, belt_machine(axis), MachineLimits(torque_n_m_max=14.5))
     write(tmp_path / "w.st", design.waveform, "w")
     block = Machine((tmp_path / "w.st").read_text()).instance("FB_w")
     window = len(design.waveform.samples)
@@ -52,7 +52,7 @@ def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_
 
 
 @pytest.mark.parametrize(
-    "wish",
+    "spec",
     [
         {"kind": "chirp", "band_hz": (20, 140), "resolution_hz": 10},
         {"kind": "prbs", "band_hz": (20, 140), "resolution_hz": 20},
@@ -61,11 +61,11 @@ def test_the_function_block_brings_the_excitation_in_within_the_peaks_that_were_
         {"phases": "schroeder", "band_hz": (60, 300), "resolution_hz": 20, "resolution_n_m": 0.3},
     ],
 )
-def test_no_mean_carries_the_axis_beyond_its_peaks_when_the_excitation_is_brought_in(wish):
+def test_no_mean_carries_the_axis_beyond_its_peaks_when_the_excitation_is_brought_in(spec):
     axis = BeltAxis()
-    design = choose(Wish(**wish, amplitude_n_m=1.0), belt_machine(axis), Bearable(torque_n_m_max=14.5))
+    design = choose(ExperimentSpec(**spec, amplitude_n_m=1.0), belt_machine(axis), MachineLimits(torque_n_m_max=14.5))
     samples = design.waveform.samples
-    assert abs(samples.sum()) <= 0.5 * wish.get("resolution_n_m", 1e-9)
+    assert abs(samples.sum()) <= 0.5 * spec.get("resolution_n_m", 1e-9)
     ramp = round(design.ramp_s * RATE_HZ)
     played = np.resize(samples, ramp + 4 * len(samples)) * np.minimum(np.arange(ramp + 4 * len(samples)) / ramp, 1.0)
     found = extremes(axis, played, seconds=(len(played) - 1) / RATE_HZ, run_in_s=0.0)["following error"]
@@ -77,7 +77,9 @@ def runs(tmp_path_factory):
     """One recording of the axis at standstill, tracked as a velocity with its loop and as a position without."""
     folder = tmp_path_factory.mktemp("measured")
     axis = BeltAxis()
-    design = choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0), belt_machine(axis))
+    design = choose(
+        ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0), belt_machine(axis)
+    )
     block, truth = SimulatedAxis(
         replace(axis, excitation_n_m=design.waveform.samples, seconds=3.0, run_in_s=10.0)
     ).run()
@@ -119,7 +121,7 @@ def test_a_design_from_a_run_adopts_the_description_of_the_run(runs):
     for part in ("velocity", "position"):
         assert was["loop"][part].items() <= axis["loop"][part].items()
     told = json.loads(done.out)["predicted"]
-    belt = worst(choose(Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0),
+    belt = worst(choose(ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0),
                         belt_machine(BeltAxis())).peaks)  # fmt: skip
     for name in ("torque", "speed", "following error"):
         assert max(told[name]["high"], -told[name]["low"]) == pytest.approx(belt[name].size, rel=0.05), name

@@ -6,7 +6,16 @@ import pytest
 from livebode.core import Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.experiment_design import Bearable, Wish, accuracy_of, belt_machine, choose, measured_machine, peaks, worst
+from livebode.experiment_design import (
+    ExperimentSpec,
+    MachineLimits,
+    accuracy_of,
+    belt_machine,
+    choose,
+    measured_machine,
+    peaks,
+    worst,
+)
 from livebode.experiment_design.waveform import Waveform
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, extremes
 
@@ -20,9 +29,9 @@ def test_the_room_is_what_the_simulation_leaves():
     """At the largest amplitude that passes, the simulated torque stands at its limit within 10 %."""
     axis = BeltAxis(motion=Strokes(), sensor=NOISE)
     design = choose(
-        Wish(band_hz=(20, 140), resolution_hz=20, accuracy=1e-3),
+        ExperimentSpec(band_hz=(20, 140), resolution_hz=20, accuracy=1e-3),
         belt_machine(axis),
-        Bearable(torque_n_m_max=6.0),
+        MachineLimits(torque_n_m_max=6.0),
     )
     low, high = extremes(axis, design.waveform.samples, alignments=12, seconds=4.0)["torque"]
     # A tenth of the room was kept in reserve.
@@ -39,9 +48,9 @@ def test_sigma_is_that_of_the_tracker_and_the_recording_reaches_the_accuracy():
     The 95 % bound is to hold at every line; with 64 the share of errors within it has a standard deviation of 2.7 %.
     Near the resonance (60 Hz) noise rings from window to window and sigma is up to 1.4 times larger for one window.
     """
-    wish = Wish(lines="20:140:20", window=800, amplitude_n_m=0.5, accuracy=0.05, phases="schroeder")
+    spec = ExperimentSpec(lines="20:140:20", window=800, amplitude_n_m=0.5, accuracy=0.05, phases="schroeder")
     axis = BeltAxis(sensor=NOISE)
-    design = choose(wish, belt_machine(axis))
+    design = choose(spec, belt_machine(axis))
     assert design.windows > 1
     lines = design.waveform.lines
     truth = axis.linear(0.8).sampled(4000).response(lines.frequency_hz)
@@ -60,7 +69,7 @@ def test_sigma_is_that_of_the_tracker_and_the_recording_reaches_the_accuracy():
     assert np.all(np.abs(ratio[calm] - 1) < 0.2), ratio
     assert 0.9 < ratio[~calm][0] < 1.5
     worst_line = int(np.argmax(design.accuracy.relative))
-    within = np.mean(np.abs(np.array(means)) <= wish.accuracy, axis=0)
+    within = np.mean(np.abs(np.array(means)) <= spec.accuracy, axis=0)
     assert within[worst_line] > 0.95 - 3 * 0.027, within
     assert np.all(within > 0.95 - 3 * 0.027), within
 
@@ -87,7 +96,7 @@ def test_a_plant_of_python_control_serves_as_well():
     control = pytest.importorskip("control")
     plant = control.sample_system(control.tf([1.0], [0.005, 0.0]), 1 / 4000, "zoh")
     machine = measured_machine(plant, BeltAxis().drive.loop(), 4000.0)
-    design = choose(Wish(lines="20:140:20", window=400, amplitude_n_m=1.0), machine)
+    design = choose(ExperimentSpec(lines="20:140:20", window=400, amplitude_n_m=1.0), machine)
     torque = worst(design.peaks)["torque"]
     f = LINES.frequency_hz
     z = np.exp(2j * np.pi * f / 4000)
@@ -100,8 +109,9 @@ def test_a_plant_of_python_control_serves_as_well():
 
 def test_an_equal_snr_makes_every_line_equally_accurate():
     design = choose(
-        Wish(lines="20:140:20", window=400, shape="equal snr", accuracy=0.05), belt_machine(BeltAxis(sensor=NOISE))
+        ExperimentSpec(lines="20:140:20", window=400, shape="equal snr", accuracy=0.05),
+        belt_machine(BeltAxis(sensor=NOISE)),
     )
     np.testing.assert_allclose(design.accuracy.relative, design.accuracy.relative[0], rtol=1e-9)
-    flat = choose(Wish(lines="20:140:20", window=400, accuracy=0.05), belt_machine(BeltAxis(sensor=NOISE)))
+    flat = choose(ExperimentSpec(lines="20:140:20", window=400, accuracy=0.05), belt_machine(BeltAxis(sensor=NOISE)))
     assert design.waveform.rms < flat.waveform.rms

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from livebode.core import DesignError, UsageError
-from livebode.experiment_design import QUANTITIES, Bearable, Wish, choose, measured_machine
+from livebode.experiment_design import QUANTITIES, ExperimentSpec, MachineLimits, choose, measured_machine
 from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.simulation import BeltAxis
 from tests.support.errors import refused
 
 AXIS = BeltAxis()
 PLANT, LOOP = AXIS.linear(0.8).sampled(4000), AXIS.drive.loop()
-WISH = Wish(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
+WISH = ExperimentSpec(lines="20:140:20", window=400, phases="schroeder", amplitude_n_m=1.0)
 MOTION = {
     "torque": (-2.0, 1.5),
     "speed": (-0.4, 0.4),
@@ -36,13 +36,13 @@ def machine(motion, stroke_s=4.0):
 def test_a_limit_on_an_unknown_part_of_the_motion_is_refused_and_without_it_the_table_notes_it(name):
     known = {key: value for key, value in MOTION.items() if key != name}
     with refused(DesignError, "motion-unknown", quantity=name, key=f"measured.{MOTION_KEYS[name]}"):
-        choose(WISH, machine(known), Bearable(**LIMIT[name]))
+        choose(WISH, machine(known), MachineLimits(**LIMIT[name]))
     others = {key: value for other in known for key, value in LIMIT[other].items()}
-    design = choose(WISH, machine(known), Bearable(**others))
+    design = choose(WISH, machine(known), MachineLimits(**others))
     (row,) = [choice for choice in design.choices if choice.what == f"peak {name}"]
     assert "the peak of the motion alone is not specified" in row.why
     assert design.plain()["predicted"][name]["motion_alone"] is None
-    whole = choose(WISH, machine(MOTION), Bearable(**LIMIT[name]))
+    whole = choose(WISH, machine(MOTION), MachineLimits(**LIMIT[name]))
     excited = design.plain()["predicted"][name]
     told = whole.plain()["predicted"][name]
     assert told["low"] == pytest.approx(excited["low"] + MOTION[name][0])
@@ -52,11 +52,11 @@ def test_a_limit_on_an_unknown_part_of_the_motion_is_refused_and_without_it_the_
 def test_an_axis_at_standstill_has_no_motion_but_an_unknown_position():
     standing = machine({}, stroke_s=None)
     limits = {key: value for name in ("torque", "speed", "following error") for key, value in LIMIT[name].items()}
-    told = choose(WISH, standing, Bearable(**limits)).plain()["predicted"]
+    told = choose(WISH, standing, MachineLimits(**limits)).plain()["predicted"]
     assert [told[name]["motion_alone"] for name in ("torque", "speed", "following error")] == [(0.0, 0.0)] * 3
     with refused(DesignError, "motion-unknown", quantity="travel"):
-        choose(WISH, standing, Bearable(position_m_max=1.8))
-    choose(WISH, machine({"travel": (0.8, 0.8)}, stroke_s=None), Bearable(position_m_max=1.8))
+        choose(WISH, standing, MachineLimits(position_m_max=1.8))
+    choose(WISH, machine({"travel": (0.8, 0.8)}, stroke_s=None), MachineLimits(position_m_max=1.8))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from tests.support.errors import refused
 
 def read(data):
     asked = Experiment.of(data, "here")
-    asked.machine(), asked.bearable(), asked.signal_names()
+    asked.machine(), asked.machine_limits(), asked.signal_names()
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def test_the_end_of_the_program_is_no_fault_within_pyuff(tmp_path: Path) -> None
 def test_formats_held_in_memory_refuse_more_values_than_their_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("livebode.export.written.VALUES_MAX", 100)
+    monkeypatch.setattr("livebode.export.result.VALUES_MAX", 100)
     parts = [made(10, LINES), made(10, LINES)]
     for write, name in ((write_mat, "mat"), (write_netcdf, "netcdf")):
         with refused(OutputError, "too-large", format=name, limit=100):

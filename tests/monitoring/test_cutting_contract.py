@@ -10,7 +10,7 @@ import pytest
 
 from livebode.core import BaselineError, Block, UsageError
 from livebode.estimation import Settings, Tracker
-from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
+from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.simulation import TensionLoss
 from tests.support.axes import LINES
 from tests.support.errors import refused
@@ -24,7 +24,7 @@ FAULT = TensionLoss(start_s=6.0, loss=0.03)
 def baseline(by_model: bool) -> Baseline:
     responses = Tracker(SETTINGS).process(recorded((0.3,) * 12, seed=40))
     at = places(LINES.window, SETTINGS.step)
-    rows = [Apart(LINES.window, place).of_responses(responses) for place in at]
+    rows = [NonOverlappingWindows(LINES.window, place).of_responses(responses) for place in at]
     table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], rows, len(at))
     return Baseline(
         LINES, SETTINGS.step, signals_of(SETTINGS), "joint", "plant", (table,), machine() if by_model else None

@@ -10,7 +10,7 @@ import pytest
 
 from livebode.core import BaselineError, Block, Event
 from livebode.estimation import Settings, Tracker
-from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
+from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.simulation import Fault, SimulatedAxis, Strokes, TensionLoss
 from tests.support.axes import LINES
 from tests.support.errors import refused
@@ -31,7 +31,7 @@ def recorded(seed: int, seconds: float, *faults: Fault) -> Block:
 def baseline(hop: int) -> Baseline:
     settings, at = replace(SETTINGS, hop=hop), places(LINES.window, hop)
     responses = Tracker(settings).process(recorded(1, LEARNED_S))
-    rows = [Apart(max(LINES.window, hop), place).of_responses(responses) for place in at]
+    rows = [NonOverlappingWindows(max(LINES.window, hop), place).of_responses(responses) for place in at]
     table = learn_table("lines", [f"{f:g} Hz" for f in LINES.frequency_hz], rows, len(at))
     return Baseline(LINES, hop, signals_of(settings), "joint", "plant", (table,), None)
 

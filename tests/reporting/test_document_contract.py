@@ -149,7 +149,7 @@ def test_pages_are_numbered_and_sections_are_in_the_outline(tmp_path: Path) -> N
     for i, (page, text) in enumerate(zip(reader.pages, texts), 1):
         assert f"{i} / {len(reader.pages)}" in text
         assert [float(side) for side in page.mediabox[2:]] == pytest.approx([595.28, 841.89], abs=0.1)
-    assert [entry["/Title"] for entry in reader.outline] == [document.asked, *(s.title for s in document.sections)]
+    assert [entry["/Title"] for entry in reader.outline] == [document.heading, *(s.title for s in document.sections)]
 
 
 def test_the_report_of_an_unfinished_run_states_that_it_is_unfinished(tmp_path: Path) -> None:

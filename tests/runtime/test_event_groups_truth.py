@@ -19,7 +19,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.records import Run
 from livebode.records.grouped_events import each_event, event_counts, event_rows
 from livebode.records.query import query
-from livebode.reporting.happenings import EventSummary
+from livebode.reporting.event_summary import EventSummary
 from livebode.runtime import Document
 from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
 from tests.support.runs import record

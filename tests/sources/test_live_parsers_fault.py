@@ -32,8 +32,8 @@ from livebode.sources.live.address import parse_address
 from livebode.sources.live.framing import FRAME_BYTES_MAX, HEADER, FrameSplitter
 from livebode.sources.live.lines import LineSplitter
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder, encode_line
-from livebode.sources.live.said import Said
 from livebode.sources.live.settings import check_keys
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_frame import read_spectra_text, spectra_text
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
@@ -63,7 +63,7 @@ def test_damaged_frames_give_batches_or_a_sentence():
         encode_samples(batch(), double=True),
         encode_layout([Channel("ä" * 50, "°")], 1.0),
     ]
-    decoder, sequencer = FrameDecoder(), Sequencer(Said())
+    decoder, sequencer = FrameDecoder(), Sequencer(SourceEvents())
     decoder.decode(seeds[0])
     decoded = 0
     for _ in range(CASES):
@@ -80,7 +80,7 @@ def test_damaged_frames_give_batches_or_a_sentence():
             sequencer.push(found)  # a hostile batch that is well formed must not harm the stream either
     assert decoded > CASES // 100
     assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
-    assert len(sequencer._waiting) + len(sequencer._doubts._doubted) < 64
+    assert len(sequencer._waiting) + len(sequencer._unconfirmed._batches) < 64
 
 
 SPECTRA = SpectraLayout(CHANNELS, (Channel("x", "m"),), 400, 20, (2, 4), (3,), (0.5, 0.0), (False, True))
@@ -96,7 +96,7 @@ def spectra(first: int = 400, many: int = 3) -> SpectraBatch:
 def test_damaged_frames_of_spectra_give_batches_or_a_sentence():
     rng = random.Random(7)
     layout = encode_spectra_layout(SPECTRA, 4000.0, epoch=5)
-    decoder, sequencer = FrameDecoder(), Sequencer(Said(), reorder=0)
+    decoder, sequencer = FrameDecoder(), Sequencer(SourceEvents(), reorder=0)
     decoder.decode(layout)
     decoder.decode(encode_layout(CHANNELS, 4000.0))
     sequencer.push(spectra(340))
@@ -128,7 +128,7 @@ def test_damaged_frames_of_spectra_give_batches_or_a_sentence():
     assert decoded > CASES // 100
     assert tracked > CASES // 100
     assert len(decoder._layouts) <= FrameDecoder.LAYOUTS_MAX
-    assert len(sequencer._waiting) + len(sequencer._doubts._doubted) < 64
+    assert len(sequencer._waiting) + len(sequencer._unconfirmed._batches) < 64
 
 
 def test_damaged_texts_of_spectra_give_a_layout_or_a_sentence():

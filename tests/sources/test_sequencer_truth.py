@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from livebode.core import Channel
 from livebode.sources.live import Batch, LiveBlock, Position, Sequencer
 from livebode.sources.live.computer_clock import ClockReading, pause
-from livebode.sources.live.said import BURST, Said
+from livebode.sources.live.source_events import BURST, SourceEvents
 from tests.support.displaced import displaced
 
 CHANNELS = (Channel("w", "N m"), Channel("y", "rad/s"))
@@ -37,8 +37,8 @@ def stream(lengths: list[int], first: int = 0, epoch: int = 1, stamp_s: float | 
     ]
 
 
-def passed(batches: list[Batch], said: Said | None = None, **options: int) -> list[LiveBlock]:
-    sequencer = Sequencer(said or Said(), **options)
+def passed(batches: list[Batch], events: SourceEvents | None = None, **options: int) -> list[LiveBlock]:
+    sequencer = Sequencer(events or SourceEvents(), **options)
     return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
 
 
@@ -59,17 +59,17 @@ def test_reordering_within_the_bound_and_repeats_change_nothing(lengths, first, 
     for _ in range(data.draw(st.integers(0, 20))):
         again = data.draw(st.integers(0, len(order) - 1))
         order.insert(data.draw(st.integers(again, len(order))), order[again])
-    said = Said()
-    blocks = passed(order, said, reorder=bound)
+    events = SourceEvents()
+    blocks = passed(order, events, reorder=bound)
     assert content(blocks) == content(passed(batches, reorder=bound))
     assert [b.start for b in blocks] == [b.first_sample - first for b in batches]
-    assert said.counts["repeat"] == len(order) - len(batches)
-    assert said.counts["loss"] == said.counts["restart"] == said.counts["foreign"] == 0
+    assert events.counts["repeat"] == len(order) - len(batches)
+    assert events.counts["loss"] == events.counts["restart"] == events.counts["foreign"] == 0
     latest, late = -1, 0
     for at in dict.fromkeys(b.first_sample for b in order):
         late += at < latest
         latest = max(latest, at)
-    assert said.counts["reordered"] == late
+    assert events.counts["reordered"] == late
 
 
 @settings(deadline=None)
@@ -82,12 +82,12 @@ def test_lost_batches_are_exactly_the_gaps(lengths, bound, data):
     batches = stream(lengths, 7)
     lost = data.draw(st.sets(st.integers(1, len(batches) - 2)))
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
-    said = Said()
-    blocks = passed(displaced(kept, bound, data), said, reorder=bound)
+    events = SourceEvents()
+    blocks = passed(displaced(kept, bound, data), events, reorder=bound)
     truth = [(b.first_sample - 7, b.data.tobytes()) for b in kept]
     assert [(b.start, b.data.tobytes()) for b in blocks] == truth
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
-    events = [event for event in said.take() if event.kind == "loss"]
+    events = [event for event in events.take() if event.kind == "loss"]
     missing = [b.first_sample - a.stop for a, b in pairwise(kept) if a.stop != b.first_sample]
     assert [event.details["missing_samples"] for event in events] == missing
     assert [event.sample for event in events] == [b.start for b in blocks if b.gap]
@@ -108,7 +108,7 @@ def test_any_overlapping_batches_give_correct_ascending_samples(pieces, bound):
 
 def test_a_missing_batch_is_waited_for_no_longer_than_its_time():
     a, _, c = stream([4, 4, 4])
-    sequencer = Sequencer(Said(), reorder=8, wait_s=1.0)
+    sequencer = Sequencer(SourceEvents(), reorder=8, wait_s=1.0)
     assert sequencer.push(a) == []
     assert len(sequencer.poll(1.1)) == 1
     assert sequencer.push(replace(c, arrived_s=2.0)) == []
@@ -122,30 +122,30 @@ def test_a_missing_batch_is_waited_for_no_longer_than_its_time():
 def test_a_restart_is_a_gap_of_unknown_length_and_loses_nothing(epoch, reorder):
     """With a new epoch at once; without one when the numbers begin anew far enough back."""
     old, new = stream([100] * 5000, 1000), stream([100] * 20, 0, epoch)
-    said = Said()
-    blocks = passed(old + new, said, reorder=reorder)
+    events = SourceEvents()
+    blocks = passed(old + new, events, reorder=reorder)
     assert np.array_equal(np.concatenate([b.data[0] for b in blocks[5000:]]), np.arange(2000))
     assert [b.gap for b in blocks[4999:5002]] == [False, True, False]
     assert [b.start for b in blocks[4999:5002]] == [499_900, 500_000, 500_100]
-    assert said.counts["restart"] == 1
-    assert said.counts["loss"] == said.counts["repeat"] == said.counts["clock-jump"] == 0
+    assert events.counts["restart"] == 1
+    assert events.counts["loss"] == events.counts["repeat"] == events.counts["clock-jump"] == 0
 
 
 def test_a_restart_soon_after_the_start_without_an_epoch():
-    said = Said()
-    blocks = passed(stream([10] * 100) + stream([10] * 100), said)
-    assert [block.gap for block in blocks].count(True) == said.counts["restart"] == 1
+    events = SourceEvents()
+    blocks = passed(stream([10] * 100) + stream([10] * 100), events)
+    assert [block.gap for block in blocks].count(True) == events.counts["restart"] == 1
     assert sum(map(len, blocks)) == 2000
-    assert said.counts["repeat"] == 0
+    assert events.counts["repeat"] == 0
 
 
 def test_a_second_sender_is_dropped_and_named_while_the_first_one_sends():
     a, b = stream([10] * 50, 0, 1), stream([10] * 50, 0, 2)
-    said = Said()
-    blocks = passed([batch for pair in zip(a, b) for batch in pair], said, reorder=0)
+    events = SourceEvents()
+    blocks = passed([batch for pair in zip(a, b) for batch in pair], events, reorder=0)
     assert content(blocks) == content(passed(a, reorder=0))
-    assert (said.counts["restart"], said.counts["foreign"]) == (0, 50)
-    assert said.take()[0].details == {"epoch": "0x2", "sender_sample": 0}
+    assert (events.counts["restart"], events.counts["foreign"]) == (0, 50)
+    assert events.take()[0].details == {"epoch": "0x2", "sender_sample": 0}
 
 
 @settings(deadline=None)
@@ -153,14 +153,14 @@ def test_a_second_sender_is_dropped_and_named_while_the_first_one_sends():
 def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strange, at):
     """It is trusted again, with its own numbers: all but what the other one's samples stand for is there, in time."""
     good = stream([10] * 100, 1000, 1)
-    said = Said()
-    blocks = passed(good[:at] + stream([10] * strange, 7, 2) + good[at:], said, reorder=reorder)
+    events = SourceEvents()
+    blocks = passed(good[:at] + stream([10] * strange, 7, 2) + good[at:], events, reorder=reorder)
     mine = [block for block in blocks if block.origin.epoch == 1]
     found = np.concatenate([block.data[0] for block in mine])
     assert np.array_equal(found, np.concatenate([np.arange(block.start, block.stop) for block in mine]) + 1000)
     assert found[-1] == 1999
     assert len(found) == 1000 - 10 * strange
-    back = [event for event in said.take() if event.kind == "restart"]
+    back = [event for event in events.take() if event.kind == "restart"]
     assert [event.details["epoch"] for event in back] == ["0x2", "0x1"]
     assert back[1].details["lost_samples"] == 10 * strange
     assert "set its address in source.sender" in back[1].message
@@ -171,22 +171,22 @@ def test_two_batches_of_another_epoch_do_not_lock_the_sender_out(reorder, strang
 def test_batches_half_an_hour_ahead_are_rejected_while_the_stream_continues(reorder, strange, at):
     good = stream([10] * 60, 1000)
     ahead = stream([10] * strange, 1000 + int(1800 * RATE_HZ))
-    said = Said()
-    blocks = passed(good[:at] + ahead + good[at:], said, reorder=reorder)
+    events = SourceEvents()
+    blocks = passed(good[:at] + ahead + good[at:], events, reorder=reorder)
     assert content(blocks) == content(passed(good, reorder=reorder))
-    assert {kind: count for kind, count in said.counts.items() if count} == {"foreign": strange}
+    assert {kind: count for kind, count in events.counts.items() if count} == {"foreign": strange}
 
 
 @pytest.mark.parametrize("reorder", [0, 8])
 def test_a_real_jump_of_half_an_hour_is_a_loss_of_exactly_so_long(reorder):
     jump = int(1800 * RATE_HZ)
     a, b = stream([10] * 40, 1000), stream([10] * 40, 1400 + jump)
-    said = Said()
-    blocks = passed(a + b, said, reorder=reorder)
+    events = SourceEvents()
+    blocks = passed(a + b, events, reorder=reorder)
     assert np.array_equal(
         np.concatenate([block.data[0] for block in blocks]), np.r_[1000:1400, 1400 + jump : 1800 + jump]
     )
-    (event,) = said.take()
+    (event,) = events.take()
     assert (event.kind, event.details["missing_samples"], event.sample) == ("loss", jump, 400 + jump)
 
 
@@ -196,8 +196,8 @@ def left_at(sample: int, number: int, epoch: int, away_s: float) -> Position:
     return Position(sample, epoch, number, RATE_HZ, ClockReading(now.unix_s - away_s, now.uptime_s - away_s, now.boot))
 
 
-def resumed(position: Position, batches: list[Batch], said: Said, **options: int) -> list[LiveBlock]:
-    sequencer = Sequencer(said, **options)
+def resumed(position: Position, batches: list[Batch], events: SourceEvents, **options: int) -> list[LiveBlock]:
+    sequencer = Sequencer(events, **options)
     sequencer.resume(position)
     return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
 
@@ -211,23 +211,23 @@ def test_a_stream_continues_by_the_numbers_of_the_sender_whatever_the_clock(epoc
     batches = stream([10] * (again // 10 + 40), 105_000 + missing - again if missing == 0 else 105_000 + missing, epoch)
     if epoch == 0 and missing == 0:
         batches = batches[again // 10 :]
-    said = Said()
-    blocks = resumed(position, batches, said, reorder=reorder)
+    events = SourceEvents()
+    blocks = resumed(position, batches, events, reorder=reorder)
     number = np.concatenate([np.arange(block.start, block.stop) for block in blocks])
     assert np.array_equal(np.concatenate([block.data[0] for block in blocks]), number + 100_000)
     assert number[0] == 5000 + missing
-    losses = [event.details["missing_samples"] for event in said.take() if event.kind == "loss"]
+    losses = [event.details["missing_samples"] for event in events.take() if event.kind == "loss"]
     assert losses == ([missing] if missing else [])
-    assert said.counts["restart"] == 0
+    assert events.counts["restart"] == 0
 
 
 @pytest.mark.parametrize("epoch", [0, 2])
 def test_the_gap_of_a_restarted_sender_is_estimated_by_the_computers_clock(epoch):
     position = left_at(5000, 905_000, 0 if epoch == 0 else 1, 20.0)
-    said = Said()
-    blocks = resumed(position, stream([10] * 60, 0, epoch), said, reorder=0)
+    events = SourceEvents()
+    blocks = resumed(position, stream([10] * 60, 0, epoch), events, reorder=0)
     assert (blocks[0].start, blocks[0].gap) == (5000 + 20 * RATE_HZ - 10, True)
-    (event,) = said.take()
+    (event,) = events.take()
     assert event.kind == "restart"
     assert "which is an estimate" in event.message
     assert event.details["estimated_samples"] == 20 * RATE_HZ - 10
@@ -235,10 +235,10 @@ def test_the_gap_of_a_restarted_sender_is_estimated_by_the_computers_clock(epoch
 
 def test_numbers_of_a_sender_without_epoch_that_the_clock_contradicts_are_a_restart():
     """It cannot have sent five minutes in 20 s."""
-    said = Said()
-    blocks = resumed(left_at(5000, 105_000, 0, 20.0), stream([10] * 40, 1_305_000, 0), said, reorder=0)
+    events = SourceEvents()
+    blocks = resumed(left_at(5000, 105_000, 0, 20.0), stream([10] * 40, 1_305_000, 0), events, reorder=0)
     assert blocks[0].start == 5000 + 20 * RATE_HZ - 10
-    assert said.counts["restart"] == 1
+    assert events.counts["restart"] == 1
 
 
 YEARS = 10 * 365 * 86400.0
@@ -257,16 +257,16 @@ def test_a_computer_clock_that_is_wrong_is_not_used_and_named(step_s, boot):
 def test_one_stray_batch_far_away_does_not_derail_the_stream():
     batches = stream([10] * 50)
     stray = stream([10], 10**15)
-    said = Said()
-    blocks = passed(batches[:20] + stray + batches[20:], said, reorder=3)
+    events = SourceEvents()
+    blocks = passed(batches[:20] + stray + batches[20:], events, reorder=3)
     assert content(blocks) == content(passed(batches, reorder=3))
-    assert said.counts["foreign"] == 1
+    assert events.counts["foreign"] == 1
 
 
 def counts_of(batches: list[Batch], **options: float) -> dict[str, int]:
-    said = Said()
-    passed(batches, said, **options)
-    return {kind: count for kind, count in said.counts.items() if count}
+    events = SourceEvents()
+    passed(batches, events, **options)
+    return {kind: count for kind, count in events.counts.items() if count}
 
 
 def test_each_fault_of_a_stream_is_counted_as_its_own_kind():
@@ -297,9 +297,9 @@ def test_a_rate_that_is_a_little_wrong_shows_after_ten_seconds():
     jitter = rng.normal(scale=1e-3, size=200)
     assert counts_of([replace(b, stamp_s=b.stamp_s + e) for b, e in zip(batches, jitter)]) == {}
     off = [replace(b, stamp_s=1e9 + b.first_sample / 4010 + e) for b, e in zip(batches, jitter)]
-    said = Said()
-    passed(off, said)
-    (event,) = said.take()
+    events = SourceEvents()
+    passed(off, events)
+    (event,) = events.take()
     assert event.kind == "wrong-rate"
     assert event.details["measured_hz"] == pytest.approx(4010, abs=1)
 
@@ -311,21 +311,21 @@ def test_changed_layouts_that_still_hold_the_channels_are_taken_by_name():
         replace(b, channels=wider, data=np.vstack([b.data[1], b.data[0], b.data[0] * 0])) if i >= 10 else b
         for i, b in enumerate(good)
     ]
-    said = Said()
-    assert content(passed(changed, said)) == content(passed(good))
-    assert [event.kind for event in said.take()] == ["layout-changed"]
+    events = SourceEvents()
+    assert content(passed(changed, events)) == content(passed(good))
+    assert [event.kind for event in events.take()] == ["layout-changed"]
 
 
 def test_a_flood_of_events_is_counted_and_held_back():
     now = [0.0]
-    said = Said(lambda: now[0])
+    events = SourceEvents(lambda: now[0])
     for _ in range(100_000):
-        said.say("malformed", "x" * 100_000)
-    events = said.take()
-    assert len(events) == BURST
-    assert max(len(event.message) for event in events) <= 500
+        events.report("malformed", "x" * 100_000)
+    found = events.take()
+    assert len(found) == BURST
+    assert max(len(event.message) for event in found) <= 500
     now[0] = 1.0
-    said.say("malformed", "y")
-    (event,) = said.take()
+    events.report("malformed", "y")
+    (event,) = events.take()
     assert event.details["more"] == 100_000 - BURST
-    assert said.counts["malformed"] == 100_001
+    assert events.counts["malformed"] == 100_001

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from livebode.core import Channel, SpectraLayout
 from livebode.sources.live import Batch, Sequencer, SpectraBatch
-from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import JUMP_S
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import LiveSpectra
 from tests.support.displaced import displaced
 
@@ -37,7 +37,7 @@ def made(what: SpectraLayout, a: int, b: int, epoch: int = 1) -> SpectraBatch:
     return SpectraBatch(a * what.hop, sums, number[np.newaxis], state, what, RATE_HZ, epoch, arrived_s=0.0)
 
 
-def passed(batches: list[SpectraBatch | Batch], said: Said, reorder: int) -> list[LiveSpectra]:
+def passed(batches: list[SpectraBatch | Batch], said: SourceEvents, reorder: int) -> list[LiveSpectra]:
     sequencer = Sequencer(said, reorder=reorder)
     return [block for batch in batches for block in sequencer.push(batch)] + sequencer.finish()
 
@@ -59,7 +59,7 @@ def test_lost_batches_are_exactly_the_gaps_and_phases_are_unchanged(hop, lengths
     kept = [batch for i, batch in enumerate(batches) if i not in lost]
     # A longer jump is believed only when more batches follow it (tests/sources/test_sequencer_truth.py).
     assume(max(b.first_sample - a.stop for a, b in pairwise(kept)) <= JUMP_S * RATE_HZ)
-    said = Said()
+    said = SourceEvents()
     blocks = passed(displaced(kept, bound, data), said, bound)
     assert [block.start for block in blocks] == [batch.first_sample - first * hop for batch in kept]
     assert [b.gap for b in blocks] == [False, *(a.stop != b.first_sample for a, b in pairwise(kept))]
@@ -78,7 +78,7 @@ def test_lost_batches_are_exactly_the_gaps_and_phases_are_unchanged(hop, lengths
 @given(hops, st.lists(st.tuples(st.integers(0, 60), st.integers(1, 9)), min_size=1, max_size=31), st.integers(0, 8))
 def test_any_overlapping_batches_give_correct_ascending_spectra(hop, pieces, bound):
     """Batches that overlap, repeat and leave holes as they like: what comes out is at its place, once."""
-    blocks = passed([stream(hop, [length], first)[0] for first, length in pieces], Said(), bound)
+    blocks = passed([stream(hop, [length], first)[0] for first, length in pieces], SourceEvents(), bound)
     numbers = np.concatenate([block.sums[0, :, 0].real for block in blocks])
     places = np.concatenate([block.sample for block in blocks])
     assert np.all(np.diff(places) > 0)
@@ -88,7 +88,7 @@ def test_any_overlapping_batches_give_correct_ascending_spectra(hop, pieces, bou
 
 
 def test_a_restart_is_a_gap_and_keeps_the_grid_of_hops():
-    said = Said()
+    said = SourceEvents()
     blocks = passed(stream(20, [1] * 50, 1000) + stream(20, [1] * 10, 0, epoch=2), said, 4)
     assert [block.gap for block in blocks[49:52]] == [False, True, False]
     assert [block.start for block in blocks[49:52]] == [980, 1000, 1020]
@@ -99,7 +99,7 @@ def test_a_restart_is_a_gap_and_keeps_the_grid_of_hops():
 def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_reported_once():
     given_, samples = stream(20, [1] * 12), Batch(40, np.zeros((2, 20)), SIGNALS, RATE_HZ, 1, arrived_s=0.0)
     other = made(layout(20, lines=(2, 6)), 4, 5)
-    said = Said()
+    said = SourceEvents()
     blocks = passed([*given_[:4], samples, samples, other, other, *given_[4:]], said, 0)
     assert [block.start for block in blocks] == list(range(0, 240, 20))
     messages = [event.message for event in said.take() if event.kind == "layout-changed"]
@@ -108,14 +108,14 @@ def test_samples_and_other_layouts_in_a_stream_of_spectra_are_left_out_and_repor
         "the sender now sends spectra of another layout; they are skipped until the first layout is back",
     ]
     # The other way round.
-    said = Said()
+    said = SourceEvents()
     begun = [replace(samples, first_sample=at) for at in (0, 20)]
     assert len(passed([begun[0], given_[1], begun[1]], said, 0)) == 2
     assert [e.message[:31] for e in said.take()] == ["the sender now sends spectra; t"]
 
 
 def test_a_changed_rate_is_reported():
-    said = Said()
+    said = SourceEvents()
     first, second = stream(20, [1, 1])
     assert len(passed([first, replace(second, rate_hz=8000.0)], said, 0)) == 1
     assert said.counts["wrong-rate"] == 1

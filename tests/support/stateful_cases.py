@@ -15,7 +15,7 @@ from livebode.core import Block, Channel, Event, Lines, Responses, Spectra, Spec
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.excitation import multisine
 from livebode.fitting import Fitter, Grid, TwoMass
-from livebode.monitoring import Apart, Baseline, Monitor, learn_table, places, signals_of
+from livebode.monitoring import Baseline, Monitor, NonOverlappingWindows, learn_table, places, signals_of
 from livebode.motion import MotionCorrection
 from livebode.preparation.checks import ChannelCheck
 from livebode.runtime.change_detection import ChangeDetection
@@ -146,7 +146,7 @@ def baseline(by_model: bool) -> Baseline:
     value = 1.0 + 0.01 * (rng.standard_normal((400, len(lines))) + 1j * rng.standard_normal((400, len(lines))))
     found = Responses.join([plain_responses(value)])
     at = places(lines.window, MONITORED.step)
-    parts = [Apart(lines.window, place).of_responses(found) for place in at]
+    parts = [NonOverlappingWindows(lines.window, place).of_responses(found) for place in at]
     table = learn_table("lines", [f"{f:g} Hz" for f in lines.frequency_hz], parts, len(at))
     return Baseline(
         lines, MONITORED.step, signals_of(MONITORED), "joint", "plant", (table,), ideal() if by_model else None

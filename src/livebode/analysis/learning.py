@@ -11,7 +11,16 @@ from livebode.configuration.axis import Axis, FitSection
 from livebode.configuration.fit_settings import fitter_of
 from livebode.configuration.recorded import recorded_configuration
 from livebode.core import BaselineError, Block, LivebodeError
-from livebode.monitoring import Apart, Baseline, Machine, Rows, Table, learn_machine, learn_table, places
+from livebode.monitoring import (
+    Baseline,
+    Machine,
+    NonOverlappingWindows,
+    Rows,
+    Table,
+    learn_machine,
+    learn_table,
+    places,
+)
 from livebode.records import Run
 from livebode.sources import open_log
 
@@ -136,9 +145,9 @@ def _check_same(first: Run, mine: Axis, run: Run, axis: Axis) -> None:
             )
 
 
-def _apart(run: Run) -> list[Apart]:
+def _apart(run: Run) -> list[NonOverlappingWindows]:
     window, hop = run.lines.window, run.found["hop"]
-    return [Apart(max(window, hop), place) for place in places(window, hop)]
+    return [NonOverlappingWindows(max(window, hop), place) for place in places(window, hop)]
 
 
 def _rows(run: Run) -> list[Rows]:

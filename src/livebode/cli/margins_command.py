@@ -29,7 +29,7 @@ def margins_command(
     radius: Annotated[
         float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
     ] = None,
-    ms: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
+    max_sensitivity: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
 ) -> None:
     """Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.
@@ -42,7 +42,7 @@ def margins_command(
 
     given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
     section = FitSection.model_validate(given) if given else None
-    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), ms)
+    found = loop_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity)
     picture = save_loop_picture(found, directory, title=directory.name)
     if as_json:
         print(to_json(found.plain()))

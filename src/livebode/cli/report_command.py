@@ -34,7 +34,7 @@ def report_command(
     from livebode.core.clock import RunClock, moments_by
     from livebode.language import in_language
     from livebode.records import Run, to_json
-    from livebode.reporting.material import Judged
+    from livebode.reporting.report_data import Judged
     from livebode.reporting.run_report import run_report
 
     judged = None
@@ -46,7 +46,7 @@ def report_command(
         section = FitSection.model_validate(recorded_configuration(Run.open(directory).summary).get("fit", {}))
         found, notes = validate_run(directory, on, [section])
         judged = Judged(on.name, tuple(found), tuple(notes))
-    with moments_by(RunClock.of(Run.open(directory, told=lambda _: None).summary)), in_language(language):
+    with moments_by(RunClock.of(Run.open(directory, on_damage=lambda _: None).summary)), in_language(language):
         document = run_report(directory, judged, made=datetime.now(UTC))
         files, remark = write_documents(document, out or directory / "report", force=force or out is None)
     if as_json:

@@ -91,7 +91,7 @@ class Document:
         In the order of reading.
     foot
         Printed at the end, and at the foot of each page of a PDF.
-    asked
+    heading
         Heading of the verdict.
     tones
         The verdict that is printed for each tone, so that it is legible without colours.
@@ -103,5 +103,5 @@ class Document:
     verdict: tuple[Finding, ...]
     sections: tuple[Section, ...]
     foot: str = ""
-    asked: str = ""
+    heading: str = ""
     tones: Mapping[str, str] = field(default_factory=lambda: TONES)

@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket
 
 from livebode import export
 from livebode.core import LivebodeError, Responses, ServerError
-from livebode.dashboard import asked
+from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S
 from livebode.dashboard.board import Board
 from livebode.dashboard.client import Client
@@ -68,7 +68,7 @@ class _Pages:
 
     async def login(self, request: Request) -> Response:
         data = await body(request)
-        token = None if data is None else asked.plain(data).get("token")
+        token = None if data is None else queries.plain(data).get("token")
         if not isinstance(token, str):
             raise ServerError("request-malformed", "the login has no token", "send an object with the text token")
         session = self._board.access.login(token, _address(request))
@@ -99,7 +99,7 @@ class _Pages:
         """Rows of a span of time."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        span, past = asked.span(request.query_params, len(self._board.states)), Past.of(state)
+        span, past = queries.span(request.query_params, len(self._board.states)), Past.of(state)
         found = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
         return Response(frame("history", span.axis, _as(state, found, span)), media_type="application/octet-stream")
 
@@ -107,7 +107,7 @@ class _Pages:
         """The response nearest to a time, with its overlays."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        span = asked.span(request.query_params, len(self._board.states))
+        span = queries.span(request.query_params, len(self._board.states))
         found = await self._board.elsewhere(Past.of(state).at, span.from_s)
         data = state.frames_of("moment", found, span.quantity)
         return Response(data, media_type="application/octet-stream")
@@ -116,7 +116,7 @@ class _Pages:
         """Responses of a span of time as a file; a single response if the span has no length."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        span, past = asked.span(request.query_params, len(self._board.states)), Past.of(state)
+        span, past = queries.span(request.query_params, len(self._board.states)), Past.of(state)
 
         def write() -> Path:
             parts = past.all_between(span.from_s, span.to_s) if span.to_s > span.from_s else [past.at(span.from_s)]
@@ -148,7 +148,7 @@ class _Pages:
                 "the acknowledgement is not a short JSON object",
                 "send it with the type application/json",
             )
-        axis, event = asked.acknowledged(data, len(self._board.states))
+        axis, event = queries.acknowledged(data, len(self._board.states))
         self._board.acknowledge(axis, event)
         return JSONResponse({}, 202)
 
@@ -185,7 +185,7 @@ class _Pages:
         """The state of the axis of a query, if its run has started; None without access."""
         if self._role(request) is None:
             return None
-        state = self._board.states[asked.span(request.query_params, len(self._board.states)).axis]
+        state = self._board.states[queries.span(request.query_params, len(self._board.states)).axis]
         state.refresh()
         if state.quantities is None:
             raise ServerError("not-begun", "the run has not begun", "wait for its first samples")
@@ -202,7 +202,7 @@ def _files() -> dict[str, tuple[bytes, str]]:
     return found
 
 
-def _as(state: State, responses: Responses, span: asked.Span) -> Responses:
+def _as(state: State, responses: Responses, span: queries.Span) -> Responses:
     assert state.quantities is not None
     return state.quantities.of_responses(responses, span.quantity)
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from livebode.core import LivebodeError, Responses, ServerError
-from livebode.dashboard.asked import Wish, wish
 from livebode.dashboard.frames import frame
 from livebode.dashboard.past import Past
+from livebode.dashboard.queries import ClientMessage, client_message
 from livebode.records import to_json
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Client:
 
     def __init__(self, board: Board, socket: WebSocket, role: str) -> None:
         self._board, self._socket, self._role = board, socket, role
-        self._watched = Wish("watch")
+        self._watched = ClientMessage("watch")
         self._anew = True
         self._paused = False
         self._displaced = asyncio.Event()
@@ -82,11 +82,11 @@ class Client:
             try:
                 if text is None:
                     raise ServerError("request-malformed", "a message is text, not bytes", "send text")
-                await self._heed(wish(text, len(self._board.states)))
+                await self._heed(client_message(text, len(self._board.states)))
             except (LivebodeError, KeyError) as error:
                 await self._tell({"error": str(error)})
 
-    async def _heed(self, asked: Wish) -> None:
+    async def _heed(self, asked: ClientMessage) -> None:
         if asked.kind == "watch":
             state = self._board.states[asked.axis]
             if asked.quantity and state.quantities is not None:

@@ -78,7 +78,7 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
     experiment = False
     if run_path is not None:
         try:
-            run = Run.open(run_path, told=lambda _: None)
+            run = Run.open(run_path, on_damage=lambda _: None)
             if configuration is None:
                 axes = {"": Axis.of(recorded_configuration(run.summary), str(run_path))}
         except LivebodeError as error:
@@ -100,8 +100,8 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
 
 def _check_experiment(path: Path) -> None:
     found = Experiment.read(path)
-    found.wish()
-    found.bearable()
+    found.spec()
+    found.machine_limits()
     found.signal_names()
 
 

@@ -160,7 +160,7 @@ class RepeatingErrors(StatefulBase):
         elif self._whole:
             with np.errstate(all="ignore"):
                 gone = self._take(block.channels)
-            self._tell(sample, block.origin_s + sample / block.rate_hz, gone)
+            self._report(sample, block.origin_s + sample / block.rate_hz, gone)
         self._samples[:, 0] = self._samples[:, -1]
         self._at, self._whole = 0, True
 
@@ -235,7 +235,7 @@ class RepeatingErrors(StatefulBase):
         velocity = unit.endswith("/s") or not unit
         return self._step * (np.abs(1 - 1 / lines.z) if velocity else np.ones(len(lines)))
 
-    def _tell(self, sample: int, time_s: float, gone: NDArray[np.bool_]) -> None:
+    def _report(self, sample: int, time_s: float, gone: NDArray[np.bool_]) -> None:
         for at in np.flatnonzero(gone & self._told[_HUM]):
             self._told[_HUM, at] = False
             f = self._settings.lines.frequency_hz[at]

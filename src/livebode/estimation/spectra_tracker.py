@@ -22,20 +22,20 @@ from livebode.core import (
     UsageError,
     ignore,
 )
-from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import Rows, after
 from livebode.estimation.spectra_watch import SpectraWatch
+from livebode.estimation.stream_estimator import StreamEstimator
 
 Floats = NDArray[np.float64]
 
 _NONE = np.zeros(0, dtype=np.intp)
 
 
-class SpectraTracker(AroundLines[SpectraWatch]):
+class SpectraTracker(StreamEstimator[SpectraWatch]):
     """Frequency responses of a machine whose drive runs the kernel and sends the spectra: a Tracker without its kernel.
 
     With a kernel of the same precision the Responses equal those of a Tracker from the samples. The effective time of

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Event, SignalError, Spectra, Stage
-from livebode.estimation.counted import Counted
+from livebode.estimation.stream_counters import StreamCounters
 
 _KINDS = {
     "not-whole": "a window is incomplete (marked by the drive, or its sums are not finite)",
@@ -15,7 +15,7 @@ _KINDS = {
 }
 
 
-class SpectraWatch(Counted):
+class SpectraWatch(StreamCounters):
     """Counts and Events of a stream of Spectra. One Event for marked windows that overlap or follow each other."""
 
     _stage = Stage("spectra-counts", 1)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, ignore
-from livebode.estimation.around_lines import AroundLines
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
@@ -16,10 +15,11 @@ from livebode.estimation.ripple import RippleSpeed, ripple_power
 from livebode.estimation.settings import Settings
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.spikes import SpikeGate
+from livebode.estimation.stream_estimator import StreamEstimator
 from livebode.estimation.watch import Watch
 
 
-class Tracker(AroundLines[Watch]):
+class Tracker(StreamEstimator[Watch]):
     """Frequency responses of a machine in closed loop, sample by sample, from a sliding DFT at excited lines.
 
     The Responses do not depend on how the samples are cut into Blocks, and a restored Tracker continues as if it had

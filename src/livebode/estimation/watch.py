@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Block, Event, SignalError, Stage
-from livebode.estimation.counted import Counted
 from livebode.estimation.spectra import Rows
+from livebode.estimation.stream_counters import StreamCounters
 
 _KINDS = {
     "non-finite": "a sample is not finite",
@@ -15,7 +15,7 @@ _KINDS = {
 }
 
 
-class Watch(Counted):
+class Watch(StreamCounters):
     """Counts and Events of a stream of Blocks."""
 
     _stage = Stage("sample-counts", 1)
@@ -43,7 +43,9 @@ class Watch(Counted):
             self.counts["gaps"] += 1
             self.counts["missing"] += missing
             many = f"{missing} samples are" if missing else "an unknown number of samples is"
-            self._say("gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing)
+            self._exclude(
+                "gap", block, block.start, f"{many} missing before sample {block.start}", missing_samples=missing
+            )
         return first or gap
 
     def take(self, block: Block, rows: Rows) -> None:
@@ -59,8 +61,8 @@ class Watch(Counted):
             self._last[kind] = int(number[-1])
             new += [(int(sample), kind) for sample in number[apart]]
         for sample, kind in sorted(new):
-            self._say(kind, block, sample, _KINDS[kind])
+            self._exclude(kind, block, sample, _KINDS[kind])
 
-    def _say(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
+    def _exclude(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
         message = f"{what}; responses are invalid until a window of {self._window} samples is complete again"
         self._report(kind, block, sample, message, **details)

@@ -6,27 +6,27 @@ from livebode.experiment_design.belt import belt_machine
 from livebode.experiment_design.choose import Design, choose
 from livebode.experiment_design.explain import Choice
 from livebode.experiment_design.files import FORMATS, write
-from livebode.experiment_design.limits import Bearable
+from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import QUANTITIES, UNITS, Machine, Place
 from livebode.experiment_design.measured import MeasuredResponse, measured_machine
 from livebode.experiment_design.peaks import Peak, peaks, worst
+from livebode.experiment_design.spec import ExperimentSpec
 from livebode.experiment_design.waveform import Waveform
-from livebode.experiment_design.wish import Wish
 
 __all__ = [
     "FORMATS",
     "QUANTITIES",
     "UNITS",
     "Accuracy",
-    "Bearable",
     "Choice",
     "Design",
+    "ExperimentSpec",
     "Machine",
+    "MachineLimits",
     "MeasuredResponse",
     "Peak",
     "Place",
     "Waveform",
-    "Wish",
     "accuracy_of",
     "axis_text",
     "belt_machine",

@@ -14,12 +14,12 @@ from livebode.experiment_design.accuracy import Accuracy, Floats, accuracy_of
 from livebode.experiment_design.encoder import encoder_counts
 from livebode.experiment_design.explain import Choice, explained
 from livebode.experiment_design.grid import grid
-from livebode.experiment_design.limits import Bearable, beyond, check_known, room
+from livebode.experiment_design.limits import MachineLimits, beyond, check_known, room
 from livebode.experiment_design.machine import UNITS, Machine
 from livebode.experiment_design.make import REACHED, unit_waveform
 from livebode.experiment_design.peaks import Peak, peaks, worst
+from livebode.experiment_design.spec import ExperimentSpec
 from livebode.experiment_design.waveform import Waveform
-from livebode.experiment_design.wish import Wish
 
 # Of the room that the limits leave: reserve for errors of the prediction.
 _RESERVE = 0.1
@@ -45,7 +45,7 @@ class Design:
     limits, peaks
         Limits of the machine, and the predicted peaks at each place.
     accuracy, windows
-        Accuracy of one window, and the number of windows that brings every line's 95 % bound within `wish.accuracy`.
+        Accuracy of one window, and the number of windows that brings every line's 95 % bound within `spec.accuracy`.
     recording_s
         Recording time for that.
     hop
@@ -54,11 +54,11 @@ class Design:
         All of it as rows of a table.
     """
 
-    wish: Wish
+    spec: ExperimentSpec
     machine: Machine
     waveform: Waveform
     amplitude_n_m: float | list[float]
-    limits: Bearable
+    limits: MachineLimits
     peaks: tuple[Peak, ...]
     accuracy: Accuracy
     windows: int
@@ -109,7 +109,7 @@ class Design:
         }
 
 
-def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Design:
+def choose(spec: ExperimentSpec, machine: Machine, limits: MachineLimits | None = None) -> Design:
     """The experiment for a specification: lines and window by the resolution, amplitude by accuracy and limits.
 
     Raises
@@ -118,20 +118,20 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         If a limit would be exceeded (with the largest amplitude that passes), the grid has no such lines, a crest
         factor is not reached, or the excitation vanishes in the drive's steps.
     """
-    limits = limits or Bearable()
+    limits = limits or MachineLimits()
     check_known(machine, limits)
-    found = grid(wish, machine.rate_hz)
-    unit = unit_waveform(wish, found, machine)
+    found = grid(spec, machine.rate_hz)
+    unit = unit_waveform(spec, found, machine)
     of_unit = peaks(unit, machine)  # rejected where it has power outside of the known band of the machine
-    factor, why = _factor(wish, unit, of_unit, machine, limits)
-    waveform = _played(wish, unit, factor)
+    factor, why = _factor(spec, unit, of_unit, machine, limits)
+    waveform = _played(spec, unit, factor)
     predicted = peaks(waveform, machine)
     share, first = room(predicted, limits)
     if share < 1 and first is not None:
-        passing = _passing(wish, unit, factor, share, machine, limits)
-        raise beyond(first, limits, share, None if wish.listed else factor, passing)
+        passing = _passing(spec, unit, factor, share, machine, limits)
+        raise beyond(first, limits, share, None if spec.listed else factor, passing)
     accuracy = accuracy_of(waveform, machine)
-    windows = accuracy.windows(wish.accuracy)
+    windows = accuracy.windows(spec.accuracy)
     ramp_s = ceil(_RAMP_S * machine.rate_hz / waveform.lines.window) * waveform.lines.window / machine.rate_hz
     waveform = replace(waveform, about={**waveform.about, "ramp_s": ramp_s})
     recording_s, recording_why = _recording(waveform, machine, windows)
@@ -139,10 +139,10 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
         in_time = max(1, int(windows * _LONG_S / recording_s))
         recording_why += f"; an hour is enough for {100 * accuracy.reached(in_time).max():.2g} %"
     design = Design(
-        wish=wish,
+        spec=spec,
         machine=machine,
         waveform=waveform,
-        amplitude_n_m=wish.listed or factor,
+        amplitude_n_m=spec.listed or factor,
         limits=limits,
         peaks=predicted,
         accuracy=accuracy,
@@ -154,25 +154,27 @@ def choose(wish: Wish, machine: Machine, limits: Bearable | None = None) -> Desi
     return replace(design, choices=explained(design, found, why, recording_why))
 
 
-def _played(wish: Wish, unit: Waveform, factor: float) -> Waveform:
+def _played(spec: ExperimentSpec, unit: Waveform, factor: float) -> Waveform:
     """The waveform as the drive plays it."""
-    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": wish.listed or factor})
-    if wish.resolution_n_m is None:
+    waveform = replace(unit.scaled(factor), about={**unit.about, "amplitude_n_m": spec.listed or factor})
+    if spec.resolution_n_m is None:
         return waveform
-    waveform = waveform.quantised(wish.resolution_n_m)
-    if wish.crest_factor_max is not None and waveform.crest_factor > wish.crest_factor_max * (1 + REACHED):
+    waveform = waveform.quantised(spec.resolution_n_m)
+    if spec.crest_factor_max is not None and waveform.crest_factor > spec.crest_factor_max * (1 + REACHED):
         raise DesignError(
             "crest-factor-not-reached",
-            f"rounding to steps of {wish.resolution_n_m:g} N m gives a crest factor "
-            f"of {waveform.crest_factor:.4f}, above {wish.crest_factor_max:g}",
+            f"rounding to steps of {spec.resolution_n_m:g} N m gives a crest factor "
+            f"of {waveform.crest_factor:.4f}, above {spec.crest_factor_max:g}",
             f"allow {waveform.crest_factor + 5e-4:.3f}, or take finer steps",
             crest_factor=waveform.crest_factor,
-            crest_factor_max=wish.crest_factor_max,
+            crest_factor_max=spec.crest_factor_max,
         )
     return waveform
 
 
-def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: Machine, limits: Bearable) -> float:
+def _passing(
+    spec: ExperimentSpec, unit: Waveform, factor: float, share: float, machine: Machine, limits: MachineLimits
+) -> float:
     """A factor near the largest whose excitation is within the limits, in four digits; 0 where there is none.
 
     `share` is the room at the factor that is not. Rounding to the drive's steps is not linear: a factor predicted from
@@ -183,7 +185,7 @@ def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: M
             break
         factor = rounded_down(factor * min(share, 1 - 1e-3))
         try:
-            share, _ = room(peaks(_played(wish, unit, factor), machine), limits)
+            share, _ = room(peaks(_played(spec, unit, factor), machine), limits)
         except DesignError:  # too small for the steps
             break
         if share >= 1:
@@ -192,15 +194,15 @@ def _passing(wish: Wish, unit: Waveform, factor: float, share: float, machine: M
 
 
 def _factor(
-    wish: Wish, unit: Waveform, of_unit: tuple[Peak, ...], machine: Machine, limits: Bearable
+    spec: ExperimentSpec, unit: Waveform, of_unit: tuple[Peak, ...], machine: Machine, limits: MachineLimits
 ) -> tuple[float, str]:
     """Factor of the unit waveform, and the reason."""
-    if wish.amplitude_n_m is not None:
-        return (1.0 if wish.listed else float(np.asarray(wish.amplitude_n_m))), "as given"
+    if spec.amplitude_n_m is not None:
+        return (1.0 if spec.listed else float(np.asarray(spec.amplitude_n_m))), "as given"
     largest, first = room(of_unit, limits)
     if first is not None and largest <= 0:
         raise beyond(first, limits, largest, None, 0.0)
-    needed = accuracy_of(unit, machine).factor_for(wish.accuracy)
+    needed = accuracy_of(unit, machine).factor_for(spec.accuracy)
     allowed = largest * (1 - _RESERVE)
     if needed == 0:
         if largest == inf:
@@ -212,8 +214,8 @@ def _factor(
             )
         return largest * _WITHOUT_NOISE, "a tenth of the room within the limits, because the noise is not known"
     if needed <= allowed:
-        rounded = "" if wish.resolution_n_m is None else ", before rounding"
-        return needed, f"the smallest for {100 * wish.accuracy:g} % at every line in one window{rounded}"
+        rounded = "" if spec.resolution_n_m is None else ", before rounding"
+        return needed, f"the smallest for {100 * spec.accuracy:g} % at every line in one window{rounded}"
     assert first is not None
     return allowed, f"the largest within the {first.quantity} limit, less {100 * _RESERVE:g} %"
 

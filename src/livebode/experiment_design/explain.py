@@ -11,7 +11,7 @@ import numpy as np
 from livebode.core import counted
 from livebode.experiment_design.encoder import encoder_words
 from livebode.experiment_design.grid import Grid
-from livebode.experiment_design.limits import Bearable
+from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Quantity
 from livebode.experiment_design.mains import mains_words
 from livebode.experiment_design.peaks import Peak, worst
@@ -43,7 +43,7 @@ def explained(design: Design, found: Grid, amplitude_why: str, recording_why: st
     weakest = int(np.argmax(bound))
     rows = [
         Choice("lines", f"{len(f)}, {f[0]:g} … {f[-1]:g} Hz, {spacing}", found.lines_why),
-        Choice("mains", _listed_hz(design.wish.mains_hz), mains_words(lines, design.wish.mains_hz, found.mains)),
+        Choice("mains", _listed_hz(design.spec.mains_hz), mains_words(lines, design.spec.mains_hz, found.mains)),
         Choice("window", f"{lines.window} samples, {1000 * window_s:.4g} ms", found.window_why),
         Choice("amplitude", _amplitude(design), amplitude_why),
         Choice(
@@ -84,7 +84,7 @@ def _amplitude(design: Design) -> str:
     return f"{amplitude:.4g} N m" + ", rms of the lines" * (design.waveform.about.get("shape") == "equal snr")
 
 
-def _limit_row(peak: Peak, limits: Bearable) -> Choice:
+def _limit_row(peak: Peak, limits: MachineLimits) -> Choice:
     """The peak with its limit, and the peak of the motion alone."""
     low, high = limits.of(peak.quantity)
     borne = "no limit"

@@ -14,7 +14,7 @@ from livebode.estimation.settings import default_hop
 from livebode.excitation import check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode.excitation.prbs import ORDER_MAX, ORDER_MIN
 from livebode.experiment_design.mains import meets_mains
-from livebode.experiment_design.wish import Wish
+from livebode.experiment_design.spec import ExperimentSpec
 
 _PERIODS = 4  # of each line of a stepped sine: the first of them is its transient
 _QUIET_BETWEEN = 2  # bins from line to line, so that one between them shows the noise
@@ -40,7 +40,7 @@ class Grid:
     mains: tuple[int, ...] = ()  # bins of the band that are not used because of the mains
 
 
-def grid(wish: Wish, rate_hz: float) -> Grid:
+def grid(spec: ExperimentSpec, rate_hz: float) -> Grid:
     """The lines and the window of a specification.
 
     Raises
@@ -49,21 +49,21 @@ def grid(wish: Wish, rate_hz: float) -> Grid:
         If the band is not below the Nyquist frequency, the lines are closer than any window resolves or more than
         5,000, or given lines are off the grid of a given window; the message has the nearest choice.
     """
-    found = _found(wish, rate_hz)
+    found = _found(spec, rate_hz)
     if len(found.lines) > _LINES_MAX:
-        raise _too_many(wish, found.lines)
+        raise _too_many(spec, found.lines)
     return found
 
 
-def _too_many(wish: Wish, lines: Lines) -> GridError:
+def _too_many(spec: ExperimentSpec, lines: Lines) -> GridError:
     """The error with the order, or the resolution, that gives few enough lines."""
     f, many = lines.frequency_hz, len(lines)
     facts: dict[str, float] = {}
-    if wish.order is not None:
-        order = wish.order - ceil(log2(many / _LINES_MAX))
+    if spec.order is not None:
+        order = spec.order - ceil(log2(many / _LINES_MAX))
         facts["order_max"], fewer = order, f"take order {order}"
     else:  # the period of a PRBS is rounded up to a power of two
-        finest_hz = ceil(1000 * (2 if wish.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)) / 1000
+        finest_hz = ceil(1000 * (2 if spec.kind == "prbs" else 1) * (f[-1] - f[0]) / (_LINES_MAX - 1)) / 1000
         facts["resolution_hz_min"], fewer = finest_hz, f"take lines {finest_hz:g} Hz or more apart"
     return GridError(
         "too-many-lines",
@@ -75,38 +75,38 @@ def _too_many(wish: Wish, lines: Lines) -> GridError:
     )
 
 
-def _found(wish: Wish, rate_hz: float) -> Grid:
-    if wish.lines is not None:
-        return _stepped(wish, _of_text(wish, wish.lines, rate_hz))
-    assert wish.band_hz is not None
-    low, high = wish.band_hz
+def _found(spec: ExperimentSpec, rate_hz: float) -> Grid:
+    if spec.lines is not None:
+        return _stepped(spec, _of_text(spec, spec.lines, rate_hz))
+    assert spec.band_hz is not None
+    low, high = spec.band_hz
     check_band(low, high, rate_hz)
-    if wish.kind == "prbs":
-        return _prbs(wish, low, high, rate_hz)
-    if wish.window is not None:
-        check_window(wish.window, rate_hz)
-    apart = 1 if wish.kind in ("chirp", "stepped") else _QUIET_BETWEEN
-    window, why = (wish.window, "as given") if wish.window else _window(wish.resolution_hz or 0.0, apart, rate_hz)
-    if wish.kind == "chirp":
+    if spec.kind == "prbs":
+        return _prbs(spec, low, high, rate_hz)
+    if spec.window is not None:
+        check_window(spec.window, rate_hz)
+    apart = 1 if spec.kind in ("chirp", "stepped") else _QUIET_BETWEEN
+    window, why = (spec.window, "as given") if spec.window else _window(spec.resolution_hz or 0.0, apart, rate_hz)
+    if spec.kind == "chirp":
         return Grid(chirp_lines(low, high, rate_hz, window), why, "every bin of the band")
-    if wish.kind == "stepped":
+    if spec.kind == "stepped":
         first, last = ceil(low * window / rate_hz - 1e-9), floor(high * window / rate_hz + 1e-9)
         bins = [k for k in range(max(first, 1), last + 1) if 2 * k < window]
         if not bins:
             raise _no_line(low, high, 1, window, rate_hz)
-        bins, mains = _without_mains(wish, bins, rate_hz / window)
-        return _stepped(wish, Grid(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
-    return _odd(wish, low, high, window, rate_hz, why)
+        bins, mains = _without_mains(spec, bins, rate_hz / window)
+        return _stepped(spec, Grid(Lines.of_bins(bins, window, rate_hz), why, "the band's bins", mains=mains))
+    return _odd(spec, low, high, window, rate_hz, why)
 
 
-def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: str) -> Grid:
+def _odd(spec: ExperimentSpec, low: float, high: float, window: int, rate_hz: float, why: str) -> Grid:
     """Odd bins: with even bins only, the excitation would repeat after half the window."""
     all_odd = odd_bins(low, high, rate_hz, window).tolist()
     if not all_odd:
         raise _no_line(low, high, _QUIET_BETWEEN, window, rate_hz)
-    bins, mains = _without_mains(wish, all_odd, rate_hz / window)
-    if wish.kind == "odd" and len(bins) >= _GROUP:
-        lines = odd_lines(low, high, rate_hz, window, group=_GROUP, seed=wish.seed, without=mains)
+    bins, mains = _without_mains(spec, all_odd, rate_hz / window)
+    if spec.kind == "odd" and len(bins) >= _GROUP:
+        lines = odd_lines(low, high, rate_hz, window, group=_GROUP, seed=spec.seed, without=mains)
         words = (
             "odd bins, one in four of them not excited, at random: noise and distortion show there and at the even ones"
         )
@@ -115,9 +115,9 @@ def _odd(wish: Wish, low: float, high: float, window: int, rate_hz: float, why: 
     return Grid(Lines.of_bins(bins, window, rate_hz), why, words, mains=mains)
 
 
-def _without_mains(wish: Wish, bins: list[int], resolution_hz: float) -> tuple[list[int], tuple[int, ...]]:
+def _without_mains(spec: ExperimentSpec, bins: list[int], resolution_hz: float) -> tuple[list[int], tuple[int, ...]]:
     """The bins away from the mains, and the excluded ones; all bins where more than half would be excluded."""
-    met = meets_mains(bins, resolution_hz, wish.mains_hz)
+    met = meets_mains(bins, resolution_hz, spec.mains_hz)
     left = [k for k, near in zip(bins, met) if not near]
     return (left, tuple(k for k, near in zip(bins, met) if near)) if 2 * len(left) >= len(bins) else (bins, ())
 
@@ -141,10 +141,10 @@ def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -
     )
 
 
-def _stepped(wish: Wish, found: Grid) -> Grid:
-    if wish.kind != "stepped":
+def _stepped(spec: ExperimentSpec, found: Grid) -> Grid:
+    if spec.kind != "stepped":
         return found
-    steps, periods = len(found.lines), wish.periods or _PERIODS
+    steps, periods = len(found.lines), spec.periods or _PERIODS
     whole = stepped_lines(found.lines, periods=periods)
     why = f"{counted(steps, 'step')} of {counted(periods, 'period')} of {found.lines.window} samples"
     return Grid(whole, why, found.lines_why, base=found.lines, periods=periods)
@@ -181,9 +181,9 @@ def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]
     return shortest, why
 
 
-def _of_text(wish: Wish, text: str, rate_hz: float) -> Grid:
-    if wish.window is not None:
-        return Grid(Lines.parse(text, rate_hz, wish.window), "as given", "as given")
+def _of_text(spec: ExperimentSpec, text: str, rate_hz: float) -> Grid:
+    if spec.window is not None:
+        return Grid(Lines.parse(text, rate_hz, spec.window), "as given", "as given")
     if "k=" in text:
         raise GridError(
             "window-missing",
@@ -218,20 +218,20 @@ def _numbers(item: str) -> list[str]:
     return parts if len(parts) != 3 else [parts[0], parts[2]]
 
 
-def _prbs(wish: Wish, low: float, high: float, rate_hz: float) -> Grid:
-    held = wish.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
-    order = wish.order
+def _prbs(spec: ExperimentSpec, low: float, high: float, rate_hz: float) -> Grid:
+    held = spec.held_ticks or max(1, int(rate_hz / (_BITS_PER_PERIOD * high)))
+    order = spec.order
     if order is None:
-        bits = rate_hz / (wish.resolution_hz or 1.0) / held
+        bits = rate_hz / (spec.resolution_hz or 1.0) / held
         order = max(ORDER_MIN, ceil(np.log2(bits + 1) - 1e-9))
         if order > ORDER_MAX:
             finest = rate_hz / held / (2**ORDER_MAX - 1)
             raise GridError(
                 "window-too-long",
-                f"lines {wish.resolution_hz:g} Hz apart need a PRBS of order {order}, above {ORDER_MAX}",
+                f"lines {spec.resolution_hz:g} Hz apart need a PRBS of order {order}, above {ORDER_MAX}",
                 f"take {finest:.3g} Hz or more",
                 argument="resolution_hz",
-                resolution_hz=wish.resolution_hz,
+                resolution_hz=spec.resolution_hz,
                 order=order,
                 order_max=ORDER_MAX,
                 resolution_hz_min=finest,

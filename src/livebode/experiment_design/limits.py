@@ -11,7 +11,7 @@ from livebode.experiment_design.peaks import Peak
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bearable:
+class MachineLimits:
     """Limits of motor, mechanics and drive; an omitted quantity is not limited.
 
     Parameters
@@ -70,7 +70,7 @@ class Bearable:
         return low > -inf or high < inf
 
 
-def check_known(machine: Machine, limits: Bearable) -> None:
+def check_known(machine: Machine, limits: MachineLimits) -> None:
     """Raise DesignError for a limited quantity whose range in the motion alone is not specified."""
     for name in QUANTITIES:
         if limits.limited(name) and not all(name in place.motion for place in machine.places):
@@ -83,7 +83,7 @@ def check_known(machine: Machine, limits: Bearable) -> None:
             )
 
 
-def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]:
+def room(found: tuple[Peak, ...], limits: MachineLimits) -> tuple[float, Peak | None]:
     """Factor on the excitation that reaches the first limit, and the peak that reaches it.
 
     0 or less where the motion alone leaves no room; infinite, with None, without limits.
@@ -101,7 +101,7 @@ def room(found: tuple[Peak, ...], limits: Bearable) -> tuple[float, Peak | None]
     return largest, first
 
 
-def beyond(peak: Peak, limits: Bearable, share: float, amplitude: float | None, passing: float) -> DesignError:
+def beyond(peak: Peak, limits: MachineLimits, share: float, amplitude: float | None, passing: float) -> DesignError:
     """Why a peak that leaves only this share of the excitation is rejected, and the remedy.
 
     `passing` is an amplitude within the limits, 0 where there is none. Without an amplitude the lines have one each,

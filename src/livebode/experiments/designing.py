@@ -73,7 +73,7 @@ def design_experiment(
             )
     _check_names(name, experiment.log)
     _check_free(directory, force)
-    design = choose(experiment.wish(), experiment.machine(), experiment.bearable())
+    design = choose(experiment.spec(), experiment.machine(), experiment.machine_limits())
     lines = design.waveform.lines
     left_out = ""
     if kinds is None and lines.window > PERIOD_MAX:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from livebode.configuration.axis import LoopSection, nearest
 from livebode.configuration.toml_file import shortened
 from livebode.core import ConfigError
-from livebode.experiment_design import Bearable, Machine, Wish, belt_machine
+from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 
@@ -109,14 +109,14 @@ class Experiment(BaseModel):
             ).at(origin)
         return found
 
-    def wish(self) -> Wish:
+    def spec(self) -> ExperimentSpec:
         """Specification from [excitation]."""
         given = dict(self.excitation)
         if isinstance(given.get("band_hz"), list):
             given["band_hz"] = tuple(given["band_hz"])
-        return _made(Wish, given, "excitation")
+        return _made(ExperimentSpec, given, "excitation")
 
-    def bearable(self) -> Bearable:
+    def machine_limits(self) -> MachineLimits:
         """[limits]; for a belt axis its own limits by default."""
         axis = self.axis()
         own = {} if axis is None else {
@@ -125,7 +125,7 @@ class Experiment(BaseModel):
             "position_m_min": axis.limits.position_m_min,
             "position_m_max": axis.limits.position_m_max,
         }  # fmt: skip
-        return _made(Bearable, own | self.limits, "limits")
+        return _made(MachineLimits, own | self.limits, "limits")
 
     def axis(self) -> BeltAxis | None:
         """The belt axis; None for a measured one."""

@@ -5,16 +5,16 @@ from livebode.export.formats import ENDINGS, FORMATS, TABLES, save
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
 from livebode.export.parameters import ParameterTable, write_parameters_csv, write_parameters_mat
+from livebode.export.result import WriteResult
 from livebode.export.selection import at
 from livebode.export.universal import write_uff
-from livebode.export.written import Written
 
 __all__ = [
     "ENDINGS",
     "FORMATS",
     "TABLES",
     "ParameterTable",
-    "Written",
+    "WriteResult",
     "at",
     "save",
     "write_csv",

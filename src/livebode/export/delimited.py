@@ -14,10 +14,10 @@ from pyarrow.csv import CSVWriter, WriteOptions
 
 from livebode.arrow import from_numpy
 from livebode.core import RecordError, Responses
-from livebode.export.written import Written
+from livebode.export.result import WriteResult
 
 
-def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] | None = None) -> Written:
+def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] | None = None) -> WriteResult:
     """Write responses in long form, part by part.
 
     Columns: ``time [s]``, ``schedule``, ``frequency [Hz]``, ``re``, ``im``, ``magnitude [dB]``, ``phase [deg]``,
@@ -43,7 +43,7 @@ def write_csv(path: Path, parts: Iterable[Responses], _about: Mapping[str, Any] 
         if writer is None:
             raise RecordError("no-responses", "the run has no responses to export", "see its events")
         writer.close()
-    return Written(rows)
+    return WriteResult(rows)
 
 
 def begin(file: BinaryIO, header: list[str], schema: pa.Schema) -> CSVWriter:

@@ -16,10 +16,10 @@ from livebode.export.delimited import write_csv
 from livebode.export.labelled import write_netcdf
 from livebode.export.matlab import write_mat
 from livebode.export.parameters import write_parameters_csv, write_parameters_mat
+from livebode.export.result import WriteResult
 from livebode.export.universal import write_uff
-from livebode.export.written import Written
 
-FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], Written]] = {
+FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], WriteResult]] = {
     "csv": write_csv,
     "mat": write_mat,
     "netcdf": write_netcdf,
@@ -27,7 +27,7 @@ FORMATS: Mapping[str, Callable[[Path, Iterable[Responses], Mapping[str, Any]], W
 }
 """Functions that write responses, by the name of the format."""
 
-TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], Written]] = {
+TABLES: Mapping[str, Callable[[Path, Iterable[pa.RecordBatch]], WriteResult]] = {
     "csv": write_parameters_csv,
     "mat": write_parameters_mat,
 }

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Responses
-from livebode.export.written import Written, whole
+from livebode.export.result import WriteResult, whole
 
 
-def write_netcdf(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
+def write_netcdf(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> WriteResult:
     """Write responses as NetCDF 3 with 64-bit offsets, which needs no other library (extra `xarray`).
 
     As `Responses.to_xarray`, with run.json (`about`) as the attribute ``run``; but NetCDF 3 has neither complex numbers
@@ -39,4 +39,4 @@ def write_netcdf(path: Path, parts: Iterable[Responses], about: Mapping[str, Any
     for name in ("first", "sample"):
         dataset[name] = dataset[name].astype(np.float64, keep_attrs=True)
     dataset.to_netcdf(path, format="NETCDF3_64BIT", engine="scipy")
-    return Written(len(responses))
+    return WriteResult(len(responses))

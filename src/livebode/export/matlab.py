@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Responses
-from livebode.export.written import Written, whole
+from livebode.export.result import WriteResult, whole
 
 VARIABLE = "livebode"
 
 
-def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
+def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> WriteResult:
     """Write responses as a MATLAB v5 file with one struct `livebode`.
 
     Fields: ``H`` (1, 1, lines, responses) complex and ``w`` (lines, 1) in rad/s, for `frd(H, w)`;
@@ -35,7 +35,7 @@ def write_mat(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
     responses = whole(parts, "mat")
     struct = _struct(responses) | ({} if about is None else {"run": json.dumps(about, ensure_ascii=False)})
     savemat(path, {VARIABLE: struct}, appendmat=False, do_compression=True)
-    return Written(len(responses))
+    return WriteResult(len(responses))
 
 
 def _struct(responses: Responses) -> dict[str, Any]:

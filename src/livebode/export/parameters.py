@@ -12,7 +12,7 @@ import pyarrow as pa
 from livebode.core import OutputError, RecordError
 from livebode.export.delimited import begin
 from livebode.export.matlab import VARIABLE
-from livebode.export.written import VALUES_MAX, Written
+from livebode.export.result import VALUES_MAX, WriteResult
 
 COLUMNS = ("time_s", "schedule", "name", "value", "sigma", "unit", "model", "status")
 _NUMBERS = ("time_s", "schedule", "value", "sigma")
@@ -57,7 +57,7 @@ class ParameterTable:
             )
 
 
-def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
+def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteResult:
     """Write parameters in long form, part by part, with the names of `COLUMNS`; units have their own column.
 
     Raises
@@ -76,10 +76,10 @@ def write_parameters_csv(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
                 "no-parameters", "the run has no parameters to export", "run the recording again with a model"
             )
         writer.close()
-    return Written(rows)
+    return WriteResult(rows)
 
 
-def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written:
+def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> WriteResult:
     """Write parameters as a MATLAB struct `livebode` of columns, for `struct2table`; text is in cells.
 
     Raises
@@ -112,4 +112,4 @@ def write_parameters_mat(path: Path, parts: Iterable[pa.RecordBatch]) -> Written
         name: np.array(table[name].to_pylist(), dtype=object)[:, np.newaxis] for name in set(COLUMNS) - set(_NUMBERS)
     }
     savemat(path, {VARIABLE: {name: (numbers | texts)[name] for name in COLUMNS}}, appendmat=False, do_compression=True)
-    return Written(table.num_rows)
+    return WriteResult(table.num_rows)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import ExtraError, Response, Responses, SignalError
-from livebode.export.written import Written
+from livebode.export.result import WriteResult
 
 _LABEL, _ID = 20, 80  # longest unit and line of text in the format
 _LINES_MIN = 2
@@ -20,7 +20,7 @@ _UNKNOWN, _TIME, _FREQUENCY = 0, 17, 18  # specific data types
 _FRF, _SCALAR = 4, 0
 
 
-def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> Written:
+def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] | None = None) -> WriteResult:
     """Write one ASCII dataset 58 for each response, in order (extra `uff`).
 
     Function type 4 (frequency response function), complex in double precision (12 digits), abscissa in Hz, response
@@ -66,7 +66,7 @@ def write_uff(path: Path, parts: Iterable[Responses], about: Mapping[str, Any] |
             "export csv or mat, which accept a response with fewer",
             lines_min=_LINES_MIN,
         )
-    return Written(functions, left_out)
+    return WriteResult(functions, left_out)
 
 
 def _cause(error: BaseException) -> BaseException:

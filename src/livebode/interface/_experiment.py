@@ -68,7 +68,7 @@ def design(
     over = {name: value for name, value in given.items() if value is not None}
     asked = _described(experiment, over)
     if directory is None:
-        return choose(asked.wish(), asked.machine(), asked.bearable())
+        return choose(asked.spec(), asked.machine(), asked.machine_limits())
     return design_experiment(asked, Path(directory)).design
 
 

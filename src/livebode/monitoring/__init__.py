@@ -8,7 +8,7 @@ from livebode.monitoring.machine import Machine
 from livebode.monitoring.machine_detector import MachineDetector
 from livebode.monitoring.machine_monitor import MachineMonitor
 from livebode.monitoring.monitor import Monitor
-from livebode.monitoring.rows import PLACES, Apart, Rows, places
+from livebode.monitoring.rows import PLACES, NonOverlappingWindows, Rows, places
 from livebode.monitoring.table import Table
 from livebode.monitoring.table_learning import learn_table
 from livebode.monitoring.table_monitor import TableMonitor
@@ -16,13 +16,13 @@ from livebode.monitoring.table_monitor import TableMonitor
 __all__ = [
     "DEFAULT_INTERVAL_S",
     "PLACES",
-    "Apart",
     "Baseline",
     "Evidence",
     "Machine",
     "MachineDetector",
     "MachineMonitor",
     "Monitor",
+    "NonOverlappingWindows",
     "Rows",
     "Table",
     "TableMonitor",

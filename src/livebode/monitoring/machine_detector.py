@@ -8,6 +8,7 @@ import numpy as np
 
 from livebode.core import Event, Stage, StatefulBase
 from livebode.monitoring import evidence as word
+from livebode.monitoring.active_alarms import ActiveAlarms
 from livebode.monitoring.alarms import Alarm, Recent
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence
@@ -17,7 +18,6 @@ from livebode.monitoring.offset import Offset
 from livebode.monitoring.run_offset import RunOffset
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.sentences import changed, cleared, corrected, far_away, offset_unknown, unknown
-from livebode.monitoring.standing import Standing
 
 CHARTS = 2 * len(DIRECTIONS) + 2
 """Charts that take a step with a window: up and down for each direction, and for stiffness in the cart's cell."""
@@ -67,7 +67,7 @@ class MachineDetector(StatefulBase):
         self._first = Charts(held.smallest, held.allowed, threshold)
         self._further = Charts(free.smallest, free.allowed, threshold)
         self._cells = Charts(np.repeat(held.smallest[:1], size), np.repeat(held.allowed[:1], size), threshold)
-        self.standing = Standing(machine, threshold)
+        self.standing = ActiveAlarms(machine, threshold)
         self._own = RunOffset(machine.between, held, threshold)
         self._recent = Recent(_LOOK_WINDOWS)
         self._passed = np.full(size, -1)  # mark of the newest window in each cell

@@ -10,7 +10,7 @@ from livebode.estimation import Settings
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.false_alarms import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_monitor import MachineMonitor
-from livebode.monitoring.rows import Apart, places
+from livebode.monitoring.rows import NonOverlappingWindows, places
 from livebode.monitoring.table_monitor import TableMonitor
 
 
@@ -85,7 +85,9 @@ class Monitor(StatefulBase):
             share = mean_s * len(baseline.tables)
             self._tables = {t.what: TableMonitor(t, share, self._step_s) for t in baseline.tables}
         self._parameters = next((t.names for t in baseline.tables if t.what == "parameters"), ())
-        self._apart = {name: Apart(apart, places(lines.window, settings.step)[0]) for name in self._tables}
+        self._apart = {
+            name: NonOverlappingWindows(apart, places(lines.window, settings.step)[0]) for name in self._tables
+        }
         self._counts = {"change": 0, "change-cleared": 0}
 
     @property

@@ -60,7 +60,7 @@ def places(window: int, hop: int) -> tuple[int, ...]:
     return tuple(step * hop % window for step in range(count, 0, -max(1, count // PLACES))) if hop < window else (0,)
 
 
-class Apart(StatefulBase):
+class NonOverlappingWindows(StatefulBase):
     """Selects rows whose windows do not overlap from a stream of responses or parameters.
 
     Parameters

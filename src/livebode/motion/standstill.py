@@ -91,13 +91,13 @@ class Standstill(StatefulBase):
         dragged = self._drag > _DRAG * amplitude
         done = []
         for (first, last), touch in zip(found, touches):
-            goes_on = self._until >= 0 and first - self._until < self._window
-            rest_of_one = goes_on and last - first < self._window
+            continues = self._until >= 0 and first - self._until < self._window
+            rest_of_one = continues and last - first < self._window
             at = touch & np.isfinite(rest)
             excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
             stretch = Stretch(first, last, float(np.sqrt(excess)))
             if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
-                if not goes_on:
+                if not continues:
                     self._report(stretch, tracked)
                 self._until = last
                 done.append(stretch)

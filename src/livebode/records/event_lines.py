@@ -16,7 +16,7 @@ NAME = "events.jsonl"
 _LINE_BYTES_MAX = 1 << 20
 
 
-def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Iterator[Event]:
+def events(run: Path, report: Callable[[Event], None], *, finished: bool) -> Iterator[Event]:
     """The events of a run in order; a damaged line becomes an event of kind "record-damaged", which is also reported.
 
     A last line without an end is still being written, except if the run is finished.
@@ -43,7 +43,7 @@ def events(run: Path, tell: Callable[[Event], None], *, finished: bool) -> Itera
                 if event is None:
                     message = f"line {number} of {NAME} is damaged: {_bytes(value)} are not read"
                     event = Event(KIND, sample, time_s, message, {"file": NAME, "line": number})
-                    tell(event)
+                    report(event)
                 sample, time_s = event.sample, event.time_s
                 yield event
 

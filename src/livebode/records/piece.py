@@ -51,8 +51,8 @@ class Piece:
         If these entries are not in the form of a run.
     """
 
-    def __init__(self, run: Path, name: str, parts: Any, tell: Callable[[Event], None]) -> None:
-        self._run, self._name, self._tell = run, name, tell
+    def __init__(self, run: Path, name: str, parts: Any, report: Callable[[Event], None]) -> None:
+        self._run, self._name, self._tell = run, name, report
         try:
             self._parts = [Part(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
             self._parts[-1]

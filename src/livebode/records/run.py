@@ -57,17 +57,17 @@ class Run:
         run.json.
     damages
         Damage found so far, as events of kind "record-damaged"; everything else is read.
-    told
+    on_damage
         Called once with each of them; a `DamageWarning` by default.
     """
 
     path: Path
     summary: dict[str, Any]
     damages: list[Event] = field(default_factory=list, compare=False)
-    told: Callable[[Event], None] | None = field(default=None, compare=False)
+    on_damage: Callable[[Event], None] | None = field(default=None, compare=False)
 
     @classmethod
-    def open(cls, path: Path, told: Callable[[Event], None] | None = None) -> Run:
+    def open(cls, path: Path, on_damage: Callable[[Event], None] | None = None) -> Run:
         """The run in this directory.
 
         Raises
@@ -78,7 +78,7 @@ class Run:
             If the lines in run.json are not a valid grid.
         """
         summary, damaged = read_summary(path)
-        run = cls(path, summary, told=told)
+        run = cls(path, summary, on_damage=on_damage)
         if wrong := what_is_wrong(summary):
             raise RecordError(
                 "unexpected-content",
@@ -92,16 +92,16 @@ class Run:
         except LivebodeError as error:
             raise error.at(str(path / RUN)) from None
         if damaged:
-            run.tell(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
+            run.report(Event(KIND, 0, 0.0, damaged, {"file": RUN}))
         return run
 
-    def tell(self, damage: Event) -> None:
+    def report(self, damage: Event) -> None:
         """Record damage that was found."""
         if damage not in self.damages:
             self.damages.append(damage)
             _logger.warning("%s: %s", self.path, damage.message)
-            if self.told is not None:
-                self.told(damage)
+            if self.on_damage is not None:
+                self.on_damage(damage)
                 return
             warnings.warn(f"{self.path}: {damage.message}", DamageWarning, stacklevel=2)
 
@@ -184,7 +184,7 @@ class Run:
         file = self.path / name
         try:
             if reading.in_segments(self.path):
-                yield from reading.tables(self.path, name, self.tell, size_bytes_max, span_s, finished=self.finished)
+                yield from reading.tables(self.path, name, self.report, size_bytes_max, span_s, finished=self.finished)
             elif (piece := self._piece(name)) is not None:
                 yield from (pa.Table.from_batches([batch]) for batch in piece.batches(_ROWS))
         except (OSError, pa.ArrowException, KeyError, TypeError) as error:
@@ -194,9 +194,9 @@ class Run:
         """A table in one file; None if it was not recorded, or if the file is missing, which is reported."""
         file, parts = f"{name}.parquet", self.summary.get("files", {})
         if os.path.lexists(self.path / file):
-            return Piece(self.path, file, parts.get(file), self.tell)
+            return Piece(self.path, file, parts.get(file), self.report)
         if name == "responses" or file in parts:
-            self.tell(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
+            self.report(Event(KIND, 0, 0.0, f"{file} is damaged: the file is missing", {"file": file}))
         return None
 
     @property
@@ -211,10 +211,10 @@ class Run:
                 groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
                 whole = {name: found for name, found in groups.items() if found != []}
                 return {name: Files([self.path / f"{name}.parquet"], found, []) for name, found in whole.items()}
-            segments, rows = reading.parts(self.path, self.tell, finished=self.finished)
+            segments, rows = reading.parts(self.path, self.report, finished=self.finished)
             found = {name: Files([], None, rows.get(name, [])) for name in tables}
             for segment in segments:
-                if segment.table in found and reading.whole(self.path, segment, self.tell) is not None:
+                if segment.table in found and reading.whole(self.path, segment, self.report) is not None:
                     found[segment.table].paths.append(self.path / segment.name)
         except (OSError, pa.ArrowException) as error:
             raise _unreadable(self.path, error) from None
@@ -241,7 +241,7 @@ class Run:
     def event_lines(self) -> Iterator[Event]:
         """Events in events.jsonl."""
         try:
-            yield from event_lines.events(self.path, self.tell, finished=self.finished)
+            yield from event_lines.events(self.path, self.report, finished=self.finished)
         except OSError as error:
             raise _unreadable(self.path / event_lines.NAME, error) from None
 

@@ -26,7 +26,7 @@ def to_html(document: Document) -> str:
         f"<title>{title}</title>\n<style>\n{STYLE_SHEET}</style>\n</head>\n<body>\n"
         f'<header>\n<p class="kind">{_text(document.kind)}</p>\n<h1>{_text(document.title)}</h1>\n'
         f'<dl class="facts">{facts}</dl>\n</header>\n'
-        f'<h2>{_text(document.asked)}</h2>\n<ul class="verdict">\n{_verdict(document)}\n</ul>\n'
+        f'<h2>{_text(document.heading)}</h2>\n<ul class="verdict">\n{_verdict(document)}\n</ul>\n'
         f"<nav>{links}</nav>\n<main>\n{body}\n</main>\n<footer>{_text(document.foot)}</footer>\n</body>\n</html>\n"
     )
 

@@ -54,7 +54,7 @@ def save_pdf(document: Document, path: Path) -> None:
     template = _Pages(document, path)
     flow: list[Flowable] = [
         _words(document.kind, _KIND), _words(document.title, _TITLE), _facts(document), Spacer(0, 4 * mm),
-        _words(document.asked, _HEADING), _verdict(document),
+        _words(document.heading, _HEADING), _verdict(document),
     ]  # fmt: skip
     for section in document.sections:
         flow += _section(section)

@@ -8,31 +8,31 @@ from livebode.core import Event
 from livebode.core.document import Finding, Tone
 from livebode.language import recognised, tr, trn
 from livebode.records import Run
-from livebode.reporting.happenings import EventSummary
+from livebode.reporting.event_summary import EventSummary
 
 _ACTIVE_MAX = 5
 
 
-def alarms(run: Run, happenings: EventSummary) -> tuple[Finding, ...]:
+def alarms(run: Run, event_summary: EventSummary) -> tuple[Finding, ...]:
     """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
     if not monitoring:
-        return (_so_far(run, happenings),)
+        return (_so_far(run, event_summary),)
     tone: Tone = "open"
     active = bool(monitoring.get("standing"))
     if monitoring.get("baseline") is not None and monitoring.get("judged_s"):
         tone = "alarm" if active else "check" if monitoring.get("changes") else "ok"
-    latest = _newest(happenings)[-_ACTIVE_MAX:] if active else []
+    latest = _newest(event_summary)[-_ACTIVE_MAX:] if active else []
     return (
         Finding(tone, recognised(monitoring["message"])),
         *(Finding("alarm", recognised(event.message)) for event in latest),
     )
 
 
-def _newest(happenings: EventSummary) -> list[Event]:
+def _newest(event_summary: EventSummary) -> list[Event]:
     """The newest report of each change that has not cleared."""
     found: dict[tuple[str, str], Event] = {}
-    for event in happenings.in_full:
+    for event in event_summary.in_full:
         key = str(event.details.get("what")), str(event.details.get("place_m"))
         if event.kind in ("change", "change-corrected"):
             found[key] = event
@@ -41,13 +41,13 @@ def _newest(happenings: EventSummary) -> list[Event]:
     return list(found.values())
 
 
-def _so_far(run: Run, happenings: EventSummary) -> Finding:
+def _so_far(run: Run, event_summary: EventSummary) -> Finding:
     """The changes so far, if run.json does not contain a summary yet."""
     if run.finished:
         return Finding(
             "open", tr("Changes are not assessed without a baseline; `livebode learn` creates one from healthy runs.")
         )
-    came, cleared = happenings.count("change"), happenings.count("change-cleared")
+    came, cleared = event_summary.count("change"), event_summary.count("change-cleared")
     if not came:
         text = tr("No change was reported so far; the final verdict is available at the end of the run.")
         return Finding("open", text)

@@ -21,7 +21,7 @@ from livebode.language import marked, number, recognised, tr, trn
 from livebode.records import Run
 from livebode.records.grouped_events import event_counts
 from livebode.reporting.comparison_verdict import verdict
-from livebode.reporting.material import written
+from livebode.reporting.report_data import written
 from livebode.reporting.wording import BOUND_95, decibels, polar, signed, with_bound
 
 _TONES = {**TONES, "ok": marked("no difference shown")}

@@ -13,7 +13,7 @@ from livebode.analysis.difference import Compared, Difference, Place
 from livebode.core.document import Finding, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.reporting.alarms import alarms
-from livebode.reporting.happenings import EventSummary
+from livebode.reporting.event_summary import EventSummary
 from livebode.reporting.wording import polar, signed
 
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")

@@ -6,7 +6,7 @@ from typing import Any
 
 from livebode.core.document import Paragraph, Section
 from livebode.language import listed, marked, number, recognised, tr, trn
-from livebode.reporting.material import Material
+from livebode.reporting.report_data import ReportData
 from livebode.reporting.wording import duration, pairs
 
 _ESTIMATOR = {
@@ -30,7 +30,7 @@ _ROLES = {
 }
 
 
-def how(of: Material) -> Section:
+def how(of: ReportData) -> Section:
     """The section "How it was measured"."""
     found, tracking = of.run.found, of.configuration.get("tracking", {})
     window_s = found["window"] / found["rate_hz"]
@@ -66,33 +66,33 @@ def how(of: Material) -> Section:
     return Section(tr("How it was measured"), (pairs(rows), Paragraph(bounds)))
 
 
-def _options(tracking: dict[str, Any], of: Material) -> list[str]:
-    said = []
+def _options(tracking: dict[str, Any], of: ReportData) -> list[str]:
+    parts = []
     if tracking.get("average"):
-        said.append(tr("averaged over periods with forgetting {forgetting:g}", forgetting=tracking["forgetting"]))
+        parts.append(tr("averaged over periods with forgetting {forgetting:g}", forgetting=tracking["forgetting"]))
     if tracking.get("differenced"):
-        said.append(tr("differenced: {channels}", channels=listed(tracking["differenced"])))
+        parts.append(tr("differenced: {channels}", channels=listed(tracking["differenced"])))
     if tracking.get("spikes"):
-        said.append(tr("windows with spikes of {channels} excluded", channels=listed(tracking["spikes"])))
+        parts.append(tr("windows with spikes of {channels} excluded", channels=listed(tracking["spikes"])))
     if tracking.get("hann"):
-        said.append(tr("Hann window"))
+        parts.append(tr("Hann window"))
     if tracking.get("dtype") == "float32":
-        said.append(tr("single precision"))
+        parts.append(tr("single precision"))
     if "motion" in of.configuration:
-        said.append(tr("corrected for the axis's motion with a moving model"))
-    return said
+        parts.append(tr("corrected for the axis's motion with a moving model"))
+    return parts
 
 
 def _loop(loop: dict[str, Any]) -> list[str]:
     """The described controllers in words; empty if there are none."""
-    said = [
+    parts = [
         # The keys of the configuration, with numbers as in the file.
         f"{name}: {', '.join(f'{key} {value}' for key, value in loop[name].items() if value)}"
         for name in ("velocity", "position", "position_pd")
         if name in loop
     ]
     at = recognised(str(loop.get("excitation_at")))
-    return [tr("excitation at the {place}", place=at), *said] if said else []
+    return [tr("excitation at the {place}", place=at), *parts] if parts else []
 
 
 def _rate_from(found: dict[str, Any]) -> str:

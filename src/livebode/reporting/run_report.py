@@ -9,8 +9,8 @@ from livebode.core.clock import moment
 from livebode.core.document import Document, Paragraph, Section
 from livebode.language import tr
 from livebode.reporting import sections
-from livebode.reporting.material import Judged, Material, read, written
 from livebode.reporting.measured import how
+from livebode.reporting.report_data import Judged, ReportData, read, written
 from livebode.reporting.verdict import verdict
 from livebode.reporting.wording import duration
 
@@ -50,12 +50,12 @@ def run_report(directory: Path, judged: Judged | None = None, *, made: datetime)
         facts=facts(of, made),
         verdict=verdict(of),
         sections=(*there, Section(tr("Not in this report"), absent)) if absent else tuple(there),
-        asked=tr("Verdict"),
+        heading=tr("Verdict"),
         foot=f"{of.title} · {of.run.path.resolve().name} · livebode {version}".strip(),
     )
 
 
-def facts(of: Material, made: datetime) -> tuple[tuple[str, str], ...]:
+def facts(of: ReportData, made: datetime) -> tuple[tuple[str, str], ...]:
     """The title block."""
     source = of.configuration.get("source", {})
     log, first_s, last_s = source.get("log"), *of.of.spans_s

@@ -15,7 +15,7 @@ from livebode.fitting import Fit
 from livebode.language import listed, marked, number, recognised, tr
 from livebode.margins.words import WORDS
 from livebode.reporting.alarms import alarms
-from livebode.reporting.material import Material, by_schedule
+from livebode.reporting.report_data import ReportData, by_schedule
 from livebode.reporting.wording import (
     BOUND_95,
     lines_of,
@@ -31,7 +31,7 @@ _PANELS, _CURVES = 8, 700  # parameters that are drawn, and responses per curve
 _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses per trace
 
 
-def response(of: Material) -> Section:
+def response(of: ReportData) -> Section:
     """The mean with its bounds, the fitted model, and a table."""
     one = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
@@ -59,7 +59,7 @@ def response(of: Material) -> Section:
     return Section(tr("Frequency response"), (picture, table))
 
 
-def tracking(of: Material) -> Section:
+def tracking(of: ReportData) -> Section:
     """Magnitude of the lines over time and over the schedule, if there is one."""
     shown = of.of.overview
     if len(shown.lines) <= _TRACES_MAX:
@@ -76,7 +76,7 @@ def tracking(of: Material) -> Section:
     return Section(tr("Tracking"), (Picture("tracking", data, caption),))
 
 
-def parameters(of: Material) -> Section | str:
+def parameters(of: ReportData) -> Section | str:
     """Fitted parameters: of the mean, newest, and over time."""
     tracks = [t for t in of.tracks.values() if t.model != MARGINS]
     if of.fit is None and not tracks:
@@ -124,7 +124,7 @@ def _fitted(fit: Fit, what: str) -> str:
     )
 
 
-def motion(of: Material) -> Section | None:
+def motion(of: ReportData) -> Section | None:
     """The model of the axis in motion; None if the run was not corrected for motion."""
     model = of.run.found.get("motion", {}).get("model")
     if model is None:
@@ -139,7 +139,7 @@ def motion(of: Material) -> Section | None:
     return Section(tr("Motion"), (Paragraph(words), table))
 
 
-def margins(of: Material) -> Section | str:
+def margins(of: ReportData) -> Section | str:
     """The margins of the loop, with bounds and frequencies."""
     if of.loop is None:
         return of.loop_words
@@ -179,10 +179,10 @@ def _about_margins(loop: LoopReport, fit: Fit | None) -> str:
     )  # fmt: skip
 
 
-def events(of: Material) -> Section:
+def events(of: ReportData) -> Section:
     """Alarms and other events."""
     monitoring = of.run.summary.get("monitoring", {})
-    words = alarms(of.run, of.happenings)[0].text
+    words = alarms(of.run, of.event_summary)[0].text
     if monitoring.get("baseline"):
         words += " " + tr(
             "Baseline {baseline}, judged by {judge}; mean time between false alarms: {days} days of motion or more.",
@@ -191,10 +191,10 @@ def events(of: Material) -> Section:
         )  # fmt: skip
         if covariates := monitoring.get("covariates"):
             words += " " + tr("Covariates: {names}.", names=listed(covariates))
-    return Section(tr("Alarms and events"), (Paragraph(words), *of.happenings.parts()))
+    return Section(tr("Alarms and events"), (Paragraph(words), *of.event_summary.parts()))
 
 
-def quality(of: Material) -> Section:
+def quality(of: ReportData) -> Section:
     """Gaps, bad samples, invalid responses and the state of the source."""
     counts = of.run.summary.get("counts", {})
     rows = [
@@ -234,7 +234,7 @@ _SOURCE = {
 }  # fmt: skip
 
 
-def validation(of: Material) -> Section | str:
+def validation(of: ReportData) -> Section | str:
     """Validation of the model on independent data, or why there is none."""
     if of.judged is None:
         return tr("No validation: the model was not tested on independent data. Use `livebode report RUN --on LOG`.")
@@ -257,18 +257,18 @@ def validation(of: Material) -> Section | str:
     return Section(tr("Validation"), tuple(parts))
 
 
-def settings(of: Material) -> Section:
+def settings(of: ReportData) -> Section:
     """The complete configuration as TOML, with all defaults."""
     return Section(tr("Settings"), (Listing(to_toml(of.configuration) or "# none"),))
 
 
-def versions(of: Material) -> Section:
+def versions(of: ReportData) -> Section:
     """Versions of the software."""
     rows = [(name.replace("_", " "), str(value)) for name, value in of.run.summary.get("versions", {}).items()]
     return Section(tr("Versions"), (pairs(rows),))
 
 
-def _over_time(of: Material, track: Track, what: str) -> Picture:
+def _over_time(of: ReportData, track: Track, what: str) -> Picture:
     names = [name for name in track.values if np.isfinite(track.values[name]).any() and track.newest[name].sigma > 0]
     shown = [name for name in names if not name.endswith("_frequency")][:_PANELS]
     every = slice(None, None, -(-len(track.time_s) // _CURVES))
@@ -286,11 +286,11 @@ def _moving(track: Track) -> bool:
     return any(np.count_nonzero(np.isfinite(v)) > 1 and track.newest[n].sigma > 0 for n, v in track.values.items())
 
 
-def _drawn(of: Material, kept: int) -> str:
+def _drawn(of: ReportData, kept: int) -> str:
     return tr(" (thinned: {kept:,} of {all:,} responses)", kept=kept, all=of.of.count) if kept < of.of.count else ""
 
 
-def _re(of: Material) -> str:
+def _re(of: ReportData) -> str:
     return tr(" re 1 {unit}", unit=of.run.found["unit"]) if of.run.found["unit"] else ""
 
 

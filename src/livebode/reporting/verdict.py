@@ -9,7 +9,7 @@ from livebode.core.document import Finding, Tone
 from livebode.language import listed, number, recognised, tr, trn
 from livebode.margins import worst
 from livebode.reporting.alarms import alarms
-from livebode.reporting.material import Material
+from livebode.reporting.report_data import ReportData
 from livebode.reporting.wording import lines_of, share
 
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
@@ -20,10 +20,10 @@ _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
 _TRUSTED: dict[str, Tone] = {"passes": "ok", "small error": "ok", "fails": "check", "cannot be judged": "open"}
 
 
-def verdict(of: Material) -> tuple[Finding, ...]:
+def verdict(of: ReportData) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
     found = [
-        *alarms(of.run, of.happenings),
+        *alarms(of.run, of.event_summary),
         *_record(of),
         *_signals(of),
         *_valid(of),
@@ -34,7 +34,7 @@ def verdict(of: Material) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda f: _URGENT[f.tone]))
 
 
-def _record(of: Material) -> list[Finding]:
+def _record(of: ReportData) -> list[Finding]:
     found = []
     if not of.run.finished:
         found.append(
@@ -48,10 +48,10 @@ def _record(of: Material) -> list[Finding]:
         )
     found += [
         Finding("check", tr("The signals are doubtful: {why}.", why=recognised(event.message)))
-        for event in of.happenings.in_full
+        for event in of.event_summary.in_full
         if event.kind == "doubtful"
     ]
-    lost = of.happenings.count("record-paused")
+    lost = of.event_summary.count("record-paused")
     if lost:
         text = trn(
             "The record paused {n} time because the disk was full or failed.",
@@ -62,7 +62,7 @@ def _record(of: Material) -> list[Finding]:
     return found
 
 
-def _signals(of: Material) -> list[Finding]:
+def _signals(of: ReportData) -> list[Finding]:
     counts = of.run.summary.get("counts", {})
     found = []
     if counts.get("gaps"):
@@ -91,7 +91,7 @@ def _gaps(gaps: int, missing: int) -> str:
     )  # fmt: skip
 
 
-def _valid(of: Material) -> list[Finding]:
+def _valid(of: ReportData) -> list[Finding]:
     bad, every = of.of.incomplete, of.of.count
     text = trn(
         "{n:,} response at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start or "
@@ -107,7 +107,7 @@ def _valid(of: Material) -> list[Finding]:
     return found
 
 
-def _fits(of: Material) -> list[Finding]:
+def _fits(of: ReportData) -> list[Finding]:
     if of.fit is None:
         return [Finding("check", of.fit_words)] if "fit" in of.configuration else []
     rough = of.fit.epsilon > _EPSILON_LARGE
@@ -134,7 +134,7 @@ def _fits(of: Material) -> list[Finding]:
     return found
 
 
-def _margins(of: Material) -> list[Finding]:
+def _margins(of: ReportData) -> list[Finding]:
     if of.loop is None:
         return [Finding("open", of.loop_words)] if of.described else []
     least = worst(of.loop.places)
@@ -161,7 +161,7 @@ def _margins(of: Material) -> list[Finding]:
     return [Finding("check" if small else "ok", text)]
 
 
-def _validated(of: Material) -> list[Finding]:
+def _validated(of: ReportData) -> list[Finding]:
     if of.judged is None:
         text = tr("The model was not validated on independent data; use `livebode report RUN --on LOG`.")
         return [Finding("open", text)] if of.fit is not None else []

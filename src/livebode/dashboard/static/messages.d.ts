@@ -145,7 +145,7 @@ export type News = (Beginning | { facts?: undefined }) & {
   newest?: Trend[];
 };
 
-/** A request on the web socket; see asked.py. */
+/** A request on the web socket; see queries.py. */
 export type Wish =
   | { kind: "watch"; axis: number; quantity: Quantity | null }
   | { kind: "freeze"; time_s: number }

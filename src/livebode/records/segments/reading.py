@@ -30,21 +30,21 @@ def in_segments(run: Path) -> bool:
 Rows = dict[str, list[pa.RecordBatch]]
 
 
-def parts(run: Path, tell: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
+def parts(run: Path, report: Tell, *, finished: bool) -> tuple[list[Segment], Rows]:
     """Closed segments of all tables, by age, and later rows of each that are still in a journal."""
     # The newest first: everything before an existing journal is complete. And before the manifest: a journal that is
     # closed in between is then in both instead of in neither.
     journals: dict[int, Journal] = {}
     for number in reversed(journal.numbers(run)):
         following = journals.get(number + 1)
-        journals[number] = _read(run, number, following, tell)
+        journals[number] = _read(run, number, following, report)
     found = Manifest.read(run)
     found.check(run, list(journals))
-    _tell_of(found, finished, tell)
+    _tell_of(found, finished, report)
     left = [number for number in sorted(journals) if number not in found.closed]
     for number in left:
         if places := journals[number].damages:
-            tell(event_of(journal.name_of(number), places, None))
+            report(event_of(journal.name_of(number), places, None))
     rows: Rows = {}
     for number in left:
         for table, batches in journals[number].rows.items():
@@ -64,7 +64,7 @@ def waiting_events(run: Path) -> list[Any]:
 def tables(
     run: Path,
     table: str,
-    tell: Tell,
+    report: Tell,
     size_bytes_max: int | None,
     span_s: tuple[float, float] | None = None,
     *,
@@ -80,20 +80,20 @@ def tables(
     OSError
         If something cannot be read.
     """
-    segments, rows = parts(run, tell, finished=finished)
+    segments, rows = parts(run, report, finished=finished)
     segments = [segment for segment in segments if segment.table == table]
     if span_s is not None:
         segments = [segment for segment in segments if segment.first_s <= span_s[1] and segment.last_s >= span_s[0]]
-    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), tell)
+    yield from _joined(run, segments if size_bytes_max is None else _newest(segments, size_bytes_max), report)
     if table in rows:
         yield pa.Table.from_batches(rows[table])
 
 
-def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table]:
+def _joined(run: Path, segments: list[Segment], report: Tell) -> Iterator[pa.Table]:
     """The rows of segments, small ones combined, because the overhead per part is larger than that of its rows."""
     held: list[pa.Table] = []
     for segment in segments:
-        if (file := whole(run, segment, tell)) is None:
+        if (file := whole(run, segment, report)) is None:
             continue
         # Without Arrow's threads, which can fail at the end of a short process.
         held.append(file.read(use_threads=False))
@@ -104,7 +104,7 @@ def _joined(run: Path, segments: list[Segment], tell: Tell) -> Iterator[pa.Table
         yield pa.concat_tables(held)
 
 
-def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
+def whole(run: Path, segment: Segment, report: Tell) -> pq.ParquetFile | None:
     """The file of a segment; None if it is damaged, which is reported, or was removed to meet the budget."""
     try:
         return open_segment(run, segment)
@@ -122,7 +122,7 @@ def whole(run: Path, segment: Segment, tell: Tell) -> pq.ParquetFile | None:
         "samples": segment.last_sample - segment.first_sample + 1,
     }  # fmt: skip
     message = f"{segment.name} is damaged: {why}; {lost} ({details['seconds']:.4g} s) are not read"
-    tell(Event(KIND, segment.first_sample, segment.first_s, message, details))
+    report(Event(KIND, segment.first_sample, segment.first_s, message, details))
     return None
 
 
@@ -133,7 +133,7 @@ def _newest(segments: list[Segment], size_bytes_max: int) -> list[Segment]:
     return segments[at:]
 
 
-def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Journal:
+def _read(run: Path, number: int, following: Journal | None, report: Tell) -> Journal:
     try:
         return Journal.read(run, number, lambda: None if following is None else following.first)
     except FileNotFoundError:  # it was closed in the meantime
@@ -141,14 +141,14 @@ def _read(run: Path, number: int, following: Journal | None, tell: Tell) -> Jour
     except RecordError as error:
         if error.code == "record.newer-version":
             raise
-        tell(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
+        report(Event(KIND, 0, 0.0, str(error), {"file": journal.name_of(number)}))
         return Journal()
 
 
-def _tell_of(found: Manifest, finished: bool, tell: Tell) -> None:
+def _tell_of(found: Manifest, finished: bool, report: Tell) -> None:
     if not found.broken and not (finished and found.torn):
         return
     lines = ", ".join(map(str, found.broken)) or "the last"
     lost = ", ".join(f"{first} to {last}" for first, last in found.missing)
     what = f"the segments of journals {lost} are not read" if lost else "each line is written twice, so nothing is lost"
-    tell(Event(KIND, 0, 0.0, f"{NAME} is damaged in line {lines}; {what}", {"file": NAME, "lines": found.broken}))
+    report(Event(KIND, 0, 0.0, f"{NAME} is damaged in line {lines}; {what}", {"file": NAME, "lines": found.broken}))

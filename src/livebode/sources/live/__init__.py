@@ -5,10 +5,10 @@ from livebode.sources.live.frame import FrameDecoder, encode_layout, encode_samp
 from livebode.sources.live.health import Health
 from livebode.sources.live.opening import checked_address, make_source, open_source
 from livebode.sources.live.position import Origin, Position
-from livebode.sources.live.said import KINDS
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
+from livebode.sources.live.source_events import KINDS
 from livebode.sources.live.spectra_batch import SpectraBatch
 from livebode.sources.live.spectra_frame import encode_spectra, encode_spectra_layout
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from statistics import median
 
-from livebode.sources.live.said import Said
+from livebode.sources.live.source_events import SourceEvents
 
 JUMP_S = 0.1
 """A clock that is off by this much for one interval between batches, and right in the next, was set."""
@@ -25,8 +25,8 @@ class ClockWatch:
     judged when the next one is known.
     """
 
-    def __init__(self, said: Said, rate_hz: float) -> None:
-        self._said, self._rate_hz = said, rate_hz
+    def __init__(self, said: SourceEvents, rate_hz: float) -> None:
+        self._events, self._rate_hz = said, rate_hz
         self._wrong = False
         self.restart()
 
@@ -62,7 +62,7 @@ class ClockWatch:
         self._judge_rate(number)
 
     def _jumped(self, step_s: float, number: int) -> None:
-        self._said.say(
+        self._events.report(
             "clock-jump",
             f"the sender's clock was set by {step_s:+.3f} s; time continues by sample numbers",
             sample=number,
@@ -79,7 +79,7 @@ class ClockWatch:
             ratio, wrong = 1 + self._drift_s / self._length_s, True
         if wrong and not self._wrong:
             measured_hz = self._rate_hz / ratio if ratio > 0 else None
-            self._said.say(
+            self._events.report(
                 "wrong-rate",
                 f"the sampling rate is {measured_hz:.6g} Hz by the sender's clock, not {self._rate_hz:.6g} Hz; "
                 "every frequency is wrong by the same factor; correct the rate"

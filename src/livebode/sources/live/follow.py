@@ -71,7 +71,7 @@ class FollowSource(LiveSource):
         super().resume(position)
         self._epoch, self._due = position.epoch, position.number
         self._mark = position.mark or self._mark
-        self._sequencer.face.rate_hz = self.settings.rate_hz or position.rate_hz
+        self._sequencer.schema.rate_hz = self.settings.rate_hz or position.rate_hz
 
     def _receive(self) -> bool:
         assert self.settings.log is not None
@@ -91,7 +91,9 @@ class FollowSource(LiveSource):
         try:
             if not path.exists():
                 raise SourceError("not-found", f"there is no file {path} yet", "check the name", path=str(path))
-            log = open_log(path, rate_hz=self.settings.rate_hz or self._sequencer.face.rate_hz, time=self.settings.time)
+            log = open_log(
+                path, rate_hz=self.settings.rate_hz or self._sequencer.schema.rate_hz, time=self.settings.time
+            )
             return table_of(log, self.settings.time, path.stat().st_ino)
         except (LivebodeError, OSError) as error:
             self._trouble = error
@@ -127,7 +129,7 @@ class FollowSource(LiveSource):
         kept = mark.kept_in(file)
         if kept == "all":
             return mark, mark.end
-        self._said.say("replaced", f"{path} {REPLACED[kept]}".format(end=mark.end), end_bytes=mark.end)
+        self._events.report("replaced", f"{path} {REPLACED[kept]}".format(end=mark.end), end_bytes=mark.end)
         if kept == "most":
             return mark, path.stat().st_size
         self._epoch, self._due = self._epoch + 1, -1
@@ -186,7 +188,7 @@ class FollowSource(LiveSource):
         if whole and not path.exists():
             return mark.name, mark.stop
         gone = "was removed" if not path.exists() else "was changed"
-        self._said.say("replaced", f"{path} {gone} since it was read up to sample {due - 1}; its other samples "
+        self._events.report("replaced", f"{path} {gone} since it was read up to sample {due - 1}; its other samples "
                        "are not recorded")  # fmt: skip
         self._epoch += not mark.timed
         return mark.name, max(mark.counted, mark.stop)
@@ -194,7 +196,9 @@ class FollowSource(LiveSource):
     def _segment(self, path: Path, seen: str, counted: int) -> int | None:
         """Deliver one recording whose rows are counted from `counted`; the count after it, None if unreadable."""
         try:
-            log = open_log(path, rate_hz=self.settings.rate_hz or self._sequencer.face.rate_hz, time=self.settings.time)
+            log = open_log(
+                path, rate_hz=self.settings.rate_hz or self._sequencer.schema.rate_hz, time=self.settings.time
+            )
             labels, mark = log.channels, FolderMark(path.name, checksum(path), seen, counted, log.timing is not None)
             self._announce(labels, log.rate_hz)
             held: Batch | None = None

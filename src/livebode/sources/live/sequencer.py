@@ -5,11 +5,11 @@ from __future__ import annotations
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.clock import ClockWatch
 from livebode.sources.live.computer_clock import ClockReading, pause
-from livebode.sources.live.doubts import CONFIRMED, Doubts
-from livebode.sources.live.face import Face
 from livebode.sources.live.position import Position
-from livebode.sources.live.said import Said
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
+from livebode.sources.live.stream_schema import StreamSchema
+from livebode.sources.live.unconfirmed import CONFIRMED, UnconfirmedBatches
 
 FAR_BACK_S = 60.0
 FAR_AHEAD_S = 3600.0
@@ -47,17 +47,17 @@ class Sequencer:
 
     def __init__(
         self,
-        said: Said,
+        said: SourceEvents,
         *,
         reorder: int = 8,
         wait_s: float = 1.0,
         rate_hz: float | None = None,
         confirmed: int = CONFIRMED,
     ) -> None:
-        self._said, self._reorder, self._wait_s = said, reorder, wait_s
-        self._doubts = Doubts(said, confirmed, reorder)
+        self._events, self._reorder, self._wait_s = said, reorder, wait_s
+        self._unconfirmed = UnconfirmedBatches(said, confirmed, reorder)
         self._jump_s = JUMP_S if confirmed > 1 else FAR_AHEAD_S
-        self.face = Face(said, rate_hz)
+        self.schema = StreamSchema(said, rate_hz)
         self.clock: ClockWatch | None = None
         self._epoch: int | None = None
         self._left: dict[int, int] = {}
@@ -87,17 +87,17 @@ class Sequencer:
         self._resumed, self._paced = position, paced
         self._epoch, self._next, self._number = position.epoch, position.number, position.sample
         self._begun_at = position.number
-        self._said.position = (position.sample, position.sample / position.rate_hz)
+        self._events.position = (position.sample, position.sample / position.rate_hz)
 
     def push(self, batch: AnyBatch) -> list[LiveBlock]:
         """Blocks completed by this batch."""
-        aligned = self.face.aligned(batch)
+        aligned = self.schema.aligned(batch)
         if aligned is None:
             return []
         if self._epoch is None:
             self._epoch = batch.epoch
         if self._fits(aligned):
-            self._doubts.dismiss(self._epoch, self._next)  # the stream continues, so they did not belong to it
+            self._unconfirmed.dismiss(self._epoch, self._next)  # the stream continues, so they did not belong to it
             return self._insert(aligned)
         return self._doubt(aligned)
 
@@ -110,7 +110,7 @@ class Sequencer:
 
     def finish(self) -> list[LiveBlock]:
         """Blocks of all waiting batches, at the end of the source."""
-        self._doubts.dismiss(self._epoch, self._next)
+        self._unconfirmed.dismiss(self._epoch, self._next)
         return self._release(0)
 
     def _fits(self, batch: AnyBatch) -> bool:
@@ -141,7 +141,9 @@ class Sequencer:
             self._repeat(batch)
             return []
         if batch.first_sample < self._highest:
-            self._said.say("reordered", f"sample {batch.first_sample} of the sender arrived late and was sorted in")
+            self._events.report(
+                "reordered", f"sample {batch.first_sample} of the sender arrived late and was sorted in"
+            )
         self._highest = max(self._highest, batch.first_sample)
         self._waiting[batch.first_sample] = batch
         return self._release(self._reorder)
@@ -169,22 +171,22 @@ class Sequencer:
     def _emit(self, batch: AnyBatch, start: int) -> LiveBlock:
         block = batch.block(self._number, start, self._gap)
         if batch.stamp_s is not None:
-            self.clock = self.clock or ClockWatch(self._said, batch.rate_hz)
+            self.clock = self.clock or ClockWatch(self._events, batch.rate_hz)
             self.clock.take(start, batch.stamp_s + (start - batch.first_sample) / batch.rate_hz, self._number)
         self._gap, self._resumed = False, None
         self._next, self._number = batch.stop, block.stop
         self._progress_s = batch.arrived_s
-        self._said.position = (self._number, self._number / batch.rate_hz)
+        self._events.position = (self._number, self._number / batch.rate_hz)
         return block
 
     def _lose(self, first: int) -> None:
         assert self._next is not None
         missing = first - self._next
-        rate_hz = self.face.rate_hz or 1.0
+        rate_hz = self.schema.rate_hz or 1.0
         self.lost += missing
         self._number += missing
         unsure = "; the sender sends no epoch, so a restart during the pause would not be detected"
-        self._said.say(
+        self._events.report(
             "loss",
             f"{missing} samples were lost{unsure if self._resumed is not None and not self._epoch else ''}",
             sample=self._number,
@@ -194,55 +196,57 @@ class Sequencer:
         self._next, self._gap = first, True
 
     def _repeat(self, batch: AnyBatch) -> None:
-        self._said.say("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
+        self._events.report("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
 
     def _doubt(self, batch: AnyBatch) -> list[LiveBlock]:
         """Handle a batch that does not continue the stream: a repeat, a jump, another sender, or a restart."""
         far = self._next is None or batch.stop < self._next - FAR_BACK_S * batch.rate_hz
         ahead = batch.epoch == self._epoch and self._next is not None and batch.first_sample > self._next
-        if self._is_told_again(batch):
+        if self._repeats_recorded(batch):
             self._repeat(batch)
             return []
         if batch.epoch != self._epoch:
-            believed = self._doubts.another_epoch(batch, self._epoch, self._next, replaced=batch.epoch in self._left)
+            accepted = self._unconfirmed.another_epoch(
+                batch, self._epoch, self._next, replaced=batch.epoch in self._left
+            )
         elif ahead:
-            believed = self._doubts.ahead(batch, self._epoch, self._next, self._jump_s * batch.rate_hz)
+            accepted = self._unconfirmed.ahead(batch, self._epoch, self._next, self._jump_s * batch.rate_hz)
         else:
-            believed = self._doubts.behind(batch, self._epoch, self._next, far=far)
-        if not believed:
+            accepted = self._unconfirmed.behind(batch, self._epoch, self._next, far=far)
+        if not accepted:
             return []
         if ahead and batch.first_sample - (self._next or 0) <= self._ahead_max(batch):
-            return [block for late in believed for block in self._insert(late)]
-        return self._restart(believed)
+            return [block for late in accepted for block in self._insert(late)]
+        return self._restart(accepted)
 
-    def _is_told_again(self, batch: AnyBatch) -> bool:
+    def _repeats_recorded(self, batch: AnyBatch) -> bool:
         """Whether a broker repeats samples that are already recorded: with the same epoch there was no restart."""
         known = self._resumed is not None and bool(self._epoch) and batch.epoch == self._epoch
         return known and self._next is not None and batch.stop <= self._next
 
-    def _restart(self, believed: list[AnyBatch]) -> list[LiveBlock]:
+    def _restart(self, accepted: list[AnyBatch]) -> list[LiveBlock]:
         """Continue with these batches of another epoch, or of numbers that begin again."""
         blocks = self._release(0)
-        epoch, first = believed[0].epoch, min(batch.first_sample for batch in believed)
+        epoch, first = accepted[0].epoch, min(batch.first_sample for batch in accepted)
         offset = self._left.pop(epoch, None)
         if self._epoch is not None and epoch != self._epoch and self._next is not None:
             self._left[self._epoch] = self._next - self._number
             while len(self._left) > _EPOCHS_REMEMBERED:
                 del self._left[next(iter(self._left))]
-        back = offset is not None and first - offset >= self._number - FAR_BACK_S * believed[0].rate_hz
+        back = offset is not None and first - offset >= self._number - FAR_BACK_S * accepted[0].rate_hz
         if offset is not None and back:
             self._return_to(epoch, offset, first)
         else:
-            self._begin_anew(believed[0], first)
+            self._restart_numbering(accepted[0], first)
         self._epoch, self._highest, self._gap = epoch, -1, self._number > 0
         if self.clock is not None:
             self.clock.restart()
-        for batch in believed:
+        for batch in accepted:
             if self._next is None or batch.stop > self._next:
                 blocks += self._insert(batch)
         return blocks
 
-    def _begin_anew(self, batch: AnyBatch, first: int) -> None:
+    def _restart_numbering(self, batch: AnyBatch, first: int) -> None:
         seconds = None if self._resumed is None else self._pause_s(batch, self._resumed)
         missing, how = 0, "the length of its pause is not known"
         if seconds is not None:
@@ -250,7 +254,7 @@ class Sequencer:
             missing = step * round(seconds * batch.rate_hz / step)
             how = f"its pause was {seconds:.1f} s by this computer's clock, which is an estimate"
         self._number += missing
-        self._say_restart(
+        self._report_restart(
             f"the sender restarted at its sample {first}; {how}", batch.epoch, first, estimated_samples=missing
         )
         self._next, self._resumed = None, None
@@ -261,19 +265,19 @@ class Sequencer:
         self.lost += lost
         self._next = self._number + offset
         other = "" if self._epoch is None else f" {self._epoch:#x}"
-        self._say_restart(
+        self._report_restart(
             f"the sender of epoch {epoch:#x} still sends, and the one that replaced it (epoch{other}) is silent; "
             f"the first continues at its sample {max(first, self._next)}; {lost} of its samples were not recorded. "
             "If only one machine may send, set its address in source.sender",
             epoch, first, lost_samples=lost,
         )  # fmt: skip
 
-    def _say_restart(self, message: str, epoch: int, first: int, **details: int) -> None:
-        self._said.say(
+    def _report_restart(self, message: str, epoch: int, first: int, **details: int) -> None:
+        self._events.report(
             "restart",
             message,
             sample=self._number,
-            rate_hz=self.face.rate_hz or 1.0,
+            rate_hz=self.schema.rate_hz or 1.0,
             sender_sample=first,
             epoch=f"{epoch:#x}",
             **details,

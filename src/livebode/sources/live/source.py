@@ -18,16 +18,16 @@ from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLay
 from livebode.sources.live.address import Address
 from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause
-from livebode.sources.live.doubts import CONFIRMED
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
 from livebode.sources.live.inbox import Inbox
 from livebode.sources.live.pauses import Pauses
 from livebode.sources.live.position import Position
-from livebode.sources.live.said import Said
 from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.sources.live.unconfirmed import CONFIRMED
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
@@ -53,11 +53,11 @@ class LiveSource(ABC):
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
         self._logger = logging.getLogger(type(self).__module__)
-        self._said = Said(log=self._log)
+        self._events = SourceEvents(log=self._log)
         self._inbox = Inbox(waits=self.waits)
-        self._dropped = Dropped(self._said)
+        self._dropped = Dropped(self._events)
         self._sequencer = Sequencer(
-            self._said,
+            self._events,
             reorder=settings.reorder_batches if self.reorders else 0,
             rate_hz=settings.rate_hz,
             confirmed=CONFIRMED if self.reorders else 1,
@@ -91,17 +91,17 @@ class LiveSource(ABC):
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Channels of the stream, as in its first batch."""
-        return self._sequencer.face.channels
+        return self._sequencer.schema.channels
 
     @property
     def rate_hz(self) -> float:
-        assert self._sequencer.face.rate_hz is not None
-        return self._sequencer.face.rate_hz
+        assert self._sequencer.schema.rate_hz is not None
+        return self._sequencer.schema.rate_hz
 
     @property
     def spectra(self) -> SpectraLayout | None:
         """Layout of its spectra, if the drive sends spectra; None if it sends samples."""
-        return self._sequencer.face.spectra
+        return self._sequencer.schema.spectra
 
     @property
     def samples(self) -> int | None:
@@ -121,7 +121,7 @@ class LiveSource(ABC):
             measured = (self._received - first[1]) / (newest[0] - first[0])
         return Health(
             connected=self._connected,
-            counts=self._said.counts,
+            counts=self._events.counts,
             lost=self._sequencer.lost,
             silent_s=None if newest is None else time.monotonic() - newest[0],
             measured_hz=measured,
@@ -148,14 +148,14 @@ class LiveSource(ABC):
             if position.epoch
             else "it sends no epoch: if it was restarted during the pause, what is missing is an estimate"
         )
-        self._said.say(
+        self._events.report(
             "resumed",
             f"continues after sample {position.number - 1} of the sender; {exact}",
             sender_sample=position.number,
             epoch=f"{position.epoch:#x}",
         )
         if remark := pause(position.arrived, ClockReading.at(time.monotonic())).remark:
-            self._said.say("computer-clock", remark)
+            self._events.report("computer-clock", remark)
 
     def open(self, late: Callable[[str], None] | None = None) -> Self:
         """Begin to receive, and wait for the first batch.
@@ -213,7 +213,7 @@ class LiveSource(ABC):
 
     def take_events(self) -> list[Event]:
         """Events since the last call, of the kinds in `livebode.sources.live.KINDS`."""
-        return self._said.take()
+        return self._events.take()
 
     def stop(self) -> None:
         """Request the end: `blocks` returns what was received and then ends. May be called from a signal handler."""
@@ -281,7 +281,7 @@ class LiveSource(ABC):
         except BaseException as error:  # any error: it must not be lost with the thread
             if isinstance(error, SourceError) and error.code == "source.refused":
                 self._refused = error.at(str(self.address))
-                self._said.say("refused", f"{self._refused}; no further attempt is made")
+                self._events.report("refused", f"{self._refused}; no further attempt is made")
             else:
                 self._failure = error
         finally:
@@ -298,20 +298,20 @@ class LiveSource(ABC):
     def _stands(self) -> None:
         """The connection is established."""
         self._connected, self._outage = True, False
-        self._said.say("connected", f"connected to {self.address}")
+        self._events.report("connected", f"connected to {self.address}")
 
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
         """Set the channels of a record that continues; they are known before new samples arrive."""
         if self._resumed is not None:
-            self._sequencer.face.announce(channels, rate_hz)
+            self._sequencer.schema.announce(channels, rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
-            self._said.say("disconnected", f"{self.address}: {why}; retrying with increasing delay")
+            self._events.report("disconnected", f"{self.address}: {why}; retrying with increasing delay")
         self._connected, self._outage, self._trouble = False, True, why
 
     def _malformed(self, why: object) -> None:
-        self._said.say("malformed", f"{self.address}: {why}")
+        self._events.report("malformed", f"{self.address}: {why}")
         self._trouble = why
 
     def _deliver(self, batch: AnyBatch) -> None:

@@ -50,7 +50,7 @@ class UdpSource(LiveSource):
                 except TimeoutError:
                     continue
                 if sender is not None and (other := plain_address(host)) != sender:
-                    self._said.say("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
+                    self._events.report("foreign", f"a datagram from {other} was dropped; source.sender is {sender}")
                     self._trouble = f"datagrams come from {other}, and source.sender is {sender}"
                     continue
                 try:

@@ -34,7 +34,7 @@ class EventSummary:
     kinds: dict[str, Kind] = field(default_factory=dict)
     early: list[Event] = field(default_factory=list)
     late: deque[Event] = field(default_factory=lambda: deque(maxlen=_IN_FULL))
-    told: int = 0
+    reported: int = 0
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> EventSummary:
@@ -51,7 +51,7 @@ class EventSummary:
         kind.newest = event
         if event.kind not in ALARMS and not event.kind.startswith("record-"):
             return
-        self.told += 1
+        self.reported += 1
         (self.early if len(self.early) < _IN_FULL else self.late).append(event)
 
     def count(self, kind: str) -> int:
@@ -66,7 +66,7 @@ class EventSummary:
     @property
     def left_out(self) -> int:
         """Number of events between the first and the newest that are not retained."""
-        return self.told - len(self.early) - len(self.late)
+        return self.reported - len(self.early) - len(self.late)
 
     def parts(self) -> tuple[Part, ...]:
         """A table of the kinds, and a list of the alarms."""
@@ -81,7 +81,7 @@ class EventSummary:
         )  # fmt: skip
         headings = (tr("kind"), tr("count"), tr("first"), tr("newest"), tr("newest message"))
         grouped = Table(headings, rows, (1,))
-        if not self.told:
+        if not self.reported:
             return (grouped,)
         note = trn(
             "{n:,} event between them not shown; events.jsonl contains all.",

@@ -1,4 +1,4 @@
-"""Wish: the specification of an experiment, before anything is chosen."""
+"""ExperimentSpec: the specification of an experiment, before anything is chosen."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from livebode.core import UsageError
 from livebode.excitation import Phases
 from livebode.excitation.chirp import Sweep
 from livebode.experiment_design.mains import MAINS_HZ
-from livebode.experiment_design.wish_checks import check
+from livebode.experiment_design.spec_checks import check
 
 Kind = Literal["multisine", "odd", "prbs", "chirp", "stepped"]
 Shape = Literal["flat", "equal snr"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class ExperimentSpec:
     """Specification of an experiment; values that are None are chosen automatically.
 
     Parameters

@@ -19,7 +19,7 @@ from livebode.core.clock import moment
 from livebode.fitting import Fit
 from livebode.language import recognised, tr
 from livebode.records import Run
-from livebode.reporting.happenings import EventSummary
+from livebode.reporting.event_summary import EventSummary
 
 if TYPE_CHECKING:
     from livebode.validation import Validation
@@ -35,7 +35,7 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class ReportData:
     """The data of a run that a report needs.
 
     Attributes
@@ -50,7 +50,7 @@ class Material:
         Margins of the described loop; or None and the reason.
     tracks
         Parameters and margins over the run, by model.
-    happenings
+    event_summary
         Its events.
     judged
         The validation, if requested.
@@ -64,7 +64,7 @@ class Material:
     loop: LoopReport | None
     loop_words: str
     tracks: dict[str, Track]
-    happenings: EventSummary
+    event_summary: EventSummary
     judged: Judged | None = None
 
     @property
@@ -93,7 +93,7 @@ class Material:
         return {role: str(name) for role, name in self.configuration.get("signals", {}).items()}
 
 
-def read(directory: Path, judged: Judged | None = None) -> Material:
+def read(directory: Path, judged: Judged | None = None) -> ReportData:
     """Read the run.
 
     Raises
@@ -106,8 +106,8 @@ def read(directory: Path, judged: Judged | None = None) -> Material:
     fit, fit_words = _fit(configuration, of)
     loop, loop_words = _loop(configuration, of, fit)
     over = tracks(run, of.overview.sample, of.overview.time_s)
-    happenings = EventSummary.of(run.each_event_and_damage())
-    return Material(run, configuration, of, fit, fit_words, loop, loop_words, over, happenings, judged)
+    event_summary = EventSummary.of(run.each_event_and_damage())
+    return ReportData(run, configuration, of, fit, fit_words, loop, loop_words, over, event_summary, judged)
 
 
 def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:

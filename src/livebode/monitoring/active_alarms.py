@@ -23,7 +23,7 @@ _MOVING = 0.005  # of the offset, from one stretch to the next: the others wait 
 _MOST = 0.7  # of a logarithm: a factor of two
 
 
-class Standing(StatefulBase):
+class ActiveAlarms(StatefulBase):
     """Alarms, with the resulting Offset of the model.
 
     The model follows the active changes, stretch by stretch, so that evidence remains small and a large change does
@@ -87,7 +87,7 @@ class Standing(StatefulBase):
 
     def corrected(self) -> list[tuple[Alarm, float]]:
         """Reported alarms whose amount is wrong now that the others are identified, with the reported amount."""
-        wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.told_wrong]
+        wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.needs_correction]
         return [(alarm.tell(), told) for alarm, told in wrong]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:

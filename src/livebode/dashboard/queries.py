@@ -30,7 +30,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Wish:
+class ClientMessage:
     """A message on the web socket.
 
     `watch` selects axis and quantity (default: the quantity of the run), `pause` stops and `resume` continues updates,
@@ -74,10 +74,10 @@ def span(query: Mapping[str, str], axes: int) -> Span:
     return Span(axis, _quantity(query.get("quantity", "plant")), from_s, to_s, rows, format)
 
 
-def wish(text: str, axes: int) -> Wish:
+def client_message(text: str, axes: int) -> ClientMessage:
     """Parse a message; LivebodeError if it is invalid.
 
-    >>> wish('{"kind": "watch", "axis": 0, "quantity": "open loop"}', axes=1).quantity
+    >>> client_message('{"kind": "watch", "axis": 0, "quantity": "open loop"}', axes=1).quantity
     'open loop'
     """
     if len(text) > MESSAGE_BYTES_MAX:
@@ -95,16 +95,16 @@ def wish(text: str, axes: int) -> Wish:
             raise UsageError("unreadable", "axis is not a whole number", "give the number of an axis", argument="axis")
         quantity = said.get("quantity")
         asked_for = None if quantity is None else _quantity(quantity)
-        return Wish(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
+        return ClientMessage(kind, _whole(str(axis)[:10], 0, axes - 1, "axis"), asked_for)
     if kind in ("pause", "resume", "unfreeze"):
-        return Wish(kind)
+        return ClientMessage(kind)
     if kind == "freeze":
         time_s = said.get("time_s")
         if time_s is not None:
             if isinstance(time_s, bool) or not isinstance(time_s, int | float):
                 raise UsageError("unreadable", "time_s is not a number", "give seconds", argument="time_s")
             time_s = _time(str(time_s)[:40])
-        return Wish(kind, time_s=time_s)
+        return ClientMessage(kind, time_s=time_s)
     raise UsageError(
         "not-one-of",
         f"the message's kind {str(kind)[:20]!r} is not known",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from livebode.sources.live.said import Said
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 
 CONFIRMED = 2
@@ -13,7 +13,7 @@ CONFIRMED_NEAR = 32
 """The same if numbers go back by less than a minute: a broker may repeat that many."""
 
 
-class Doubts:
+class UnconfirmedBatches:
     """Batches that do not continue the stream, of one kind at a time; a batch of another kind replaces them.
 
     Parameters
@@ -26,36 +26,36 @@ class Doubts:
         Number of batches that may be late: a replaced epoch needs more than this to be accepted again.
     """
 
-    def __init__(self, said: Said, confirmed: int, reorder: int) -> None:
-        self._said, self._confirmed = said, confirmed
+    def __init__(self, said: SourceEvents, confirmed: int, reorder: int) -> None:
+        self._events, self._confirmed = said, confirmed
         self._confirmed_again = max(CONFIRMED, reorder + 1)
-        self._doubted: list[AnyBatch] = []
+        self._batches: list[AnyBatch] = []
 
     def another_epoch(self, batch: AnyBatch, epoch: int | None, due: int | None, *, replaced: bool) -> list[AnyBatch]:
         """Take a batch of another epoch; returns what is accepted now, if anything."""
-        follows = bool(self._doubted) and self._doubted[-1].epoch == batch.epoch
+        follows = bool(self._batches) and self._batches[-1].epoch == batch.epoch
         return self._taken(batch, epoch, due, follows, self._confirmed_again if replaced else self._confirmed)
 
     def ahead(self, batch: AnyBatch, epoch: int | None, due: int | None, near: float) -> list[AnyBatch]:
         """Take a batch that is far ahead; its successors are `near` it."""
-        last = self._doubted[-1] if self._doubted else None
+        last = self._batches[-1] if self._batches else None
         follows = last is not None and last.epoch == batch.epoch and abs(batch.first_sample - last.stop) <= near
         return self._taken(batch, epoch, due, follows, CONFIRMED_AHEAD)
 
     def behind(self, batch: AnyBatch, epoch: int | None, due: int | None, *, far: bool) -> list[AnyBatch]:
         """Take a batch that is behind: a repeat, or numbers that begin again."""
-        last = self._doubted[-1] if self._doubted else None
+        last = self._batches[-1] if self._batches else None
         follows = last is not None and last.epoch == batch.epoch and last.stop == batch.first_sample
         return self._taken(batch, epoch, due, follows, CONFIRMED if far else CONFIRMED_NEAR)
 
     def dismiss(self, epoch: int | None, due: int | None) -> None:
         """Drop them; those of the stream's `epoch` from before the sample that is `due` were repeats."""
-        doubted, self._doubted = self._doubted, []
+        doubted, self._batches = self._batches, []
         for batch in doubted:
             if batch.epoch == epoch and due is not None and batch.stop <= due:
-                self._said.say("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
+                self._events.report("repeat", f"sample {batch.first_sample} of the sender was repeated and dropped")
             else:
-                self._said.say(
+                self._events.report(
                     "foreign",
                     f"a batch at sample {batch.first_sample} of epoch {batch.epoch:#x} does not belong to the stream "
                     "and was dropped",
@@ -66,8 +66,8 @@ class Doubts:
     def _taken(self, batch: AnyBatch, epoch: int | None, due: int | None, follows: bool, needed: int) -> list[AnyBatch]:
         if not follows:
             self.dismiss(epoch, due)
-        self._doubted.append(batch)
-        if len(self._doubted) < needed:
+        self._batches.append(batch)
+        if len(self._batches) < needed:
             return []
-        believed, self._doubted = self._doubted, []
-        return believed
+        accepted, self._batches = self._batches, []
+        return accepted

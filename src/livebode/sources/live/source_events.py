@@ -33,7 +33,7 @@ PENDING_MAX = 1000
 MESSAGE_MAX = 500
 
 
-class Said:
+class SourceEvents:
     """Collects Events from any thread. Of each kind at most 50 at once, then 5 per second.
 
     The others are counted, and the next Event of their kind gives their number in ``details["more"]``: a flood of
@@ -65,7 +65,9 @@ class Said:
         with self._lock:
             return dict(self._counts)
 
-    def say(self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any) -> None:
+    def report(
+        self, kind: str, message: str, *, sample: int | None = None, rate_hz: float = 0.0, **details: Any
+    ) -> None:
         """Count `kind`, and create an Event if the rate allows it."""
         with self._lock:
             self._counts[kind] += 1

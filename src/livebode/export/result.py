@@ -11,7 +11,7 @@ VALUES_MAX = 1 << 23
 """Most values (responses times lines) of a format that is not written in parts: about 2 GB of memory."""
 
 
-class Written(NamedTuple):
+class WriteResult(NamedTuple):
     """Number of rows in a file, and of rows that the format could not represent."""
 
     rows: int

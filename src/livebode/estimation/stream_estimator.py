@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Emit, Event, Responses, StatefulBase, ignore
-from livebode.estimation.counted import Counted
 from livebode.estimation.line_stage import LineStage
+from livebode.estimation.stream_counters import StreamCounters
 
 Floats = NDArray[np.float64]
-W = TypeVar("W", bound=Counted)
+W = TypeVar("W", bound=StreamCounters)
 
 
-class AroundLines(StatefulBase, Generic[W]):
+class StreamEstimator(StatefulBase, Generic[W]):
     """Base of the classes that feed a LineStage. A subclass sets these parts and returns `_nothing` if it has none."""
 
     _lines: LineStage

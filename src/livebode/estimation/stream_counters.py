@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from livebode.core import Block, Event, StatefulBase
 
 
-class Counted(StatefulBase):
+class StreamCounters(StatefulBase):
     """Counts and Events of a stream of Blocks.
 
     Events are appended to `events`. `kinds` are reasons for exclusion, `also` further counts, and `last` the sample at

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.core import Channel, SpectraLayout
-from livebode.sources.live.said import Said
+from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch, SpectraBatch
 
 SAME_RATE = 1e-9
 
 
-class Face:
+class StreamSchema:
     """Channels and rate of a stream. A batch with others is skipped, because its values have another meaning.
 
     Channels in another order, or with new ones among them, are sorted and used. Spectra must have the same layout. The
@@ -27,8 +27,8 @@ class Face:
         Required rate, if it is known in advance.
     """
 
-    def __init__(self, said: Said, rate_hz: float | None = None) -> None:
-        self._said = said
+    def __init__(self, said: SourceEvents, rate_hz: float | None = None) -> None:
+        self._events = said
         self.channels: tuple[Channel, ...] = ()
         self.rate_hz = rate_hz
         self.spectra: SpectraLayout | None = None
@@ -61,7 +61,7 @@ class Face:
         """Rows of the stream's channels in the batch; None if it cannot be used. Reports what changed."""
         assert self.rate_hz is not None
         if abs(batch.rate_hz / self.rate_hz - 1) > SAME_RATE:
-            self._said.say(
+            self._events.report(
                 "wrong-rate",
                 f"the sender states {batch.rate_hz:.9g} Hz instead of {self.rate_hz:.9g} Hz; its samples are skipped",
                 stated_hz=batch.rate_hz,
@@ -70,14 +70,14 @@ class Face:
             return None
         if (layout := _layout(batch)) != self.spectra:
             now = "samples" if layout is None else "spectra" if self.spectra is None else "spectra of another layout"
-            self._said.say(
+            self._events.report(
                 "layout-changed", f"the sender now sends {now}; they are skipped until the first layout is back"
             )
             return None
         units = {channel.name: channel.unit for channel in batch.channels}
         names = list(units)
         if missing := [channel.name for channel in self.channels if channel.name not in units]:
-            self._said.say(
+            self._events.report(
                 "layout-changed",
                 f"the sender no longer has channel {missing[0]!r}; its samples are skipped until it is back",
                 channels=names,
@@ -85,7 +85,7 @@ class Face:
             return None
         for channel in self.channels:
             if channel.unit != units[channel.name]:
-                self._said.say(
+                self._events.report(
                     "unit-changed",
                     f"the unit of channel {channel.name!r} changed from {channel.unit!r} to {units[channel.name]!r}; "
                     "its samples are skipped",
@@ -94,7 +94,7 @@ class Face:
                 )
                 return None
         if names != [channel.name for channel in self.channels]:
-            self._said.say(
+            self._events.report(
                 "layout-changed", "the sender's channels changed; the first ones are used, by name", channels=names
             )
         return [names.index(channel.name) for channel in self.channels]
