@@ -27,8 +27,8 @@ def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
         "write_samples", "_monitor_samples", "_estimate", "_record_and_publish", "_report_events", "_check_signals",
         "announce", "commit",
     ]  # fmt: skip
-    order = ("number", "split", "monitor", "estimate", "record and publish", "events", "check signals", "commit")
-    places = [PAGE.index(f"| {word} |") for word in order]
+    order = ("Number", "Split", "Monitor", "Estimate", "Record and publish", "Events", "Check signals", "Commit")
+    places = [PAGE.index(f"\n{word}\n: ") for word in order]
     assert places == sorted(places)
 
 
