@@ -82,7 +82,7 @@ app = typer.Typer(
     cls=_Group,
     help="The Bode plot of a machine while the machine works.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
 )
 _COMMANDS: dict[str, Callable[..., None]] = {

@@ -2,7 +2,8 @@
 
 from livebode.core._block import Block, Channel, nearest_name
 from livebode.core._event import Emit, Event, ignore
-from livebode.core._frequency_response import PER_LINE, PlotKind, Quantity
+from livebode.core._frequency_response import PER_LINE, Quantity
+from livebode.core._kinds import PlotKind
 from livebode.core._loop import Loop
 from livebode.core._plotting import plot_responses
 from livebode.core._response import PER_RESPONSE, Response, Responses, widened

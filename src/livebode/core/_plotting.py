@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from livebode.core._frequency_response import PlotKind
+from livebode.core._kinds import PlotKind
 from livebode.core.errors import UsageError
 from livebode.drawing import Cloud, Curve
 

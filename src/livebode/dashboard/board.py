@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from livebode.core import LivebodeError, ServerError
 from livebode.dashboard.access import Access
-from livebode.dashboard.client import Pulse
 from livebode.dashboard.notices import acknowledgement
 from livebode.dashboard.places import Places
+from livebode.dashboard.pulse import Pulse
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
 

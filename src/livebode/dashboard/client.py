@@ -174,19 +174,3 @@ class Client:
 
     async def _tell(self, news: dict[str, Any]) -> None:
         await asyncio.wait_for(self._socket.send_text(to_json(news)), SLOW_S)
-
-
-class Pulse:
-    """Wakes all that wait for the next update."""
-
-    def __init__(self) -> None:
-        self._next = asyncio.Event()
-
-    async def wait_next(self) -> None:
-        """Wait for the next update."""
-        await self._next.wait()
-
-    def beat(self) -> None:
-        """Wake all that wait now."""
-        before, self._next = self._next, asyncio.Event()
-        before.set()

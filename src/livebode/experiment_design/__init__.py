@@ -3,8 +3,8 @@
 from livebode.experiment_design.accuracy import Accuracy, accuracy_of
 from livebode.experiment_design.axis_file import axis_text
 from livebode.experiment_design.belt import belt_machine
-from livebode.experiment_design.choose import Design, choose
-from livebode.experiment_design.explain import Choice
+from livebode.experiment_design.choose import choose
+from livebode.experiment_design.design import Choice, Design
 from livebode.experiment_design.files import FORMATS, write
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import QUANTITIES, UNITS, Machine, Place

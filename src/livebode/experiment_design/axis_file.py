@@ -9,7 +9,7 @@ import tomli_w
 
 from livebode.core import Lines
 from livebode.estimation.settings import DETECTION_LINES_MIN
-from livebode.experiment_design.choose import Design
+from livebode.experiment_design.design import Design
 
 
 def axis_text(

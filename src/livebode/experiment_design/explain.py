@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from livebode.core import counted
+from livebode.experiment_design.design import Choice, Design
 from livebode.experiment_design.encoder import encoder_words
 from livebode.experiment_design.grid import Grid
 from livebode.experiment_design.limits import MachineLimits
@@ -18,18 +17,6 @@ from livebode.experiment_design.peaks import Peak, worst
 
 _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
-
-if TYPE_CHECKING:
-    from livebode.experiment_design.choose import Design
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One row of the table that explains a design."""
-
-    what: str
-    value: str
-    why: str
 
 
 def explained(design: Design, found: Grid, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
+from livebode.monitoring import baseline_file
+from livebode.monitoring.baseline_file import ROLES
 from livebode.monitoring.machine import Machine
 from livebode.monitoring.rows import PLACES, places
 from livebode.monitoring.table import Table
-
-ROLES = ("output", "input", "excitation", "schedule")
 
 _ON = {True: "on", False: "off"}
 
@@ -139,15 +139,11 @@ class Baseline:
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Baseline:
         """The baseline in a file; BaselineError where it cannot be read or is not a baseline."""
-        from livebode.monitoring.baseline_file import load
-
-        return load(Path(path))
+        return cls(**baseline_file.load(Path(path)))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write it to a file, completely or not at all; docs/how-to/monitoring.md describes the content."""
-        from livebode.monitoring.baseline_file import save
-
-        save(self, Path(path))
+        baseline_file.save(vars(self), Path(path))
 
 
 def signals_of(settings: Settings) -> dict[str, str | None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,6 @@ from numpy.typing import NDArray
 
 from livebode.core import BaselineError, Lines, LivebodeError, OutputError
 from livebode.monitoring.accuracy import Accuracy
-from livebode.monitoring.baseline import ROLES, Baseline
 from livebode.monitoring.baseline_part import Part
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
@@ -24,14 +24,16 @@ from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.monitoring.table import Table
 from livebode.motion import Curve, MovingModel
 
+ROLES = ("output", "input", "excitation", "schedule")
+
 _FORMAT = "livebode baseline"
 _VERSION = 4
 _LEARN = "learn one from runs (livebode learn)"
 _COVARIATE_ARRAYS = {"mean": 1, "low": 1, "high": 1, "slope": 2, "covariance": 3}  # and their dimensions
 
 
-def save(baseline: Baseline, path: Path) -> None:
-    """Write to a temporary file in the same directory, and move it into place when it is complete."""
+def save(baseline: Mapping[str, Any], path: Path) -> None:
+    """Write the fields of a Baseline to a temporary file beside it, and move it into place when it is complete."""
     text = json.dumps(_plain(baseline), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -55,8 +57,8 @@ def save(baseline: Baseline, path: Path) -> None:
         ) from None
 
 
-def load(path: Path) -> Baseline:
-    """Read a file that `save` wrote."""
+def load(path: Path) -> dict[str, Any]:
+    """The fields of a Baseline in a file that `save` wrote."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -93,29 +95,29 @@ def load(path: Path) -> Baseline:
             path=str(path),
             version=found,
         )
-    return _baseline(Part(str(path), "", data))
+    return _fields(Part(str(path), "", data))
 
 
-def _plain(baseline: Baseline) -> dict[str, Any]:
-    lines = baseline.lines
+def _plain(baseline: Mapping[str, Any]) -> dict[str, Any]:
+    lines = baseline["lines"]
     return {
         "format": _FORMAT,
         "version": _VERSION,
         "livebode": version("livebode"),
-        "runs": list(baseline.runs),
+        "runs": list(baseline["runs"]),
         "lines": {"bins": lines.bins, "quiet": lines.quiet, "window": lines.window, "rate_hz": lines.rate_hz},
-        "hop": baseline.hop,
-        "signals": baseline.signals,
-        "estimator": baseline.estimator,
-        "quantity": baseline.quantity,
-        "corrected": baseline.corrected,
-        "machine": _machine_plain(baseline.machine) if baseline.machine else None,
-        "remark": baseline.remark,
-        "tables": [_table_plain(table) for table in baseline.tables],
+        "hop": baseline["hop"],
+        "signals": baseline["signals"],
+        "estimator": baseline["estimator"],
+        "quantity": baseline["quantity"],
+        "corrected": baseline["corrected"],
+        "machine": _machine_plain(baseline["machine"]) if baseline["machine"] else None,
+        "remark": baseline["remark"],
+        "tables": [_table_plain(table) for table in baseline["tables"]],
     }
 
 
-def _baseline(data: Part) -> Baseline:
+def _fields(data: Part) -> dict[str, Any]:
     part = data.part("lines")
     bins, quiet = (tuple(int(b) for b in part.array(name, 1, least=0)) for name in ("bins", "quiet"))
     window, rate_hz = part.whole("window"), part.number("rate_hz", 0)
@@ -137,18 +139,18 @@ def _baseline(data: Part) -> Baseline:
     hop = data.whole("hop")
     if hop < 1:
         raise data.wrong("hop", "below 1")
-    return Baseline(
-        lines,
-        hop,
-        {role: signals.value(role) and signals.text(role) for role in ROLES},
-        data.text("estimator"),
-        data.text("quantity"),
-        tables,
-        None if data.value("machine") is None else _machine(data.part("machine"), lines),
-        data.truth("corrected"),
-        data.texts("runs"),
-        data.text("remark"),
-    )
+    return {
+        "lines": lines,
+        "hop": hop,
+        "signals": {role: signals.value(role) and signals.text(role) for role in ROLES},
+        "estimator": data.text("estimator"),
+        "quantity": data.text("quantity"),
+        "tables": tables,
+        "machine": None if data.value("machine") is None else _machine(data.part("machine"), lines),
+        "corrected": data.truth("corrected"),
+        "runs": data.texts("runs"),
+        "remark": data.text("remark"),
+    }
 
 
 def _machine_plain(machine: Machine) -> dict[str, Any]:
