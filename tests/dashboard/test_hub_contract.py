@@ -287,7 +287,7 @@ def test_an_axis_that_begins_a_new_run_may_have_other_lines(tmp_path: Path) -> N
         state.refresh()
         assert state.facts()["frequency_hz"] == lines.frequency_hz.tolist()
         assert decoded(state.newest_frames("plant"))[0]["magnitude"].shape == (1, len(lines))  # type: ignore[attr-defined]
-        hub(made(1, lines, hole=0.0, unit=""))  # that nobody takes before it begins anew
+        hub(made(1, lines, hole=0.0, unit=""))  # that nobody takes before the next run begins
     assert state.runs == 2
 
 
