@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from math import inf
@@ -13,7 +12,7 @@ from typing import Any, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from livebode.configuration.axis import LoopSection, nearest
-from livebode.configuration.toml_file import shortened
+from livebode.configuration.toml_file import read_table, shortened
 from livebode.core import ConfigError
 from livebode.experiment_design import ExperimentSpec, Machine, MachineLimits, belt_machine
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
@@ -55,28 +54,7 @@ class Experiment(BaseModel):
         ConfigError
             If the file cannot be read, is not TOML, or a key or a value is invalid; the message contains it.
         """
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise ConfigError("file-unreadable", f"there is no file {path}", "check the name", path=str(path)) from None
-        except OSError as error:
-            raise ConfigError(
-                "file-unreadable",
-                f"{str(path)!r} cannot be read: {error.strerror}",
-                "check the path and its permissions",
-                path=str(path),
-            ) from None
-        except UnicodeDecodeError:
-            raise ConfigError(
-                "not-text",
-                f"{str(path)!r} is not text",
-                "give the description of an experiment in TOML",
-                path=str(path),
-            ) from None
-        except tomllib.TOMLDecodeError as error:
-            raise ConfigError(
-                "not-toml", f"{str(path)!r} is not TOML: {error}", "correct it there", path=str(path)
-            ) from None
+        data = read_table(path)
         wanted, above = data.get("excitation", {}), dict(over or {})
         if isinstance(wanted, dict):
             # A band instead of lines, a resolution instead of a window: both at once would contradict each other.
