@@ -1,7 +1,7 @@
 """The types that all other packages use: samples, lines, responses, loops, events, errors."""
 
 from livebode.core._block import Block, Channel, nearest_name
-from livebode.core._event import Emit, Event, ignore
+from livebode.core._event import Emit, Event, hand_over, ignore
 from livebode.core._frequency_response import PER_LINE, Quantity
 from livebode.core._kinds import PlotKind
 from livebode.core._loop import Loop
@@ -79,6 +79,7 @@ __all__ = [
     "UsageError",
     "as_model",
     "counted",
+    "hand_over",
     "ignore",
     "nearest_name",
     "plot_responses",

@@ -35,3 +35,10 @@ Emit = Callable[[Event], None]
 
 def ignore(event: Event) -> None:
     """The `Emit` of a caller who does not need events."""
+
+
+def hand_over(events: list[Event], emit: Emit) -> None:
+    """Emit the events in the order of their samples, and empty the list."""
+    for event in sorted(events, key=lambda event: event.sample):
+        emit(event)
+    events.clear()

@@ -20,6 +20,7 @@ from livebode.core import (
     SpectraLayout,
     Stage,
     UsageError,
+    hand_over,
     ignore,
 )
 from livebode.estimation.implausible import PlausibleRange
@@ -128,7 +129,7 @@ class SpectraTracker(StreamEstimator[SpectraWatch]):
         centre = np.stack([time_s, schedule])
         responses = self._lines.process(rows, place, centre, block.channels, ripple=ripple)
         self._nothing = responses[0:0]
-        self._hand_over(emit)
+        hand_over(self._events, emit)
         return responses
 
     @property

@@ -46,12 +46,6 @@ class StreamEstimator(StatefulBase, Generic[W]):
         """Remaining responses at the end: always an empty batch; None where no samples came."""
         return self._nothing
 
-    def _hand_over(self, emit: Emit) -> None:
-        """Emit the events that its parts found in this batch: missing and excluded samples, and verdicts on lines."""
-        for event in sorted(self._events, key=lambda event: event.sample):
-            emit(event)
-        self._events.clear()
-
     def _state(self) -> dict[str, Any]:
         return dict(self._parts)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, ignore
+from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, hand_over, ignore
 from livebode.estimation.centre import Centre
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
@@ -135,5 +135,5 @@ class Tracker(StreamEstimator[Watch]):
             ripple = ripple_power(s.ripple, s.lines, self._speed.at(schedule, rows.sample - block.start))
         responses = self._lines.process(rows, place, centre, block.channels, repeating, ripple)
         self._nothing = responses[0:0]
-        self._hand_over(emit)
+        hand_over(self._events, emit)
         return responses

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, ignore
+from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
 from livebode.estimation import Settings, Tracker
 from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, Recorded
@@ -199,7 +199,7 @@ class MotionCorrection(StatefulBase):
             at += len(piece)
             if self._recorded.stop == wanted:
                 done.append(self._corrected(self._from + self._chunk))
-        self._hand_over(emit)
+        hand_over(self._events, emit)
         return Responses.join(done) if done else tracked[0:0]
 
     def finish(self, emit: Emit = ignore) -> Responses:
@@ -207,13 +207,8 @@ class MotionCorrection(StatefulBase):
         if not self._recorded:
             raise SignalError("too-short", "there are no samples to finish", "process a block first", samples=0)
         last = self._finished()
-        self._hand_over(emit)
+        hand_over(self._events, emit)
         return last
-
-    def _hand_over(self, emit: Emit) -> None:
-        for event in sorted(self._events, key=lambda event: event.sample):
-            emit(event)
-        self._events.clear()
 
     def _finished(self) -> Responses:
         last = self._corrected(self._recorded.stop)
