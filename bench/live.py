@@ -27,7 +27,7 @@ from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
 from livebode.dashboard import Dashboard, Serving
 from livebode.runtime import Destination, Document, Session, Subscriber
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
 CHANNELS = (Channel("w", "N m"), Channel("u", "N m"), Channel("y", "rad/s"))
@@ -48,7 +48,7 @@ class Clock:
     def __call__(self, document: Document) -> None:
         if isinstance(document, Responses):
             self._new += len(document)
-        elif isinstance(document, Tracked):
+        elif isinstance(document, TrackerResults):
             self._measure(document.block)
 
     def _measure(self, block: Block) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from livebode import Block, Parameters, Responses, Settings, Tracker
-from livebode.fitting import Fitter, Grid, TwoMass
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass
 from livebode.fitting.problem import Measured, Problem
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
@@ -51,7 +51,7 @@ def standing(runs: int, periods: int = PERIODS[0]) -> Parameters:
 
 def least_variance(periods: int = PERIODS[0]) -> Floats:
     """Cramér–Rao bound of the logarithms of Js, mL, Keff, bs: white noise on y makes sigma² = N·σ²/|U|² a period."""
-    grid = Grid.of(lines())
+    grid = EvaluationGrid.of(lines())
     u = np.abs(BeltAxis(mechanics=FROZEN).closed_loop(PLACE_M).responses(grid.frequency_hz)[1]) * WINDOW / 2
     sigma = np.sqrt(WINDOW / periods) * SIGMA / u
     exact = Measured(MODEL.at(TRUTH, grid)[np.newaxis], sigma[np.newaxis], np.ones((1, sigma.size), dtype=bool))
@@ -97,7 +97,7 @@ def rubbing(short: bool) -> Table:
         )  # fmt: skip
         settings = Settings(lines=lines(), output="velocity", input="u", excitation="w", hop=80, noise="quiet")
         responses = Tracker(settings).process(SimulatedAxis(axis).run()[0])[60:]
-        truth = MODEL.at(TRUTH, Grid.of(lines()))
+        truth = MODEL.at(TRUTH, EvaluationGrid.of(lines()))
         db = 20 * np.log10(np.abs(responses.value.mean(axis=0) / truth))
         found = Fitter(MODEL).process(responses)
         keff = f"{100 * (np.median(found['Keff'][found.ok]) / TRUTH[2] - 1):+.1f}" if found.ok.any() else "none"

@@ -15,7 +15,7 @@ from livebode.core import LivebodeError
 from livebode.excitation import multisine
 from livebode.experiment_design import Waveform, choose, write
 from livebode.experiments.experiment import Experiment
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.report import save_excitation_picture
 from livebode.simulation import SimulatedAxis
 from tests.support.command import livebode, write_parquet
@@ -63,7 +63,7 @@ def test_the_axis_file_tracks_what_was_designed(kind, tmp_path):
     played(path, samples, told["recording_s"], out / "log.parquet")
     ran = livebode("run", out / "axis.toml", "--out", tmp_path / "run")
     assert ran.code == 0, ran.err
-    run = Run.open(tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
     found = run.responses()
     np.testing.assert_allclose(found.lines.frequency_hz, told["frequency_hz"], rtol=1e-9)
     assert run.found["window"] == told["window"]
@@ -86,7 +86,7 @@ def test_the_axis_file_frees_the_responses_of_a_moving_axis_from_its_motion(tmp_
     played(path, np.load(out / "excitation.npz")["samples"], told["recording_s"], out / "log.parquet")
     ran = livebode("run", out / "axis.toml", "--out", tmp_path / "run")
     assert ran.code == 0, ran.err
-    found = Run.open(tmp_path / "run").responses()
+    found = RunRecord.open(tmp_path / "run").responses()
     found = found[np.flatnonzero(found.valid.all(axis=1))]
     assert len(found) > 700
     assert found.schedule.min() < 0.65

@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from livebode.dashboard import Dashboard, Serving, patience
 from livebode.dashboard.client import DISPLACED
 from livebode.dashboard.listener import connections_max
-from livebode.dashboard.places import PLACES, Place, Places
+from livebode.dashboard.places import PLACES, ClientPlace, Places
 from livebode.dashboard.server import Faults
 from tests.support.browser import until
 from tests.support.dashboards import Watched
@@ -93,10 +93,10 @@ def test_held_web_sockets_shut_the_owner_out_of_no_page() -> None:
 def test_an_operator_takes_the_place_of_the_oldest_viewer_and_nobody_that_of_an_operator() -> None:
     gone = list[str]()
     places = Places(open=False)
-    viewers = [Place("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
+    viewers = [ClientPlace("viewer", f"192.0.2.{n}", lambda n=n: gone.append(f"viewer {n}")) for n in range(PLACES)]
     assert all(map(places.take, viewers))
-    assert not places.take(Place("viewer", "::1", lambda: None))
-    operators = [Place("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
+    assert not places.take(ClientPlace("viewer", "::1", lambda: None))
+    operators = [ClientPlace("operator", "::1", lambda n=n: gone.append(f"operator {n}")) for n in range(PLACES + 1)]
     assert [places.take(one) for one in operators] == [True] * PLACES + [False]
     assert gone == [f"viewer {n}" for n in range(PLACES)]
     places.leave(operators[0])

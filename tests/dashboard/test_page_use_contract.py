@@ -19,7 +19,7 @@ from scipy.io import loadmat
 
 from livebode.core import Event, Lines
 from livebode.dashboard import Dashboard, Hub, Serving
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import TABLET, Tab, chromium, until
 from tests.support.dashboards import LINES, Watched, begin, whole_run
@@ -183,7 +183,7 @@ def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> No
         tab.until("document.querySelector('#readout th').textContent === '30 Hz'")
         row = page.locator("#readout [data-name=measured]").inner_text().replace("−", "-")
         numbers = [float(x) for x in re.findall(r"[-+]\d+\.\d+(?= dB|°)", row)]
-        newest = Run.open(whole).responses()
+        newest = RunRecord.open(whole).responses()
         newest = newest[int(np.flatnonzero(newest.valid.any(axis=1))[-1])]
         assert numbers[0] == pytest.approx(newest.magnitude_db[1], abs=0.006)
         for key, pane in (("p", "parameters"), ("g", "margins"), ("m", "map")):
@@ -286,7 +286,7 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
 
 
 def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) -> None:
-    run = Run.open(whole).responses()
+    run = RunRecord.open(whole).responses()
     dashboard = Dashboard(Serving("127.0.0.1", 0))
     dashboard.view(whole)
 

@@ -10,7 +10,7 @@ import pytest
 from livebode.core import ConfigError
 from livebode.experiment_design import ExperimentSpec, MachineLimits, belt_machine, choose, worst, write
 from livebode.experiments.experiment import Experiment
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.simulation import BeltAxis, SimulatedAxis, extremes
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
@@ -102,7 +102,7 @@ def runs(tmp_path_factory):
         )
         done = livebode("run", folder / f"{name}.toml", "--out", folder / f"run-{name}")
         assert done.code == 0, done.err
-    assert Run.open(folder / "run-theta").found["unit"] == "rad/(N m)"
+    assert RunRecord.open(folder / "run-theta").found["unit"] == "rad/(N m)"
     return folder
 
 

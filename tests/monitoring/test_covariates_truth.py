@@ -12,7 +12,7 @@ import pytest
 from livebode.analysis.learning import learn
 from livebode.configuration import Axis
 from livebode.core import BaselineError, Block, Event
-from livebode.monitoring import Baseline, Machine, MachineMonitor
+from livebode.monitoring import Baseline, LearnedMachine, MachineMonitor
 from livebode.monitoring.covariates import Covariates, jackknife, parts_of, window_means, with_range
 from livebode.runtime import Destination, run
 from livebode.simulation import TensionLoss
@@ -25,7 +25,7 @@ from tests.support.warm import MEAN_C, PER_KELVIN, Run, at_temperature, judged
 SHORT_S = 6.0
 
 
-def warm() -> Machine:
+def warm() -> LearnedMachine:
     """The axis as it is, with its dependence on the temperature."""
     limits = np.array([MEAN_C - 2.5]), np.array([MEAN_C + 2.8])
     slope = np.array([[-PER_KELVIN], [0.0], [0.0], [0.0]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from livebode.monitoring import DEFAULT_INTERVAL_S, Machine, MachineMonitor, learn_machine
+from livebode.monitoring import DEFAULT_INTERVAL_S, LearnedMachine, MachineMonitor, learn_machine
 from livebode.simulation import SimulatedAxis, TensionLoss
 from tests.support.axes import LINES
 from tests.support.monitored import CHANNELS, NAMES, RADIUS_M, THERE, axis, pieces, recorded, strokes, told, watcher
@@ -13,7 +13,7 @@ SPEED_M_PER_S = 0.3
 
 
 @cache
-def one_way() -> Machine:
+def one_way() -> LearnedMachine:
     """From the strokes there alone, all of one speed."""
     simulated = axis(strokes((SPEED_M_PER_S,) * 2, THERE), 80)
     half = int(simulated.motion.edges_s(4000)[1] * 4000)

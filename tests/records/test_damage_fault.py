@@ -17,17 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import DamageWarning, Event, RecordError
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.segments.damage import total
 from livebode.records.segments.frames import COMMIT, ROWS, frames, to_frame
 from livebode.records.segments.journal import Commit, Journal, head, name_of, read_sealed
 from livebode.records.segments.json_lines import in_line, to_line
-from livebode.records.table import Table
+from livebode.records.table import ColumnTable
 from tests.support.errors import refused
 from tests.support.recorded import check_beginning, expected, machine, record_machine, same
 
 SAMPLES = 2600
-TABLE = Table(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
+TABLE = ColumnTable(pa.schema([("sample", pa.int64()), ("time_s", pa.float64())]))
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def test_a_journal_that_expands_is_refused_in_a_sentence(tmp_path: Path, attack:
         message = message.replace(struct.pack("<q", 8 * rows * columns), struct.pack("<q", 8 * rows), 1)
         message = message[: -8 * rows * (columns - 1)]
         assert pa.ipc.read_record_batch(pa.py_buffer(message), schema).nbytes > 30 * len(message)
-    data = head({"a": Table(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
+    data = head({"a": ColumnTable(schema)}, commit(0)) + to_frame(ROWS, message) + commit(1).to_frame()
     (tmp_path / "open").mkdir()
     with (tmp_path / name_of(1)).open("wb") as file:
         file.write(data)
@@ -245,10 +245,10 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= data.draw(st.integers(1, 255))
     (other / name).write_bytes(content)
-    whole = Run.open(finished)
+    whole = RunRecord.open(finished)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DamageWarning)
-        run = Run.open(other)
+        run = RunRecord.open(other)
         found = run.responses(), run.events(), list(run.tables("samples"))
     told = [str(damage.details["file"]) for damage in run.damages]
     assert told == ([] if name.name == "run-copy.json" else [str(name)] * len(told))
@@ -296,17 +296,17 @@ def test_a_run_with_a_damaged_journal_is_continued_behind_the_damage(tmp_path: P
 
 def check_damage(run: Path, told: Event, journal: str) -> None:
     """That exactly what the event says is missing, and everything else is there."""
-    assert told in Run.open(run).events()
+    assert told in RunRecord.open(run).events()
     assert (run / "damaged" / journal).exists()
     details = told.details
     place = details["places"][0]
-    assert Run.open(run).summary["record"]["damaged"] == {
+    assert RunRecord.open(run).summary["record"]["damaged"] == {
         "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
     }  # fmt: skip
-    number = np.concatenate([table["sample"].to_numpy() for table in Run.open(run).tables("samples")])
+    number = np.concatenate([table["sample"].to_numpy() for table in RunRecord.open(run).tables("samples")])
     lost = np.setdiff1d(np.arange(SAMPLES), number)
     assert lost.size == details["rows"].get("samples", 0)
-    responses = Run.open(run).responses()
+    responses = RunRecord.open(run).responses()
     due = expected(SAMPLES)[0]
     gone = ~np.isin(due.sample, responses.sample)
     assert np.count_nonzero(gone) * len(due.lines) == details["rows"].get("responses", 0)

@@ -14,7 +14,7 @@ import pytest
 from livebode.configuration.axes import axes_of
 from livebode.core import ConfigError, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import free_port
@@ -42,13 +42,13 @@ def test_each_axis_leaves_what_it_would_have_left_alone(tmp_path: Path, number: 
     assert (code, err) == (0, "")
     summaries = json.loads(out)["axes"]
     for name, samples in sent.items():
-        run = Run.open(running.out / name)
+        run = RunRecord.open(running.out / name)
         check_samples([run.path], samples)
         assert run.lines.window == {"x": 100, "y": 200}[name]
         assert summaries[name]["counts"]["samples"] == samples
         assert (run.path / "bode.png").stat().st_size > 10_000
         assert not {e.kind for e in run.events()} - {"connected", "noise-from-detection-lines"}
-    assert same(Run.open(running.out / "x").responses(), Tracker(SETTINGS).process(block(sent["x"])))
+    assert same(RunRecord.open(running.out / "x").responses(), Tracker(SETTINGS).process(block(sent["x"])))
 
 
 def test_an_axis_that_fails_does_not_end_the_others(tmp_path: Path) -> None:
@@ -133,7 +133,9 @@ def test_each_of_two_recordings_has_the_run_that_it_has_alone(tmp_path: Path) ->
             "50,100,200", "--window", 100, "--hop", hop, "--out", tmp_path / f"{name}-alone",
         )  # fmt: skip
         assert alone.code == 0
-        assert same(Run.open(tmp_path / "runs" / name).responses(), Run.open(tmp_path / f"{name}-alone").responses())
+        assert same(
+            RunRecord.open(tmp_path / "runs" / name).responses(), RunRecord.open(tmp_path / f"{name}-alone").responses()
+        )
     assert not (tmp_path / "runs" / "c").exists()
 
 

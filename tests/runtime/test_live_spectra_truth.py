@@ -20,7 +20,7 @@ from livebode.core import Block, Channel, ConfigError, GridError, Lines, Spectra
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.preparation.spectra_plan import check_spectra
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.runtime.change_detection import change_detection
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, TensionLoss
 from livebode.sources.live import SpectraBatch, encode_spectra, encode_spectra_layout
@@ -191,7 +191,7 @@ def test_a_run_on_spectra_is_the_run_on_the_samples(tmp_path: Path, kind: type[P
         mine_at, other_at = (np.lexsort((rows["name"], rows["sample"])) for rows in (mine, other))
         for name in other.keys() - {"schedule"}:
             np.testing.assert_array_equal(mine[name][mine_at], other[name][other_at], err_msg=name)
-        newest, theirs = summary["fit"]["newest"], Run.open(tmp_path / "recorded").summary["fit"]["newest"]
+        newest, theirs = summary["fit"]["newest"], RunRecord.open(tmp_path / "recorded").summary["fit"]["newest"]
         assert newest | {"schedule": None} == theirs | {"schedule": None}
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from livebode.core import Event, Lines, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from tests.support.command import livebode
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import until
@@ -28,7 +28,7 @@ def one(machine: Machine, shared: str = SHARED) -> str:
 
 
 def joined(runs: list[Path]) -> Responses:
-    parts = [Run.open(run).responses() for run in runs]
+    parts = [RunRecord.open(run).responses() for run in runs]
     return Responses.join(parts)
 
 
@@ -60,9 +60,9 @@ def test_every_sample_is_in_one_of_the_records_and_no_window_is_lost(tmp_path: P
     assert same(same_settings, truth)
     # The last one tracks otherwise: as a tracker that begins at its first sample.
     tracker = Tracker(Settings(**{**SETTINGS.__dict__, "hop": 10}))
-    assert same(Run.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
+    assert same(RunRecord.open(runs[3]).responses(), tracker.process(block(sent).cut(int(first), sent)))
     assert said(runs[1])["fit"]["model"] == "rigid"
-    assert pa.concat_tables(Run.open(runs[1]).tables("parameters")).num_rows > 0
+    assert pa.concat_tables(RunRecord.open(runs[1]).tables("parameters")).num_rows > 0
     applied = [[e for e in events(run) if e.kind == "configuration-applied"] for run in runs]
     assert [[e.details["sections"] for e in found] for found in applied] == [[["fit"]], [["fit"]], [["tracking"]], []]
     assert [found[0].sample for found in applied[:3]] == [numbers(run)[-1] + 1 for run in runs[:3]]
@@ -80,7 +80,7 @@ def test_how_the_record_is_cut_changes_in_place(tmp_path: Path) -> None:
         code, _, err = running.end()
     assert code == 0, err
     assert not (running.out / "x-2").exists()
-    long = [s.last_sample - s.first_sample for s in Run.open(running.out / "x").segments if s.table == "samples"]
+    long = [s.last_sample - s.first_sample for s in RunRecord.open(running.out / "x").segments if s.table == "samples"]
     assert len(long) >= 5
     assert min(long) < 1000
     number = numbers(running.out / "x")

@@ -12,10 +12,10 @@ import numpy as np
 from livebode.configuration.axis import RecordSection
 from livebode.core import Block, Channel, Event, Responses
 from livebode.estimation import Settings, Tracker
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.grouped_events import each_event
 from livebode.runtime import Document, Outcome
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 from tests.support.command import LINES, RATE_HZ, signals
 from tests.support.found import with_events
 from tests.support.runs import record
@@ -74,7 +74,7 @@ def record_machine(
     """Record the machine until its end, from where its record ends."""
 
     def listen(document: Document) -> None:
-        if isinstance(document, Tracked):
+        if isinstance(document, TrackerResults):
             progress(document.samples, document.samples_total)
         elif isinstance(document, Event) and document.kind.startswith("record-"):
             tell(document)
@@ -105,7 +105,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
 
     Returns how many samples it holds.
     """
-    run, (responses, events) = Run.open(directory), expected(samples)
+    run, (responses, events) = RunRecord.open(directory), expected(samples)
     found = run.responses()
     assert same(found, responses[: len(found)])
     kept = [table["sample"].to_numpy() for table in run.tables("samples")]
@@ -124,7 +124,7 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
 def check_whole(directory: Path, samples: int) -> None:
     """That a finished record equals that of an uninterrupted run."""
     assert check_beginning(directory, samples, samples) == samples
-    run = Run.open(directory)
+    run = RunRecord.open(directory)
     assert run.finished
     columns = [table.to_pydict() for table in run.tables("samples")]
     for name, values in zip(NAMES, data(samples)):
@@ -136,4 +136,4 @@ def check_whole(directory: Path, samples: int) -> None:
 
 
 def unfinished(directory: Path) -> bool:
-    return not (directory / "run.json").exists() or not Run.open(directory).finished
+    return not (directory / "run.json").exists() or not RunRecord.open(directory).finished

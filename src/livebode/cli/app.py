@@ -41,7 +41,7 @@ from livebode.records import to_json
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class _Group(TyperGroup):
+class _HelpGroup(TyperGroup):
     """The group of commands, with help in colour."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -79,7 +79,7 @@ class _Command(TyperCommand):
 
 
 app = typer.Typer(
-    cls=_Group,
+    cls=_HelpGroup,
     help="The Bode plot of a machine while the machine works.",
     no_args_is_help=True,
     add_completion=True,

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from livebode.cli.failures import failure_of
-from livebode.cli.notices import Notices
+from livebode.cli.notices import NoticePrinter
 from livebode.cli.terminal import console
 from livebode.core import Event, LivebodeError
 from livebode.runtime import Session, StoppedError, Subscriber
@@ -39,7 +39,9 @@ class AxesTerminal:
 
     def subscriber(self, name: str) -> Subscriber:
         """Prints the events of an axis that a person must act on."""
-        return Notices(lambda message: self._print(f"livebode: {name}: {message}" if name else f"livebode: {message}"))
+        return NoticePrinter(
+            lambda message: self._print(f"livebode: {name}: {message}" if name else f"livebode: {message}")
+        )
 
     def run(self, session: Session) -> None:
         """Run the session and show its state."""

@@ -13,7 +13,7 @@ from livebode.core import OutputError
 from livebode.records import to_json
 
 if TYPE_CHECKING:
-    from livebode.monitoring import Baseline, Machine
+    from livebode.monitoring import Baseline, LearnedMachine
 
 _LATE_SAMPLES = 0.05  # less is not reported
 _MACHINE = ("stiffness", "load", "damping", "inertia")
@@ -107,7 +107,7 @@ def _ripple(model: dict[str, Any]) -> str:
     return text
 
 
-def _covariates(machine: Machine) -> list[dict[str, Any]]:
+def _covariates(machine: LearnedMachine) -> list[dict[str, Any]]:
     """Range of each covariate, and its influence in percent per unit."""
     c = machine.covariates
     return [
@@ -116,7 +116,7 @@ def _covariates(machine: Machine) -> list[dict[str, Any]]:
     ]
 
 
-def _between_runs(machine: Machine) -> dict[str, float]:
+def _between_runs(machine: LearnedMachine) -> dict[str, float]:
     """Standard deviation between healthy runs, in percent; empty if they do not differ."""
     if (between := machine.between) is None:
         return {}

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.notices import Notices
+from livebode.cli.notices import NoticePrinter
 from livebode.cli.options import Excitation, Json, Output, Port, Rate, Serve, Time
 from livebode.cli.pictures import counted, drawing, show
 from livebode.cli.serving import SubscribersOf, served
@@ -18,7 +18,7 @@ from livebode.configuration.axis import ServeSection
 from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.records import to_json
 from livebode.runtime import Destination, Document, Draw, Outcome, Session, StoppedError, Subscriber, run
-from livebode.runtime.documents import Tracked
+from livebode.runtime.documents import TrackerResults
 
 
 def run_command(
@@ -189,10 +189,12 @@ def _run(axis: Axis, directory: Path, force: bool, quiet: bool, subscribers: tup
         task = bar.add_task("tracking", total=None)
 
         def show_progress(document: Document) -> None:
-            if isinstance(document, Tracked):
+            if isinstance(document, TrackerResults):
                 bar.update(task, completed=document.samples, total=document.samples_total)
 
-        notices = Notices(lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False))
+        notices = NoticePrinter(
+            lambda message: bar.console.print(f"livebode: {message}", highlight=False, markup=False)
+        )
         return run(axis, Destination(directory, _drawing(axis), force, (*subscribers, show_progress, notices)))
 
 

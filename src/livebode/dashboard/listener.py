@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from livebode.dashboard.access import network
-from livebode.dashboard.patience import PatientProtocol, Waiting
+from livebode.dashboard.patience import ClientWait, PatientProtocol
 
 CONNECTIONS_MAX = 128
 HANDSHAKE_S = 10.0
@@ -47,8 +47,8 @@ class _Connection:
         return self.socket.fileno() >= 0
 
     @property
-    def waits(self) -> Waiting:
-        return Waiting(self._since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
+    def waits(self) -> ClientWait:
+        return ClientWait(self._since_s, HANDSHAKE_S) if self.protocol is None else self.protocol.waits
 
     def drop(self) -> None:
         if self.protocol is not None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.experiment_design.machine import STANDING, Extremes, Machine, Place, Quantity, check_noise
+from livebode.experiment_design.machine import STANDING, Extremes, Machine, OperatingPoint, Quantity, check_noise
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 
 Floats = NDArray[np.float64]
@@ -60,11 +60,11 @@ def _extremes(observed: dict[Quantity, Floats], here: NDArray[np.bool_], at_m: f
     return {name: (float(x[here].min()), float(x[here].max())) for name, x in observed.items()}
 
 
-def _place(axis: BeltAxis, at_m: float, motion: Extremes) -> Place:
+def _place(axis: BeltAxis, at_m: float, motion: Extremes) -> OperatingPoint:
     linear, rate_hz, radius = axis.linear(at_m), axis.drive.rate_hz, axis.mechanics.radius_m
     velocity, angle = linear.sampled(rate_hz), linear.out("position").sampled(rate_hz)
     differenced = Sampled(angle.a, angle.b, angle.c, rate_hz, differenced=True)
-    return Place(
+    return OperatingPoint(
         plant=differenced if axis.sensor.velocity_differenced else velocity,
         speed=radius * velocity,
         travel=linear.out("cart").sampled(rate_hz),

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.core import counted
 from livebode.experiment_design.design import Choice, Design
 from livebode.experiment_design.encoder import encoder_words
-from livebode.experiment_design.grid import Grid
+from livebode.experiment_design.grid import LineChoice
 from livebode.experiment_design.limits import MachineLimits
 from livebode.experiment_design.machine import UNITS, Quantity
 from livebode.experiment_design.mains import mains_words
@@ -19,7 +19,7 @@ _LISTED_MAX = 4  # amplitudes
 _LONG_S = 3600.0
 
 
-def explained(design: Design, found: Grid, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
+def explained(design: Design, found: LineChoice, amplitude_why: str, recording_why: str) -> tuple[Choice, ...]:
     """The table: chosen values and reasons."""
     waveform, lines, machine = design.waveform, design.waveform.lines, design.machine
     f, window_s = lines.frequency_hz, lines.window / lines.rate_hz

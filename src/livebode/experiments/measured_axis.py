@@ -15,7 +15,7 @@ from livebode.experiment_design import Machine, MeasuredResponse, measured_machi
 from livebode.experiment_design.machine import MOTION_KEYS
 from livebode.experiment_design.measured import Output
 from livebode.fitting import mean_response
-from livebode.records import Run
+from livebode.records import RunRecord
 
 Number = Annotated[float, Field(strict=True)]  # true is not a number
 
@@ -53,7 +53,7 @@ class MeasuredAxis:
     """
 
     def __init__(self, section: MeasuredSection, loop: LoopSection | None) -> None:
-        self._section, self._run = section, Run.open(section.run)
+        self._section, self._run = section, RunRecord.open(section.run)
         self._said = recorded_configuration(self._run.summary)
         self._given = loop
         self._loop = loop or LoopSection.model_validate(self._said.get("loop", {}))

@@ -12,7 +12,7 @@ from livebode.monitoring.charts import Charts
 from livebode.monitoring.false_alarms import threshold
 from livebode.monitoring.noise_level import NoiseLevel
 from livebode.monitoring.rows import Rows
-from livebode.monitoring.table import Table
+from livebode.monitoring.table import ScheduleTable
 from livebode.monitoring.table_sentences import cleared, differs, unknown
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ class TableMonitor(StatefulBase):
     _stage = Stage("table-monitor", 1)
     _STATE = ("_charts", "_noise", "_standing", "_seen_in", "judged", "_found", "_told_unknown")
 
-    def __init__(self, table: Table, mean_s: float, step_s: float) -> None:
+    def __init__(self, table: ScheduleTable, mean_s: float, step_s: float) -> None:
         self._table = table
         size = table.accuracy.smallest.size
         self._charts = Charts(table.accuracy.smallest, table.accuracy.allowed, threshold(mean_s, step_s, 2 * size))

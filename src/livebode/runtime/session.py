@@ -15,7 +15,7 @@ from livebode.configuration.axes import Axes, ConfigurationFile
 from livebode.configuration.axis import Axis
 from livebode.core import ConfigError, Event, LivebodeError
 from livebode.runtime.axis_thread import AxisThread
-from livebode.runtime.change import Change, change_of
+from livebode.runtime.change import ChangeRequest, change_of
 from livebode.runtime.destination import Destination
 from livebode.runtime.status import Status
 
@@ -132,9 +132,9 @@ class Session:
             message = f"axis {name} was removed, its run is being finished; the configuration is applied after that"
             self._say("configuration-postponed", message, record=False)
 
-    def _checked(self, axes: Axes) -> dict[str, Change | None]:
+    def _checked(self, axes: Axes) -> dict[str, ChangeRequest | None]:
         """The change for each running axis; LivebodeError if one of them cannot continue with it."""
-        changes: dict[str, Change | None] = {}
+        changes: dict[str, ChangeRequest | None] = {}
         if ("" in axes) != ("" in self.threads):
             raise ConfigError(
                 "change-needs-restart",
@@ -151,7 +151,7 @@ class Session:
                 raise (error.at(f"axis {name}") if name else error) from None
         return changes
 
-    def _apply(self, axes: Axes, changes: Mapping[str, Change | None]) -> None:
+    def _apply(self, axes: Axes, changes: Mapping[str, ChangeRequest | None]) -> None:
         for name, change in changes.items():
             thread = self.threads[name]
             if change is not None:

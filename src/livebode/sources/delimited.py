@@ -13,7 +13,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from livebode.core import RecordingError
-from livebode.sources.cells import EMPTY, Kind
+from livebode.sources.cells import EMPTY, CellKind
 from livebode.sources.columnar import to_numpy
 from livebode.sources.dialect import find_dialect
 from livebode.sources.locate import locate
@@ -39,8 +39,8 @@ class DelimitedRecording(Recording):
         for at, ((name, unit), kind) in enumerate(zip(split_units(headings), self._dialect.kinds, strict=True)):
             unit = self._dialect.units[at] or unit
             aliases = (headings[at],) if headings[at] != name else ()
-            if kind in (Kind.NUMBER, Kind.MOMENT):
-                is_moment = kind is Kind.MOMENT
+            if kind in (CellKind.NUMBER, CellKind.MOMENT):
+                is_moment = kind is CellKind.MOMENT
                 columns.append(Column(name, "ns" if is_moment else unit, None, aliases, temporal=is_moment, key=at))
             elif headings[at]:
                 skipped.append(Skipped(name, "it contains text"))
@@ -80,7 +80,7 @@ class DelimitedRecording(Recording):
         wanted = list(dict.fromkeys(column.key for column in columns))
         names = [str(at) for at in range(dialect.width)]
         moment = pa.timestamp("ns", dialect.zone)
-        types = {names[at]: moment if dialect.kinds[at] is Kind.MOMENT else pa.float64() for at in wanted}
+        types = {names[at]: moment if dialect.kinds[at] is CellKind.MOMENT else pa.float64() for at in wanted}
         with csv.open_csv(
             file,
             read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
