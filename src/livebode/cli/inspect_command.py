@@ -11,7 +11,7 @@ from rich.table import Table
 
 from livebode.cli import terminal
 from livebode.cli.options import Excitation, Json, Output, Rate, Time
-from livebode.core import UsageError
+from livebode.core import UsageError, counted
 from livebode.estimation.settings import default_hop
 from livebode.records import to_json
 
@@ -101,7 +101,7 @@ def _show_recording(found: Inspection, console: Console) -> None:
     console.print(
         f"{log.path}: {log.format}, {found.samples} samples at {log.rate_hz:.9g} Hz ({log.rate_origin})", soft_wrap=True
     )
-    gaps = f"{found.gaps} gap{'s' * (found.gaps > 1)} ({found.missing} samples missing)" if found.gaps else "no gaps"
+    gaps = f"{counted(found.gaps, 'gap')} ({found.missing} samples missing)" if found.gaps else "no gaps"
     jitter = ""
     if log.timing is not None:
         jitter = f", period {log.timing.period_s_mean * 1e6:.6g} µs ± {log.timing.period_s_std * 1e6:.3g} µs"

@@ -8,7 +8,7 @@ from livebode.core._loop import Loop
 from livebode.core._plotting import plot_responses
 from livebode.core._response import PER_RESPONSE, Response, Responses, widened
 from livebode.core._spectra import NOT_WHOLE, SPIKE, Spectra, SpectraLayout, rms
-from livebode.core._wording import counted, rounded_down
+from livebode.core._wording import counted, plural, rounded_down
 from livebode.core.controllers import PID, Cascade, PositionPD
 from livebode.core.errors import (
     BaselineError,
@@ -83,6 +83,7 @@ __all__ = [
     "ignore",
     "nearest_name",
     "plot_responses",
+    "plural",
     "rms",
     "rounded_down",
     "widened",
