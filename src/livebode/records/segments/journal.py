@@ -15,9 +15,9 @@ from typing import Any
 import pyarrow as pa
 
 from livebode.core import RecordError
+from livebode.core.files import sync_directory
 from livebode.records.inside import check_folder, open_read
 from livebode.records.segments.damage import Damage
-from livebode.records.segments.disk import sync_directory
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
 from livebode.records.segments.plain_batch import check_schema, plain_batch
 from livebode.records.table import ColumnTable
