@@ -31,7 +31,7 @@ PAPER = (
 )
 
 
-def standing(runs: int, periods: int = PERIODS[0]) -> Parameters:
+def fitted_at_standstill(runs: int, periods: int = PERIODS[0]) -> Parameters:
     """Fits of the two masses to averages over `periods`, one run after the other, in the periodic state."""
     span = periods * WINDOW
     lead = round(10 * RATE_HZ)
@@ -81,7 +81,7 @@ def moving(seed: int) -> tuple[Parameters, BeltAxis]:
 
 def at_standstill(runs: int, periods: int) -> tuple[Floats, Floats, Floats]:
     """Errors over sigma (runs, 4), mean square errors over the least variance, coverage of the 95 % bounds."""
-    still = standing(runs, periods)
+    still = fitted_at_standstill(runs, periods)
     z = (still.value - TRUTH)[:, :4] / still.sigma[:, :4]
     ratio = np.nanmean(np.log(still.value[:, :4] / TRUTH[:4]) ** 2, axis=0) / least_variance(periods)
     return z, ratio, np.mean(np.abs(z) <= ndtri(0.975), axis=0)

@@ -221,7 +221,7 @@ class Study:
         within = 100 * float(np.sum(np.array(errors) <= 0.02)) / self.count
         self.target("soft spot of 10 % over 10 cm: placed within 2 cm after one stroke, %", within, 99, True)
 
-    def told_apart(self) -> None:
+    def distinguished(self) -> None:
         """2 % more or less of stiffness, and of load."""
         for what, fault, truth in (
             ("stiffness", lambda _: TensionLoss(loss=0.02), -2.0),
@@ -300,7 +300,7 @@ def main() -> None:
         study.stiffness,
         study.ramp,
         study.spot,
-        study.told_apart,
+        study.distinguished,
         study.damping,
     ):
         part()

@@ -167,7 +167,7 @@ def measured(hours: float, *, as_live: bool = False) -> Curve:
         session = Session(
             {name: axis(port, fitted=name == names[0]) for name, port in zip(names, ports)},
             lambda name, _: Destination(Path(folder) / name, lambda *_: None, subscribers=subscribers[name]),
-            tell=lambda *_: None,
+            report=lambda *_: None,
             leave=lambda *_: None,
         )
         beside.start()

@@ -84,8 +84,8 @@ def test_runs_of_another_direction_or_speed_are_reported(tmp_path: Path) -> None
     elsewhere = compare(usual, RunRecord.open(moving(tmp_path / "d", 4, low=2.0, high=3.0)))
     assert any("no place in common" in w for w in elsewhere.warnings)
     assert not elsewhere.places
-    standing = compare(usual, RunRecord.open(write_run(tmp_path / "e", measured(300, 5))))
-    assert any("Only one of the runs has a changing schedule" in w for w in standing.warnings)
+    at_standstill = compare(usual, RunRecord.open(write_run(tmp_path / "e", measured(300, 5))))
+    assert any("Only one of the runs has a changing schedule" in w for w in at_standstill.warnings)
 
 
 def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path: Path) -> None:
@@ -109,9 +109,9 @@ def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path
     assert abs(table["Keff"]["change"] + 0.25e5) < table["Keff"]["change_bound"]
     for name in ("Js", "mL", "bs"):
         assert not table[name]["significant"], name
-    told = livebode("compare", *paths)
-    assert "Keff" in told.out
-    assert "changed" in told.out
+    printed = livebode("compare", *paths)
+    assert "Keff" in printed.out
+    assert "changed" in printed.out
 
 
 def test_runs_of_another_unit_or_quantity_or_without_common_lines_are_refused(tmp_path: Path) -> None:

@@ -87,8 +87,8 @@ def drawn(tab: Tab, index: int, series: int) -> np.ndarray:
     return tab.numbers(f"bode.at.map((i) => bode.charts[{index}].data[{series}][i])")
 
 
-def same_turn(found: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    return found - 360 * np.round((found - wanted) / 360)
+def same_turn(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    return found - 360 * np.round((found - truth) / 360)
 
 
 def in_record(run: RunRecord, time_s: float) -> Response:
@@ -112,10 +112,10 @@ def test_the_newest_response_with_its_bands(browser: Browser, watched: Watched, 
             "coherence": drawn(tab, 2, 1),
         }  # fmt: skip
         watched.go(watched.hub.samples + 2000)  # so that the record has it too
-        for name, wanted in expected(in_record(watched.record(), time_s), quantity).items():
+        for name, truth in expected(in_record(watched.record(), time_s), quantity).items():
             if name.startswith("deg"):
-                curves[name] = same_turn(curves[name], wanted)
-            assert np.allclose(curves[name], wanted, **CLOSE), name
+                curves[name] = same_turn(curves[name], truth)
+            assert np.allclose(curves[name], truth, **CLOSE), name
         unit = "1 rad/s/(N m)" if quantity == "plant" else ""
         assert unit in tab.js("bode.charts[0].axes[1].label")
         assert tab.wrong == []
@@ -175,8 +175,8 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
         assert np.allclose(tab.numbers("parameters.items.get('two-mass\\0Keff').t"), [r["time_s"] for r in known])
         drawn_data = [tab.numbers(f"parameters.items.get('two-mass\\0Keff').made.data[{i}]") for i in (1, 2, 3)]
         value, sigma = (np.array([r[name] for r in known], dtype=float) for name in ("value", "sigma"))
-        for found, wanted in zip(drawn_data, (value, value + 1.959964 * sigma, value - 1.959964 * sigma)):
-            assert np.allclose(found, wanted, equal_nan=True, rtol=1e-9)
+        for found, expected in zip(drawn_data, (value, value + 1.959964 * sigma, value - 1.959964 * sigma)):
+            assert np.allclose(found, expected, equal_nan=True, rtol=1e-9)
         assert tab.wrong == []
 
 

@@ -60,12 +60,12 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
     assert (first["kind"], first["axis"], second["kind"]) == ("rows", 3, "newest")
     use = responses.valid & np.isfinite(responses.value)
     with np.errstate(invalid="ignore"):
-        wanted = {
+        expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
             "reach": np.where(use, 3 * responses.sigma / np.abs(responses.value), np.nan),
             "coherence": np.where(use, responses.coherence, np.nan),
         }
-    for name, values in wanted.items():
+    for name, values in expected.items():
         assert np.allclose(first[name], values, rtol=1e-6, atol=1e-5, equal_nan=True), name
     turned = np.exp(1j * np.radians(np.asarray(first["phase"], dtype=float)))
     assert np.allclose(turned[use], responses.value[use] / np.abs(responses.value[use]), atol=1e-4)
@@ -74,8 +74,8 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
 
 
 @pytest.mark.parametrize("own", QUANTITIES)
-@pytest.mark.parametrize("wanted", QUANTITIES)
-def test_every_quantity_from_every_other(own: str, wanted: str) -> None:
+@pytest.mark.parametrize("expected", QUANTITIES)
+def test_every_quantity_from_every_other(own: str, expected: str) -> None:
     """There and back is the same, and sigma goes with the slope, which a small step shows."""
     rng = np.random.default_rng(3)
     loop = LoopSection.model_validate(LOOP).build(RATE_HZ)
@@ -83,13 +83,13 @@ def test_every_quantity_from_every_other(own: str, wanted: str) -> None:
     value = rng.normal(size=(2, len(LINES))) + 1j * rng.normal(size=(2, len(LINES)))
     responses = made(2, LINES, hole=0.0)
     responses = Responses(**{**vars(responses), "value": value, "quantity": own})
-    there = quantities.of_responses(responses, wanted)  # type: ignore[arg-type]
-    back = Quantities(wanted, "", LINES, loop).of_responses(there, own)  # type: ignore[arg-type]
+    there = quantities.of_responses(responses, expected)  # type: ignore[arg-type]
+    back = Quantities(expected, "", LINES, loop).of_responses(there, own)  # type: ignore[arg-type]
     assert np.allclose(back.value, value)
     assert np.allclose(back.sigma, responses.sigma)
     step = 1e-7
     moved = Responses(**{**vars(responses), "value": value + step})
-    slope = np.abs(quantities.of_responses(moved, wanted).value - there.value) / step  # type: ignore[arg-type]
+    slope = np.abs(quantities.of_responses(moved, expected).value - there.value) / step  # type: ignore[arg-type]
     assert np.allclose(there.sigma, responses.sigma * slope, rtol=1e-4)
 
 

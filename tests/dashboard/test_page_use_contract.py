@@ -80,10 +80,10 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
         page.keyboard.press(".")
         tab.until("timeline.atS > timeline.span.first_s + 0.09")
         run = watched.record().responses()
-        wanted = run.time_s[run.valid.any(axis=1)]
+        expected = run.time_s[run.valid.any(axis=1)]
         tab.until("!page.seeking")
         page.wait_for_timeout(150)
-        nearest = wanted[np.argmin(np.abs(wanted - tab.js("timeline.atS")))]
+        nearest = expected[np.argmin(np.abs(expected - tab.js("timeline.atS")))]
         assert shown_s(tab) == pytest.approx(nearest, abs=1e-9)
         at = int(np.flatnonzero(run.time_s == nearest)[0])
         assert np.allclose(tab.numbers("bode.curves.measured.frame.magnitude"), run[at].magnitude_db, atol=2e-5)
@@ -261,10 +261,10 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
         finger("touchStart", 0.3)
         for share in (0.4, 0.5, 0.6):
             finger("touchMove", share)
-        wanted = [tab.js(f"bode.charts[0].posToVal({share} * {box['width']}, 'x')") for share in (0.3, 0.6)]
+        expected = [tab.js(f"bode.charts[0].posToVal({share} * {box['width']}, 'x')") for share in (0.3, 0.6)]
         finger("touchEnd", 0.6)
         tab.until("bode.sight !== bode.whole")
-        assert tab.js("bode.sight") == pytest.approx(wanted, rel=0.03)
+        assert tab.js("bode.sight") == pytest.approx(expected, rel=0.03)
         for _ in range(2):
             tab.page.touchscreen.tap(box["x"] + x, box["y"] + 40)
         tab.until("bode.sight === bode.whole")

@@ -178,7 +178,7 @@ def test_a_damaged_file_is_reported_once_and_a_clock_that_was_set_back_is_explai
         if done > 600:
             raise StopError
 
-    run, told = tmp_path / "run", list[Event]()
+    run, reported = tmp_path / "run", list[Event]()
     with pytest.raises(StopError):
         record_machine(machine(SAMPLES), run, progress=stop)
     data = bytearray((run / name).read_bytes())
@@ -188,10 +188,10 @@ def test_a_damaged_file_is_reported_once_and_a_clock_that_was_set_back_is_explai
     monkeypatch.setattr(time, "time", lambda: now() - 3600)
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
-        record_machine(machine(SAMPLES), run, tell=told.append)
-    damaged = [event.message for event in told if event.kind == "record-damaged"]
+        record_machine(machine(SAMPLES), run, report=reported.append)
+    damaged = [event.message for event in reported if event.kind == "record-damaged"]
     assert len(damaged) + len(warned) == (name == "run.json")
-    (continued,) = [event for event in told if event.kind == "record-continued"]
+    (continued,) = [event for event in reported if event.kind == "record-continued"]
     assert "this computer's clock was set back, so" in continued.message
     assert continued.details["away_s"] is None
 
@@ -250,9 +250,9 @@ def test_a_changed_file_of_a_finished_run_is_reported_and_the_rest_is_read(finis
         warnings.simplefilter("ignore", DamageWarning)
         run = RunRecord.open(other)
         found = run.responses(), run.events(), list(run.tables("samples"))
-    told = [str(damage.details["file"]) for damage in run.damages]
-    assert told == ([] if name.name == "run-copy.json" else [str(name)] * len(told))
-    assert told or name.name == "run-copy.json"
+    reported = [str(damage.details["file"]) for damage in run.damages]
+    assert reported == ([] if name.name == "run-copy.json" else [str(name)] * len(reported))
+    assert reported or name.name == "run-copy.json"
     segment = next((s for s in whole.segments if s.name == str(name)), None)
     lost = dict.fromkeys(("responses", "samples"), 0) | ({segment.table: segment.rows} if segment else {})
     assert len(found[0]) == len(whole.responses()) - lost["responses"] // len(whole.lines)
@@ -285,20 +285,20 @@ def test_a_run_with_a_damaged_journal_is_continued_behind_the_damage(tmp_path: P
     content = journals[-1].read_bytes()
     commits = [frame for frame in frames(content) if frame.kind == COMMIT]
     flip(journals[-1], at * commits[-1].start / len(content))  # before the last commit, however long a state is
-    told: list[Event] = []
-    record_machine(machine(SAMPLES), run, tell=told.append)
-    assert [event.kind for event in told] == ["record-continued", "record-damaged"]
-    assert told[0].sample == held
-    check_damage(run, told[1], journals[-1].name)
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES), run, report=reported.append)
+    assert [event.kind for event in reported] == ["record-continued", "record-damaged"]
+    assert reported[0].sample == held
+    check_damage(run, reported[1], journals[-1].name)
     with refused(RecordError, "finished", path=str(run)):
         record_machine(machine(SAMPLES), run)
 
 
-def check_damage(run: Path, told: Event, journal: str) -> None:
+def check_damage(run: Path, reported: Event, journal: str) -> None:
     """That exactly what the event says is missing, and everything else is there."""
-    assert told in RunRecord.open(run).events()
+    assert reported in RunRecord.open(run).events()
     assert (run / "damaged" / journal).exists()
-    details = told.details
+    details = reported.details
     place = details["places"][0]
     assert RunRecord.open(run).summary["record"]["damaged"] == {
         "files": [f"damaged/{journal}"], **{key: details[key] for key in ("samples", "seconds", "rows")},
@@ -322,12 +322,12 @@ def test_a_journal_that_is_damaged_while_the_process_runs_is_closed_without_what
         if start == 850:
             flip(run / "open" / "000001.journal", 0.6)
 
-    told: list[Event] = []
-    record_machine(machine(SAMPLES, each), run, tell=told.append)
-    assert [event.kind for event in told] == ["record-damaged"]
-    check_damage(run, told[0], "000001.journal")
-    assert told[0].details["rows"]
-    assert "are lost" in told[0].message
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES, each), run, report=reported.append)
+    assert [event.kind for event in reported] == ["record-damaged"]
+    check_damage(run, reported[0], "000001.journal")
+    assert reported[0].details["rows"]
+    assert "are lost" in reported[0].message
 
 
 def test_a_lost_journal_is_reported(tmp_path: Path) -> None:

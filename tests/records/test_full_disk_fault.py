@@ -29,8 +29,8 @@ Y = samples_of([Channel("y", "m")])
 SUMMARY = {"found": {"bins": [1], "window": 10, "rate_hz": RATE_HZ, "quiet_bins": [], "quantity": "plant", "unit": ""}}
 
 
-def _send(say: Connection, run: Path) -> None:
-    say.send([event.kind for event in on_a_limited_file(run)])
+def _send(outlet: Connection, run: Path) -> None:
+    outlet.send([event.kind for event in on_a_limited_file(run)])
 
 
 def check_pause(kinds: list[str]) -> None:
@@ -46,12 +46,12 @@ def check_pause(kinds: list[str]) -> None:
 
 def test_a_file_at_its_size_limit_pauses_the_record(tmp_path: Path) -> None:
     context = multiprocessing.get_context("spawn")
-    said, say = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(say, tmp_path / "run"))
+    results, outlet = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(outlet, tmp_path / "run"))
     process.start()
     process.join()
     assert process.exitcode == 0
-    check_pause(said.recv())
+    check_pause(results.recv())
 
 
 def test_the_record_pauses_on_a_full_disk_and_continues(tmp_path: Path) -> None:
@@ -174,8 +174,8 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
     budget, rng = 8 << 20, np.random.default_rng(0)
     limits = SegmentLimits(interval_samples=1, segment_samples=50_000, budget_bytes=budget)
     used: list[int] = []
-    said: list[Event] = []
-    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits, said.append) as store:
+    results: list[Event] = []
+    with Store(tmp_path / "run", {"samples": Y, "responses": Y}, limits, results.append) as store:
         store.begin(SUMMARY, 0, 0.0, {"state": b""})
         for start in range(0, 40 * 50_000, 10_000):
             block = Block(rng.standard_normal((1, 10_000)), (Channel("y"),), RATE_HZ, start=start)
@@ -196,7 +196,7 @@ def test_a_budget_removes_the_oldest_samples_and_no_events(tmp_path: Path) -> No
     assert number[0] > 0
     marks = [event for event in run.events() if event.kind == "mark"]
     assert len(marks) == 200
-    gone = [name for event in said for name in event.details.get("removed", [])]
+    gone = [name for event in results for name in event.details.get("removed", [])]
     of_samples = gone.index("responses/000001.parquet")
     assert gone[:of_samples] == [f"samples/{k:06d}.parquet" for k in range(1, of_samples + 1)]
     assert not any((tmp_path / "run" / name).exists() for name in gone)

@@ -83,10 +83,10 @@ def test_a_run_that_ended_anywhere_is_read_and_continues(tmp_path: Path, sample:
     record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, sample - RATE_HZ)
     assert not RunRecord.open(tmp_path / "run").finished
-    said: list[Event] = []
-    record_machine(machine(SAMPLES), tmp_path / "run", tell=said.append)
+    reported: list[Event] = []
+    record_machine(machine(SAMPLES), tmp_path / "run", report=reported.append)
     check_whole(tmp_path / "run", SAMPLES)
-    assert [(event.kind, event.sample) for event in said] == [("record-continued", held)]
+    assert [(event.kind, event.sample) for event in reported] == [("record-continued", held)]
     with refused(RecordError, "finished", path=str(tmp_path / "run")):
         record_machine(machine(SAMPLES), tmp_path / "run")
 
@@ -100,12 +100,12 @@ def test_a_run_is_read_while_it_is_written(tmp_path: Path) -> None:
         while not going.wait(0.001):
             if (directory / "run.json").exists():
                 run = RunRecord.open(directory)
-                seen, said = run.responses(), each(run)
+                seen, reported = run.responses(), each(run)
                 number = np.concatenate([np.zeros(0, int), *(t["sample"].to_numpy() for t in run.tables("samples"))])
                 assert same(seen, responses[: len(seen)])
-                assert said == list(events[: len(said)])
+                assert reported == list(events[: len(reported)])
                 assert np.array_equal(number, np.arange(number.size))
-                found.append((len(seen), len(said), number.size))
+                found.append((len(seen), len(reported), number.size))
                 assert found[-1] >= found[-2]
 
     def reading() -> None:
@@ -250,8 +250,8 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
     else:
         record_until(sample, tmp_path / "run")
     held = check_beginning(tmp_path / "run", SAMPLES, 0)
-    wanted = expected(SAMPLES)[0]
-    wanted = wanted[: int(np.count_nonzero(wanted.sample < held))]
+    due = expected(SAMPLES)[0]
+    due = due[: int(np.count_nonzero(due.sample < held))]
 
     def ask(sql: str, *options: object) -> dict[str, object]:
         done = livebode("query", tmp_path / "run", sql, "--json", *options)
@@ -260,21 +260,21 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
 
     assert ask("SELECT max(sample) + 1 AS held, count(*) FROM samples")["rows"] == [[held, held]]
     found = ask("SELECT sum(re), count(*) FROM responses WHERE valid")["rows"][0]
-    assert found[1] == np.count_nonzero(wanted.valid)
-    assert found[0] == pytest.approx(wanted.value[wanted.valid].real.sum())
+    assert found[1] == np.count_nonzero(due.valid)
+    assert found[0] == pytest.approx(due.value[due.valid].real.sum())
     documented = "SELECT frequency_hz, avg(coherence) FROM responses WHERE valid GROUP BY ALL ORDER BY 1"
-    known = wanted.valid & np.isfinite(wanted.coherence)  # the first period has no coherence yet
-    usual = np.mean(wanted.coherence, axis=0, where=known)
+    known = due.valid & np.isfinite(due.coherence)  # the first period has no coherence yet
+    usual = np.mean(due.coherence, axis=0, where=known)
     np.testing.assert_allclose(np.array(ask(documented)["rows"])[:, 1], usual)
     first = ask("FROM responses ORDER BY sample, frequency_hz", "--rows", 2)
     assert (first["more"], len(first["rows"]), first["columns"][0]) == (True, 2, "first")
     assert ask("SELECT count(*) FROM events WHERE kind = 'non-finite'")["rows"] == [[int(held > SAMPLES // 3)]]
     text = livebode("query", tmp_path / "run", "SELECT sample, valid FROM responses LIMIT 1", "--csv").out
-    assert text == f"sample,valid\n{wanted.sample[0]},False\n"
+    assert text == f"sample,valid\n{due.sample[0]},False\n"
 
 
 @pytest.mark.parametrize(
-    ("sql", "says"),
+    ("sql", "message"),
     [
         ("FROM responsess", "Did you mean"),
         ("SELEC 1", "syntax error"),
@@ -286,12 +286,12 @@ def test_a_query_sees_what_is_committed(tmp_path: Path, sample: int | None) -> N
         ("FROM sys", "does not exist"),
     ],
 )
-def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, says: str) -> None:
+def test_a_query_that_cannot_be_run_is_refused(tmp_path: Path, sql: str, message: str) -> None:
     record_until(1200, tmp_path / "run")
     before = sorted(os.listdir(tmp_path / "run"))
     done = livebode("query", tmp_path / "run", sql.format(run=tmp_path / "run"))
     assert done.code == 2
-    assert says in done.err
+    assert message in done.err
     assert sorted(os.listdir(tmp_path / "run")) == before
 
 

@@ -19,7 +19,7 @@ from tests.support.command import livebode, signals, write_parquet
 from tests.support.peers.machine import Machine
 from tests.support.peers.peer import free_port
 from tests.support.recorded import same
-from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, said, source
+from tests.support.session_process import SHARED, Running, block, check_samples, events, numbers, source, summary_of
 
 LINES = Lines.parse("50,100,200", 1000.0, 100)
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
@@ -163,17 +163,17 @@ def test_impossible_axes_are_refused(tmp_path: Path, axes: str, code: str, facts
 
 
 @pytest.mark.parametrize(
-    ("fit", "says"),
+    ("fit", "message"),
     [
         ('fit.model = "two-masses"', "axis x: [fit]: there is no model 'two-masses'"),
         ('fit = {model = "rigid", fixed = {Jx = 1.0}}', "no parameter 'Jx'"),
     ],
 )
-def test_an_impossible_fit_is_refused_before_the_start(tmp_path: Path, fit: str, says: str) -> None:
+def test_an_impossible_fit_is_refused_before_the_start(tmp_path: Path, fit: str, message: str) -> None:
     (tmp_path / "axes.toml").write_text(f'[axes.x]\nsource.url = "udp://h:1"\n{fit}\n{SHARED}')
     result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
     assert result.code == 2
-    assert says in result.err
+    assert message in result.err
     assert result.err.count("\n") == 1
     assert not (tmp_path / "runs").exists()
 
@@ -194,4 +194,4 @@ def test_events_after_a_restart_have_the_sample_numbers_of_the_record(tmp_path: 
     (loss,) = [event for event in events(running.out / "x") if event.kind == "loss"]
     assert (loss.sample, loss.details["missing_samples"]) == (number[held], number[held] - held)
     assert np.array_equal(np.diff(number[held:]), np.ones(number.size - held - 1))
-    assert said(running.out / "x")["counts"]["gaps"] == 1
+    assert summary_of(running.out / "x")["counts"]["gaps"] == 1

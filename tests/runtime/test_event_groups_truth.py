@@ -196,17 +196,17 @@ def test_the_record_of_a_killed_run_contains_every_event_until_a_second_before(t
     )  # fmt: skip
     killed, whole = RunRecord.open(machine.killed), RunRecord.open(machine.run)
     every = [one.sample for event in whole.events() for one in each_event(event) if one.kind == "gap"]
-    told = [one.sample for event in killed.events() for one in each_event(event) if one.kind == "gap"]
+    reported_event = [one.sample for event in killed.events() for one in each_event(event) if one.kind == "gap"]
     assert len(every) > 3 * AT_ONCE
-    assert told == every[: len(told)]
-    assert len(told) >= sum(sample < 9_000 for sample in every)
+    assert reported_event == every[: len(reported_event)]
+    assert len(reported_event) >= sum(sample < 9_000 for sample in every)
     (row,) = [row for row in event_rows(killed.events()) if row.newest.kind == "gap"]
-    assert (row.count, row.first_s) == (len(told), every[0] / RATE_HZ)
+    assert (row.count, row.first_s) == (len(reported_event), every[0] / RATE_HZ)
     assert row.last_s >= 9.0 - 2 * WINDOW / RATE_HZ
-    assert EventSummary.of(killed.events()).count("gap") == len(told)
+    assert EventSummary.of(killed.events()).count("gap") == len(reported_event)
     found = query(killed, "SELECT count, last_s FROM events WHERE kind = 'gap'", 10)
-    assert found.rows == [(len(told), row.last_s)]
-    assert query(killed, "SELECT count(*) FROM single_events WHERE kind = 'gap'", 1).rows == [(len(told),)]
+    assert found.rows == [(len(reported_event), row.last_s)]
+    assert query(killed, "SELECT count(*) FROM single_events WHERE kind = 'gap'", 1).rows == [(len(reported_event),)]
     assert len((machine.run / "events.jsonl").read_text().splitlines()) < len(every) / 3
     (shown,) = [notice for notice in page.notices.since(0) if notice["cause"] == "loss"]
     ids = [event_id(event) for event in whole.events() if event.kind == "gap"]

@@ -145,13 +145,13 @@ def run_live(
     return json.loads(out), folder / name
 
 
-def ended(process: subprocess.Popen[bytes], said: bytes = b"") -> bytes:
-    """Its output after Ctrl-C, which it gets when it has had the time to take all; `said` is how its errors begin."""
+def ended(process: subprocess.Popen[bytes], message: bytes = b"") -> bytes:
+    """Its output after Ctrl-C, sent when it has read everything; `message` is how its errors begin."""
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(2.5)  # it goes on, for the machine may send more
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
-    assert (process.returncode, err[: len(said) or None]) == (0, said)
+    assert (process.returncode, err[: len(message) or None]) == (0, message)
     return out
 
 
@@ -248,9 +248,9 @@ def test_the_model_of_the_machine_is_left_out_and_this_is_reported(tmp_path: Pat
     small_baseline().save(tmp_path / "baseline.json")
     axis = configured(REST + f'[monitoring]\nbaseline = "{tmp_path / "baseline.json"}"\n')
     tracker_settings = settings()
-    told = change_detection(axis, tracker_settings, samples=False).summary()
-    assert told["judged_by"] == "tables"
-    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in told["message"]
+    summary = change_detection(axis, tracker_settings, samples=False).summary()
+    assert summary["judged_by"] == "tables"
+    assert "model of the machine is not used: it needs samples, but the drive sends spectra" in summary["message"]
     assert change_detection(axis, tracker_settings).summary()["judged_by"] == "model"
 
 

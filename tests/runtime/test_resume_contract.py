@@ -70,9 +70,9 @@ def test_correction_fits_and_monitoring_continue_in_a_resumed_run(
     assert parameters[0].num_rows > 1000
     # NaN is not equal to itself, and its text is.
     assert str(parameters[0].to_pydict()) == str(parameters[1].to_pydict())
-    said = [[event for event in run.events() if not event.kind.startswith("record-")] for run in runs]
-    assert said[0] == said[1]
-    assert "change" in [event.kind for event in said[0]]
+    reported = [[event for event in run.events() if not event.kind.startswith("record-")] for run in runs]
+    assert reported[0] == reported[1]
+    assert "change" in [event.kind for event in reported[0]]
     for part in ("found", "counts", "fit", "monitoring"):
         assert outcome.summary[part] == whole.summary[part], part
     assert runs[0].finished

@@ -88,8 +88,8 @@ class Watched:
         self, directory: Path, serving: Serving | None = None, loop: dict[str, Any] | None = LOOP, name: str = "axis"
     ) -> None:
         self.directory, self.machine = directory, Machine()
-        self.told: list[str] = []
-        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.told.append)
+        self.messages: list[str] = []
+        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.messages.append)
         self.hub = self.dashboard.hub(name)
         words = {"loop": loop or {}, "fit": FIT, "signals": {"output": "y", "input": "u", "schedule": "x"}}
         section = FitSection.model_validate(FIT)

@@ -40,11 +40,11 @@ LIFE_S = 1.0
 """Longest life of a process from there on."""
 
 
-def _work(configuration: dict[str, Any], directory: Path, say: Connection, fifo: Path | None) -> None:
+def _work(configuration: dict[str, Any], directory: Path, outlet: Connection, fifo: Path | None) -> None:
     if fifo is not None:
         sys.stdin = os.fdopen(os.open(fifo, os.O_RDONLY))
     axis = Axis.model_validate(configuration)
-    say.send("begun")
+    outlet.send("begun")
     run(axis, Destination(directory, lambda *_: None))
 
 
@@ -52,14 +52,14 @@ def start(feed: Feed, directory: Path) -> ForkServerProcess:
     """A process that records this feed, once it has imported all."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.support.killed_live"])
-    said, say = context.Pipe(duplex=False)
+    results, outlet = context.Pipe(duplex=False)
     process = context.Process(
-        target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, say, feed.fifo)
+        target=_work, args=(REST | feed.rest | {"source": feed.source}, directory, outlet, feed.fifo)
     )
     process.start()
-    say.close()
-    assert said.poll(PATIENCE_S)
-    said.recv()
+    outlet.close()
+    assert results.poll(PATIENCE_S)
+    results.recv()
     return process
 
 

@@ -103,7 +103,7 @@ def pieces(block: Block, sizes: Iterable[int]) -> Iterable[Block]:
             return
 
 
-def told(events: Iterable[Event]) -> list[tuple[str, str]]:
+def changes_of(events: Iterable[Event]) -> list[tuple[str, str]]:
     """Kind and what of each event."""
     return [(e.kind, str(e.details.get("what", e.details.get("reason")))) for e in events]
 

@@ -68,7 +68,7 @@ def record_machine(
     *,
     kept: RecordSection = KEPT,
     progress: Callable[[int, int | None], None] = lambda *_: None,
-    tell: Callable[[Event], None] = lambda _: None,
+    report: Callable[[Event], None] = lambda _: None,
     again: bool = True,
 ) -> Outcome:
     """Record the machine until its end, from where its record ends."""
@@ -77,7 +77,7 @@ def record_machine(
         if isinstance(document, TrackerResults):
             progress(document.samples, document.samples_total)
         elif isinstance(document, Event) and document.kind.startswith("record-"):
-            tell(document)
+            report(document)
 
     about = {"configuration": {"record": kept.model_dump()}}
     return record(source, Tracker(SETTINGS), directory, about=about, segments=kept, again=again, subscribers=[listen])
@@ -90,9 +90,9 @@ def expected(samples: int) -> tuple[Responses, tuple[Event, ...]]:
     return responses, tuple(events)
 
 
-def same(found: Responses, wanted: Responses) -> bool:
+def same(found: Responses, expected: Responses) -> bool:
     """Bit for bit."""
-    pairs = [(getattr(found, field.name), getattr(wanted, field.name)) for field in fields(found)]
+    pairs = [(getattr(found, field.name), getattr(expected, field.name)) for field in fields(found)]
     return all(_bits(a) == _bits(b) for a, b in pairs)
 
 
@@ -114,10 +114,10 @@ def check_beginning(directory: Path, samples: int, sample_min: int) -> int:
     assert number.size >= sample_min
     due = int(np.count_nonzero(responses.sample < number.size))
     assert len(found) == due
-    said = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
+    reported = [one for event in run.events() if not event.kind.startswith(OWN) for one in each_event(event)]
     # An event is written before the rows that belong to it are committed.
-    assert said == list(events[: len(said)])
-    assert len(said) >= sum(event.sample < number.size for event in events)
+    assert reported == list(events[: len(reported)])
+    assert len(reported) >= sum(event.sample < number.size for event in events)
     return number.size
 
 

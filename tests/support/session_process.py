@@ -58,7 +58,7 @@ class Running:
         until(lambda: self.process.poll() is not None or numbers(self.out / name).size >= samples, f"{samples} samples")
         assert self.process.poll() is None, self.process.communicate()
 
-    def told(self, name: str, kind: str) -> Event:
+    def reported_event(self, name: str, kind: str) -> Event:
         """The first event of this kind in this run, once it is there."""
         return until(lambda: next((e for e in events(self.out / name) if e.kind == kind), None), kind)
 
@@ -81,7 +81,7 @@ def numbers(run: Path) -> np.ndarray:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
 
 
-def said(run: Path) -> dict[str, Any]:
+def summary_of(run: Path) -> dict[str, Any]:
     return json.loads((run / "run.json").read_text())
 
 

@@ -29,11 +29,11 @@ _ROLES = ("output", "input", "excitation", "schedule")
 _RADIUS_M = 1.0
 
 
-def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lambda _: None) -> Baseline:
+def learn(paths: Sequence[str | PathLike[str]], report: Callable[[str], None] = lambda _: None) -> Baseline:
     """The Baseline of runs of the healthy machine, all with the same lines and signals; as `livebode learn`.
 
     Tables are learned from the runs' responses. With a torque and a scheduling position, a model of the moving machine
-    is also learned, from the recordings of the runs; `say` receives the progress.
+    is also learned, from the recordings of the runs; `report` receives the progress.
 
     Raises
     ------
@@ -57,15 +57,15 @@ def learn(paths: Sequence[str | PathLike[str]], say: Callable[[str], None] = lam
     _check_once(runs, axes)
     for run, axis in zip(runs, axes):
         _check_same(runs[0], axes[0], run, axis)
-    say("learning the lines over the schedule")
+    report("learning the lines over the schedule")
     lines, signals = runs[0].lines, axes[0].signals
     names = [f"{f:g} Hz" for f in lines.frequency_hz]
     overlap = len(_apart(runs[0]))
     tables = [learn_table("lines", names, [rows for run in runs for rows in _rows(run)], overlap)]
     if axes[0].fit is not None:
-        say("learning the fitted parameters over the schedule")
+        report("learning the fitted parameters over the schedule")
         tables.append(_parameters(runs, axes[0].fit))
-    machine, remark = _machine(runs, axes, say)
+    machine, remark = _machine(runs, axes, report)
     if machine is None and (covariates := axes[0].monitoring.covariates):
         raise BaselineError(
             "covariates-without-machine",
@@ -172,7 +172,9 @@ def _parameters(runs: list[RunRecord], section: FitSection) -> ScheduleTable:
     return learn_table("parameters", names, rows, len(_apart(runs[0])))
 
 
-def _machine(runs: list[RunRecord], axes: list[Axis], say: Callable[[str], None]) -> tuple[LearnedMachine | None, str]:
+def _machine(
+    runs: list[RunRecord], axes: list[Axis], report: Callable[[str], None]
+) -> tuple[LearnedMachine | None, str]:
     """A model of the moving machine, or the reason why there is none."""
     signals = axes[0].signals
     covariates = axes[0].monitoring.covariates
@@ -182,7 +184,7 @@ def _machine(runs: list[RunRecord], axes: list[Axis], say: Callable[[str], None]
         return None, f"a model describes the plant, but the runs contain the {axes[0].tracking.quantity}"
     if any(axis.source.log is None for axis in axes):
         return None, "a model is learned from recordings, but not all of these runs are from one"
-    say("learning a model of the moving machine from the recordings")
+    report("learning a model of the moving machine from the recordings")
     try:
         return (
             learn_machine(

@@ -35,7 +35,7 @@ def learn_command(
         )
     console = terminal.console(stderr=True)
     with console.status("reading the runs", spinner="line") as status:
-        baseline = learn(runs, say=status.update)
+        baseline = learn(runs, report=status.update)
     baseline.save(out)
     found = _found(baseline)
     print(to_json({"baseline": str(out)} | found) if as_json else f"{_sentences(found)}\n{out}")
@@ -46,8 +46,8 @@ def _found(baseline: Baseline) -> dict[str, Any]:
     from livebode.monitoring.table import STILL
 
     table, machine = baseline.tables[0], baseline.machine
-    stands = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
-    coarse = len(baseline.places) < PLACES and not stands
+    at_standstill = baseline.signals["schedule"] is not None and table.count.sum() == table.count[:, STILL].sum()
+    coarse = len(baseline.places) < PLACES and not at_standstill
     cells = int((table.count > 0).sum())
     found: dict[str, Any] = {
         "runs": list(baseline.runs),

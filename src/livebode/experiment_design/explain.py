@@ -39,8 +39,8 @@ def explained(design: Design, found: LineChoice, amplitude_why: str, recording_w
     ]
     rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
     if machine.noise > 0:
-        told = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
-        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", told))
+        reason = f"at {f[weakest]:g} Hz after {counted(design.windows, 'window')}; σ = {machine.noise:g}"
+        rows.append(Choice("95 % bound", f"{100 * bound.max():.3g} % of |G|", reason))
     if (counts := design.encoder_counts) is not None:
         rows.append(Choice("encoder", *encoder_words(counts, f, moves=machine.stroke_s is not None)))
     rows.append(Choice("recording", _duration(design.recording_s), recording_why))
@@ -66,8 +66,8 @@ def _amplitude(design: Design) -> str:
     amplitude = design.amplitude_n_m
     if isinstance(amplitude, list):
         few = len(amplitude) <= _LISTED_MAX
-        told = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
-        return f"{told} N m"
+        reason = ", ".join(f"{a:.4g}" for a in amplitude) if few else f"{min(amplitude):.4g} … {max(amplitude):.4g}"
+        return f"{reason} N m"
     return f"{amplitude:.4g} N m" + ", rms of the lines" * (design.waveform.about.get("shape") == "equal snr")
 
 

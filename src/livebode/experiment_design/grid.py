@@ -192,18 +192,18 @@ def _of_text(spec: ExperimentSpec, text: str, rate_hz: float) -> LineChoice:
             argument="window",
             lines=text,
         )
-    wanted = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
-    return LineChoice(wanted, "the shortest on whose grid the lines are, two bins apart or more", "as given")
+    required = Lines.parse(text, rate_hz, _smallest_window(text, rate_hz))
+    return LineChoice(required, "the shortest on whose grid the lines are, two bins apart or more", "as given")
 
 
 def _smallest_window(text: str, rate_hz: float) -> int:
     """The shortest window with all lines on its grid, none next to another."""
-    wanted = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
-    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in wanted)) if wanted else 1
-    if not wanted or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
+    required = [Fraction(f) for item in text.split(",") for f in _numbers(item)]
+    unit = lcm(*((f / Fraction(rate_hz)).limit_denominator(10**9).denominator for f in required)) if required else 1
+    if not required or unit > _WORTH_FACTORS * rate_hz or unit * _QUIET_BETWEEN > WINDOW_MAX:
         # Lines.parse reports what cannot be read, or which line is off this grid, with the nearest ones.
         return max(3, round(2 * rate_hz))
-    bins = sorted({int(f * unit / Fraction(rate_hz)) for f in wanted})
+    bins = sorted({int(f * unit / Fraction(rate_hz)) for f in required})
     apart = min(np.diff(bins), default=_QUIET_BETWEEN)
     return max(3, unit * (_QUIET_BETWEEN if apart < _QUIET_BETWEEN else 1))
 

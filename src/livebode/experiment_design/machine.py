@@ -25,7 +25,7 @@ MOTION_KEYS: Mapping[Quantity, str] = {
 """Key of a file with the extremes of each quantity in the motion alone."""
 Extremes = dict[Quantity, tuple[float, float]]
 """Lowest and highest value of each quantity."""
-STANDING: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
+STANDSTILL: Extremes = {"torque": (0.0, 0.0), "speed": (0.0, 0.0), "following error": (0.0, 0.0)}
 """Motion of an axis at standstill at an unknown position."""
 
 _EDGE = 1e-9  # of a frequency: a line at the end of the band is inside

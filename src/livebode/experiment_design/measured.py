@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.core import DesignError, GridError, Loop, Responses, SignalError, UsageError
 from livebode.core.controllers import integral
 from livebode.core.model import Algebra, Gain, Model, as_model
-from livebode.experiment_design.machine import STANDING, Extremes, Machine, OperatingPoint, within
+from livebode.experiment_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, within
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -208,4 +208,4 @@ def _motion(given: Extremes, stroke_s: float | None) -> Extremes:
             argument="stroke_s",
             speed_m_per_s=[low, high],
         )
-    return STANDING | given
+    return STANDSTILL | given

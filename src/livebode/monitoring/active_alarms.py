@@ -85,15 +85,15 @@ class ActiveAlarms(StatefulBase):
         new = [a for a in self.alarms if not a.announced]
         if self.far and (not known or any(abs(a.now) == _MOST for a in new)):
             return []
-        new = [a.tell() for a in new if not known or a.change.place is not None or not self._moving]
+        new = [a.announce() for a in new if not known or a.change.place is not None or not self._moving]
         nothing = [a for a in new if abs(a.now) <= max(a.bound, self._middle(a))]
         self.alarms = [a for a in self.alarms if not any(a is n for n in nothing)]
         return [a for a in new if not any(a is n for n in nothing)]
 
     def corrected(self) -> list[tuple[Alarm, float]]:
         """Reported alarms whose amount is wrong now that the others are identified, with the reported amount."""
-        wrong = [(a, a.told) for a in self.alarms if a.change.place is None and a.needs_correction]
-        return [(alarm.tell(), told) for alarm, told in wrong]
+        wrong = [(a, a.reported) for a in self.alarms if a.change.place is None and a.needs_correction]
+        return [(alarm.announce(), reported) for alarm, reported in wrong]
 
     def step(self, score: Floats, information: Floats, position_m: float) -> list[Alarm]:
         """Process a window; returns the alarms that it ends."""

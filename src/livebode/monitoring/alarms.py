@@ -33,7 +33,7 @@ class Alarm:
         The sum that keeps it active, between 0 and the threshold: at 0 it is cleared.
     announced
         Whether its Event was given.
-    told, reported_bound
+    reported, reported_bound
         Amount and bound of its newest Event.
     """
 
@@ -48,25 +48,25 @@ class Alarm:
     announced: bool = False
     score: float = 0.0
     information: float = 0.0
-    told: float = 0.0
+    reported: float = 0.0
     reported_bound: float = 0.0
 
     @property
     def needs_correction(self) -> bool:
         """Whether the amount now differs from the reported one by more than both bounds."""
-        return self.announced and abs(self.now - self.told) > self.bound + self.reported_bound
+        return self.announced and abs(self.now - self.reported) > self.bound + self.reported_bound
 
-    def tell(self) -> Alarm:
+    def announce(self) -> Alarm:
         """The alarm itself, with its present amount recorded as reported."""
         if not self.announced:
             self.change = replace(self.change, amount=self.now)
-        self.announced, self.told, self.reported_bound = True, self.now, self.bound
+        self.announced, self.reported, self.reported_bound = True, self.now, self.bound
         return self
 
     def row(self) -> list[float]:
         """As numbers, for a snapshot."""
         rest = [self.since_sample, self.since_s, *self.way_m, self.now, self.bound, self.height, self.announced]
-        sums = [self.score, self.information, self.told, self.reported_bound]
+        sums = [self.score, self.information, self.reported, self.reported_bound]
         return [*_numbers(self.change), *_numbers(self.rival), *rest, *sums]
 
     @classmethod

@@ -97,7 +97,7 @@ def learn_machine(
     parts = _all_seen(runs, machine, lines, names)
     machine = _with_uncertainty(parts, machine, lines.rate_hz)
     if (between := between_runs(parts, _SMALLEST)) is not None:
-        machine, parts = _fitted_apart(runs, replace(machine, between=between), lines, names)
+        machine, parts = _fitted_separately(runs, replace(machine, between=between), lines, names)
     return _judged(Evidence.join(parts), machine)
 
 
@@ -115,7 +115,7 @@ def _fitted(
     return machine
 
 
-def _fitted_apart(
+def _fitted_separately(
     runs: Sequence[Run], machine: LearnedMachine, lines: Lines, names: tuple[str, ...]
 ) -> tuple[LearnedMachine, list[Evidence]]:
     """The Machine whose runs have an offset each, and its residuals.

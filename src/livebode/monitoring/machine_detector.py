@@ -99,16 +99,16 @@ class MachineDetector(StatefulBase):
         if self._own.unreachable and word.OFFSET not in self._unknown:
             self._unknown.add(word.OFFSET)
             events.append(offset_unknown(self._machine, self._own.error_reachable, sample, time_s))
-        return events + self._said(sample, time_s)
+        return events + self._new_events(sample, time_s)
 
     def finish(self) -> list[Event]:
         """Identify a change that was found but not yet identified as the likeliest one."""
         if self._pending >= 0:
             self._name(final=True)
         _, sample, time_s = self._recent.moment[-1] if self._recent.moment else (0.0, 0.0, 0.0)
-        return self._said(int(sample), time_s, known=False)
+        return self._new_events(int(sample), time_s, known=False)
 
-    def _said(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
+    def _new_events(self, sample: int, time_s: float, known: bool = True) -> list[Event]:
         """Events of new changes, and corrections of the reported amounts."""
         if self._far:
             self._far = False
@@ -116,7 +116,7 @@ class MachineDetector(StatefulBase):
         new = self.standing.announced(known)
         wrong = self.standing.corrected() if new and known else []
         events = [changed(a, sample, time_s, within_run=self.within_run(a)) for a in new]
-        return events + [corrected(a, told, sample, time_s, within_run=self.within_run(a)) for a, told in wrong]
+        return events + [corrected(a, reported, sample, time_s, within_run=self.within_run(a)) for a, reported in wrong]
 
     def within_run(self, alarm: Alarm) -> bool:
         """Whether its amount is relative to the earlier part of this run, not to the baseline."""

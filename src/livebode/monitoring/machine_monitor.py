@@ -53,15 +53,15 @@ class MachineMonitor(StatefulBase):
         """Active changes as plain data."""
         alarms = self.detector.standing.alarms
         far = [about_far(alarms[-1])] if self.detector.standing.far else []
-        return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._told()]
+        return far + [about(alarm, within_run=self.detector.within_run(alarm)) for alarm in self._announced()]
 
     def together(self) -> str:
         """Their present amounts, estimated together, as text; empty where none is known."""
         if self.detector.standing.far:
             return ": the machine is so far from the baseline that no amount can be given"
-        return joint(self._told())
+        return joint(self._announced())
 
-    def _told(self) -> list[Alarm]:
+    def _announced(self) -> list[Alarm]:
         return [alarm for alarm in self.detector.standing.alarms if alarm.announced]
 
     def _judged(self, stretches: list[WindowStretch], look: Look | None) -> list[Event]:

@@ -58,13 +58,13 @@ def about_far(alarm: Alarm) -> dict[str, Any]:
     return about(alarm) | unknown | {"what": "machine", "may_also_be": None}
 
 
-def corrected(alarm: Alarm, told: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
+def corrected(alarm: Alarm, reported: float, sample: int, time_s: float, *, within_run: bool = False) -> Event:
     """The corrected amount of a reported change, after another change was identified that seemed part of it."""
     message = (
         f"With all changes since then allowed for, {_amount(alarm.change, alarm.now, alarm.bound)} than "
-        f"{_reference(within_run)}, not {_size(told)} as reported earlier."
+        f"{_reference(within_run)}, not {_size(reported)} as reported earlier."
     )
-    details = about(alarm, within_run=within_run) | {"told_percent": percent(told)}
+    details = about(alarm, within_run=within_run) | {"told_percent": percent(reported)}
     return Event("change-corrected", sample, time_s, message, details)
 
 

@@ -16,11 +16,11 @@ Floats = NDArray[np.float64]
 _NAMED = 4
 
 
-def differs(table: ScheduleTable, told: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
+def differs(table: ScheduleTable, changed: NDArray[np.bool_], amount: Floats, bound: Floats, moment: Floats) -> Event:
     """A change; `moment` is schedule, sample and time of every row since it began."""
     if table.what == "lines":
         amount, bound = _polar(amount, bound)
-    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(told)]
+    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in np.flatnonzero(changed)]
     items.sort(key=lambda item: -abs(item["amount"]) / item["bound"])
     named = "; ".join(_phrase(item) for item in items[:_NAMED])
     more = f"; and {len(items) - _NAMED} more" if len(items) > _NAMED else ""

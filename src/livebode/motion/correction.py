@@ -17,7 +17,7 @@ from livebode.motion.learner import Learner, Replayed, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.replay import by_excitation
 from livebode.motion.residual import Scatter, residual
-from livebode.motion.ripple_watch import RippleWatch
+from livebode.motion.ripple_watch import RippleMonitor
 from livebode.motion.standstill import StandstillDetector, without
 from livebode.motion.waiting import PendingResponses
 
@@ -133,7 +133,7 @@ class MotionCorrection(StatefulBase):
         self._learner = Learner(settings, radius_m, splines, passes)
         self._scatter = Scatter(settings)
         self._standstill = StandstillDetector(settings, self._events)
-        self._ripple = RippleWatch(settings)
+        self._ripple = RippleMonitor(settings)
         self._from = 0
         self._parts: dict[str, StatefulBase] = {
             "tracker": self._tracker,
@@ -193,11 +193,11 @@ class MotionCorrection(StatefulBase):
         self._waiting.append(tracked)
         at = 0
         while at < len(block):
-            wanted = self._from + self._chunk + self.settings.lines.window
-            piece = block.cut(at, wanted - block.start)
+            required = self._from + self._chunk + self.settings.lines.window
+            piece = block.cut(at, required - block.start)
             self._recorded.append(piece)
             at += len(piece)
-            if self._recorded.stop == wanted:
+            if self._recorded.stop == required:
                 done.append(self._corrected(self._from + self._chunk))
         hand_over(self._events, emit)
         return Responses.join(done) if done else tracked[0:0]

@@ -52,7 +52,7 @@ class StoredTable:
     """
 
     def __init__(self, run: Path, name: str, parts: Any, report: Callable[[Event], None]) -> None:
-        self._run, self._name, self._tell = run, name, report
+        self._run, self._name, self._report = run, name, report
         try:
             self._parts = [ParquetPart(int(p["rows"]), int(p["size_bytes"]), str(p["sha256"])) for p in parts]
             self._parts[-1]
@@ -76,12 +76,12 @@ class StoredTable:
         with open_read(self._run, self._name) as file:
             whole = self._whole(file, self._parts)
         if not whole[-1]:
-            self._tell_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))
+            self._report_of("its end is damaged, so it cannot be read", sum(part.rows for part in self._parts))
             return []
         begin = 0
         for part, sound in zip(self._parts, whole):
             if not sound:
-                self._tell_of(f"rows {begin} to {begin + part.rows - 1} are not read", part.rows)
+                self._report_of(f"rows {begin} to {begin + part.rows - 1} are not read", part.rows)
             begin += part.rows
         return [number for number, sound in enumerate(whole[:-1]) if sound]
 
@@ -104,9 +104,11 @@ class StoredTable:
             _verified[key] = sound
         return _verified[key]
 
-    def _tell_of(self, what: str, rows: int) -> None:
+    def _report_of(self, what: str, rows: int) -> None:
         table = self._name.removesuffix(".parquet")
-        self._tell(Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}}))
+        self._report(
+            Event(KIND, 0, 0.0, f"{self._name} is damaged: {what}", {"file": self._name, "rows": {table: rows}})
+        )
 
 
 def _end(column: Any) -> int:

@@ -65,7 +65,7 @@ def loop_figure(found: LoopCurves, *, title: str = "", dark: bool = False, width
             2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985,
             top=1 - 1.15 / height, bottom=0.55 / height, hspace=0.09, wspace=0.17,
         )  # fmt: skip
-        heading(figure, look, title or tr("LoopCurves"), _facts(found), 0.78 / width_in)
+        heading(figure, look, title or tr("Loop"), _facts(found), 0.78 / width_in)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         nyquist = figure.add_subplot(grid[:, 1])

@@ -48,12 +48,12 @@ class DelimitedRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         del rows
-        wanted = list(dict.fromkeys(column.key for column in columns))
+        required = list(dict.fromkeys(column.key for column in columns))
         try:
             with self._opened() as file:
                 yield from self._parsed(file, columns)
         except pa.ArrowInvalid as error:
-            raise locate(self.path, self._dialect, wanted, ARROW_BLOCK_BYTES) or RecordingError(
+            raise locate(self.path, self._dialect, required, ARROW_BLOCK_BYTES) or RecordingError(
                 "damaged", f"cannot read {self.path}: {first_line(error)}", "repair the file", path=str(self.path)
             ) from error
 
@@ -77,10 +77,10 @@ class DelimitedRecording(Recording):
 
     def _parsed(self, file: Any, columns: Sequence[Column]) -> Iterator[Chunk]:
         dialect = self._dialect
-        wanted = list(dict.fromkeys(column.key for column in columns))
+        required = list(dict.fromkeys(column.key for column in columns))
         names = [str(at) for at in range(dialect.width)]
         moment = pa.timestamp("ns", dialect.zone)
-        types = {names[at]: moment if dialect.kinds[at] is CellKind.MOMENT else pa.float64() for at in wanted}
+        types = {names[at]: moment if dialect.kinds[at] is CellKind.MOMENT else pa.float64() for at in required}
         with csv.open_csv(
             file,
             read_options=csv.ReadOptions(column_names=names, block_size=ARROW_BLOCK_BYTES),
@@ -90,7 +90,7 @@ class DelimitedRecording(Recording):
             ),
             convert_options=csv.ConvertOptions(
                 column_types=types,
-                include_columns=[names[at] for at in wanted],
+                include_columns=[names[at] for at in required],
                 decimal_point=dialect.decimal,
                 null_values=list(EMPTY),
                 check_utf8=False,
@@ -98,7 +98,7 @@ class DelimitedRecording(Recording):
         ) as reader:
             for batch in reader:
                 if batch.num_rows:
-                    yield [to_numpy(batch.column(wanted.index(column.key))) for column in columns]
+                    yield [to_numpy(batch.column(required.index(column.key))) for column in columns]
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:

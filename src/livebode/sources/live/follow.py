@@ -105,7 +105,7 @@ class FollowSource(LiveSource):
             begin, again = self._begin(path, file, table)
             self._announce(table.channels, table.rate_hz)
             lines = FileLines(file, begin, table.recording.encoding)
-            self._stands()
+            self._established()
             while not self._stop.is_set():
                 piece = lines.read(again)
                 if piece is None:
@@ -139,9 +139,9 @@ class FollowSource(LiveSource):
         """Batches of these lines; a line that does not fit the table is skipped."""
         if not lines.strip():
             return
-        wanted = [*table.columns, *([table.time] if table.time else [])]
+        required = [*table.columns, *([table.time] if table.time else [])]
         try:
-            values = table.recording.parsed(lines, wanted)
+            values = table.recording.parsed(lines, required)
         except LivebodeError as error:
             middle = lines.rfind(b"\n", 0, max(len(lines) // 2, 1)) + 1 or lines.find(b"\n") + 1
             if middle >= len(lines):
@@ -162,7 +162,7 @@ class FollowSource(LiveSource):
 
     def _follow_directory(self, folder: Path) -> None:
         self._behind = self._behind or self._begin_folder(folder)
-        self._stands()
+        self._established()
         while not self._stop.is_set():
             seen, counted = self._behind
             names = sorted(name for name in os.listdir(folder) if name > seen and not name.startswith("."))
