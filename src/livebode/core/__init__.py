@@ -32,6 +32,7 @@ from livebode.core.errors import (
 from livebode.core.lines import Lines
 from livebode.core.model import Gain, Model, as_model
 from livebode.core.parameters import Parameters
+from livebode.core.rows import RowArrays
 from livebode.core.state import Stage, Stateful, StatefulBase
 
 __all__ = [
@@ -66,6 +67,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "Responses",
+    "RowArrays",
     "ServerError",
     "SignalError",
     "SimulationError",

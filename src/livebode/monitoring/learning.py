@@ -205,7 +205,7 @@ def _seen(run: Run, machine: LearnedMachine, lines: Lines, names: tuple[str, ...
             window=lines.window,
         )
     seen = Evidence.join(parts)
-    return seen.rows(seen.judged)
+    return seen[seen.judged]
 
 
 def _with_uncertainty(parts: Sequence[Evidence], machine: LearnedMachine, rate_hz: float) -> LearnedMachine:
@@ -217,7 +217,7 @@ def _with_uncertainty(parts: Sequence[Evidence], machine: LearnedMachine, rate_h
     gradient, matrix = normal_of(seen, machine, rate_hz)
     slopes = []
     for part in parts_of([len(run) for run in parts]):
-        without = normal_of(seen.rows(part), machine, rate_hz)
+        without = normal_of(seen[part], machine, rate_hz)
         step = step_of((gradient - without[0], matrix - without[1]), machine)
         slopes.append(step[-1 - len(DIRECTIONS) * c : -1])
     scale = np.tile(1 / covariates.half_range, len(DIRECTIONS))

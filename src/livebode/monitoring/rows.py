@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Parameters, Responses, Stage, StatefulBase
+from livebode.core import Parameters, Responses, RowArrays, Stage, StatefulBase
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class Rows(RowArrays):
     """One row for every window length, (rows, columns) for values.
 
     `variance` is the row's own estimate of E|error|²; `step` is the schedule's change since the previous row; `ok` is
@@ -28,18 +27,6 @@ class Rows:
     time_s: Floats
     sample: NDArray[np.int64]
     ok: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.sample)
-
-    def some(self, chosen: NDArray[np.bool_]) -> Rows:
-        """Some of the rows."""
-        return Rows(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
-
-    @classmethod
-    def join(cls, parts: Sequence[Rows]) -> Rows:
-        """Join parts in order; at least one."""
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 
 PLACES = 5

@@ -46,10 +46,10 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[Rows], overlap: 
             windows_min=3 * WINDOWS_MIN,
         )
     rows = Rows.join(runs)
-    rows = rows.some(rows.ok)
+    rows = rows[rows.ok]
     low, step, still, bins = _grid(rows)
     cell, inside = cells(rows, low, step, still, bins)
-    rows, cell = rows.some(inside), cell[inside]
+    rows, cell = rows[inside], cell[inside]
     table = _moments(what, tuple(names), (low, step, still), bins, rows, cell, overlap)
     if not np.any(table.count >= WINDOWS_MIN):
         raise BaselineError(
