@@ -13,7 +13,7 @@ from livebode.cli.pictures import margins_in_short
 from livebode.configuration import Axis
 from livebode.core import RecordError
 from livebode.core.writing import writing
-from livebode.margins.words import WORDS
+from livebode.margins.margins import WORDS
 from livebode.records import to_json
 
 if TYPE_CHECKING:

@@ -13,14 +13,16 @@ from livebode.core.rows import RowArrays
 
 Floats = NDArray[np.float64]
 
-NAMES = (
-    "gain_margin",
-    "gain_reduction",
-    "phase_margin",
-    "delay_margin",
-    "peak_sensitivity",
-    "bandwidth",
-)
+WORDS = {
+    "gain_margin": "gain may rise by",
+    "gain_reduction": "gain may fall by",
+    "phase_margin": "phase margin",
+    "delay_margin": "delay margin",
+    "peak_sensitivity": "peak sensitivity Ms",
+    "bandwidth": "bandwidth",
+}
+"""The margins, with their names for people."""
+NAMES = tuple(WORDS)
 UNITS = ("dB", "dB", "deg", "ms", "", "Hz")
 UNSTABLE = "unstable by the fit"
 CONTRADICTED = "contradicted by the lines"

@@ -6,7 +6,7 @@ import numpy as np
 
 from livebode.core import NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
 from livebode.estimation import Settings
-from livebode.preparation.follower import Follower
+from livebode.estimation.stream_estimator import Follower
 
 # Rounding of a DFT gives 1e-30 of a signal's power at an empty line.
 POWERLESS_SHARE = 1e-20

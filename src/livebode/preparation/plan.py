@@ -11,8 +11,8 @@ from livebode.configuration.axis import Axis
 from livebode.core import Block, ConfigError, Lines, SignalError, SpectraLayout
 from livebode.estimation import RippleOrder, Settings, SpectraTracker, Tracker
 from livebode.estimation.settings import nearest_hop
+from livebode.estimation.stream_estimator import Follower
 from livebode.preparation.checks import PERIODS_COMPARED, check_length, check_period
-from livebode.preparation.follower import Follower
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
 from livebode.preparation.spectra_plan import check_spectra
 from livebode.sources import Log

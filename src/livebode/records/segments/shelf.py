@@ -18,7 +18,7 @@ from livebode.records.inside import check_folder, is_folder
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 FIRST_TO_GO = "samples"
 _logger = logging.getLogger(__name__)

@@ -31,7 +31,7 @@ from livebode.records.segments.shelf import Shelf
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table import ColumnTable
+from livebode.records.table_file import ColumnTable
 
 _logger = logging.getLogger(__name__)
 
