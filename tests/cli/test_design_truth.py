@@ -217,7 +217,7 @@ def test_the_table_gives_each_choice_with_its_reason(tmp_path):
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):
         assert word in shown.out
     assert sorted(p.name for p in (tmp_path / "d").iterdir()) == [
-        "axis.toml", "design.json", "excitation.csv", "excitation.png",
+        "axis.schema.json", "axis.toml", "design.json", "excitation.csv", "excitation.png",
     ]  # fmt: skip
     told = json.loads((tmp_path / "d" / "design.json").read_text())
     for f, sigma in zip(told["frequency_hz"], told["sigma_relative"]):
