@@ -14,7 +14,8 @@ import tomli_w
 
 from livebode.configuration.axes import axes_of
 from livebode.configuration.schema import axis_schema
-from livebode.core import LivebodeError
+from livebode.core import ConfigError, LivebodeError
+from livebode.sources.live import SourceSettings, make_source
 from livebode.sources.live.settings import TAKEN
 from tests.support.schemas import tables, validator, values_of, with_value
 
@@ -54,7 +55,7 @@ def test_every_key_has_a_description(table: tuple[str, ...]) -> None:
 def test_a_value_is_valid_where_livebode_accepts_it(table: tuple[str, ...]) -> None:
     """Every type, every choice, and the values at and just outside the limits."""
     for name, key in TABLES[table]["properties"].items():
-        for value in values_of(SCHEMA, key) if name != "axes" else ():
+        for value in values_of(key) if name != "axes" else ():
             data = with_value(base_of(table), (*table, name), value)
             if name == "url":
                 del data["source"]["log"]
@@ -70,9 +71,17 @@ def test_a_source_has_the_keys_of_its_kind(kind: str) -> None:
     url = "stdin:" if kind == "stdin" else f"{kind}://192.168.0.5:5000"
     for name, key in TABLES[("source",)]["properties"].items():
         if name not in ("log", "url", "follow"):
-            value = next(v for v in (key.get("default"), "x", 1, ["x"], {"x": "x"}, *key.get("enum", [])) if fits(key, v))
+            candidates = (key.get("default"), "x", 1, ["x"], {"x": "x"}, *key.get("enum", []))
+            value = next(value for value in candidates if fits(key, value))
             data = SMALLEST | {"source": {"url": url, name: value}}
             assert VALID.is_valid(data) == accepted(data), (name, value)
+
+
+def test_a_recording_that_grows_has_the_keys_of_a_recording() -> None:
+    source = {"log": "log.csv", "follow": True, "nodes": {"w": "ns=2;s=w"}}
+    with pytest.raises(ConfigError, match="nodes does not apply"):
+        make_source(SourceSettings(log=Path("log.csv"), follow=True, nodes={"w": "ns=2;s=w"}))
+    assert not VALID.is_valid(SMALLEST | {"source": source})
 
 
 def fits(key: dict[str, Any], value: Any) -> bool:
@@ -86,7 +95,6 @@ def fits(key: dict[str, Any], value: Any) -> bool:
         {"source": {}},
         {"source": {"log": "a", "url": "udp://h:1"}},
         {"source": {"url": "udp://h:1", "follow": True}},
-        {"source": {"log": "a", "follow": True, "nodes": {}}},
         {"signals": {}},
         {"motion": {}},
         {"loop": {"velocity": {"gain": 1.0}}},

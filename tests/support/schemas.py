@@ -35,7 +35,7 @@ def tables(schema: dict[str, Any], at: Path = (), here: dict[str, Any] | None = 
             yield from tables(schema, (*at, name), inner)
 
 
-def values_of(schema: dict[str, Any], key: dict[str, Any]) -> Iterator[Any]:
+def values_of(key: dict[str, Any]) -> Iterator[Any]:
     """Values of every type, and those at and just outside the limits of a key."""
     if "$ref" in key:
         yield from (value for value in COMMON if not isinstance(value, dict))

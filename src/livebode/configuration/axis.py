@@ -330,7 +330,7 @@ class LoopSection(_Section):
 
 
 class RecordSection(_Section):
-    """[record]: with this section, even empty, the run is recorded in segments that survive a kill; so does --continue.
+    """[record]: with this section, even empty, or with `--continue` the run is recorded in segments that survive a kill.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ class ServeSection(_Section):
     address
         Address to listen on. Any other than the loopback needs a token and TLS.
     port
-        TCP port; 0 selects a free port. --port overrides it.
+        TCP port; 0 selects a free port. `--port` overrides it.
     names
         Host names by which a browser may open the page, in addition to IP addresses and localhost.
     token_env

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, fields
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
+from annotated_types import MinLen
 from pydantic import BaseModel, ConfigDict, create_model
 
 from livebode.configuration.schema import Schema, schema_of
@@ -18,7 +19,7 @@ _CONFIG = ConfigDict(extra="forbid")
 def experiment_schema() -> Schema:
     """Schema of experiment.toml."""
     tables: Any = {name: (_table(kind) | None, None) for name, kind in BELT.items()}
-    roles: Any = dict.fromkeys((*SIGNALS, "schedule"), (str | None, None))
+    roles: Any = dict.fromkeys((*SIGNALS, "schedule"), (Annotated[str, MinLen(1)] | None, None))
     limits: Any = (_table(MachineLimits) | None, None)
     model: Any = create_model(
         "ExperimentFile",
