@@ -330,7 +330,7 @@ class LoopSection(_Section):
 
 
 class RecordSection(_Section):
-    """[record]: with this section, even empty, or with `--continue` the run is recorded in segments that survive a kill.
+    """[record]: the run is recorded in segments that survive a kill, also if the section is empty.
 
     Parameters
     ----------
