@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -94,7 +95,9 @@ def _row(key: str, value: Schema, required: bool) -> str:
     default = "required" if required else ""
     if "default" in value:
         default = f"`{json.dumps(value['default'], ensure_ascii=False)}`"
-    cells = (f"`{key}`", _type(value), default, _limits(value), value["description"])
+    # As code, because a page has other quotation marks than TOML.
+    about = re.sub(r'"[^"]+"', r"`\g<0>`", value["description"])
+    cells = (f"`{key}`", _type(value), default, _limits(value), about)
     return f"| {' | '.join(map(_cell, cells))} |"
 
 
