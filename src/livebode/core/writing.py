@@ -61,9 +61,12 @@ another path
     """
     name, cause = "the output" if path is None else repr(str(path)), why(error)
     remedy = _KNOWN.get(error.errno or 0, ("", "check the path and its permissions"))[1]
-    facts = {} if path is None else {"path": str(path)}
+    facts: dict[str, object] = {} if path is None else {"path": str(path)}
+    facts |= {"reason": cause, "errno": error.errno}
     message = f"{name} could not be written: {cause}" + ("; nothing was changed there" if unchanged else "")
-    return kind("not-written", message, remedy, **facts, reason=cause, errno=error.errno)
+    if kind is RecordError:
+        return RecordError("not-written", message, remedy, **facts)
+    return OutputError("not-written", message, remedy, **facts)
 
 
 @contextmanager
