@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from livebode.configuration.axis import LoopSection
 from livebode.configuration.recorded import recorded_configuration
-from livebode.core import Lines, Loop, Quantity, Responses, ServerError
+from livebode.core import Lines, Loop, PlantKinds, Quantity, Responses, ServerError
 from livebode.estimation.quantities import convert
-from livebode.records.run import lines_in
+from livebode.records.run import kinds_in, lines_in
 
 Complex = NDArray[np.complex128]
 
@@ -32,6 +32,8 @@ class Quantities:
         The measured quantity of the run.
     unit
         Its unit.
+    kinds
+        Kinds of the plant's output and input.
     lines
         The lines of the run.
     loop
@@ -40,6 +42,7 @@ class Quantities:
 
     own: Quantity
     unit: str
+    kinds: PlantKinds
     lines: Lines
     loop: Loop | None
 
@@ -54,7 +57,7 @@ class Quantities:
             )
         except ValueError:  # of livebode or of pydantic
             loop = None
-        return cls(found["quantity"], found["unit"], lines, loop)
+        return cls(found["quantity"], found["unit"], kinds_in(found), lines, loop)
 
     def why_not(self, quantity: Quantity) -> str:
         """The reason why the page cannot show a quantity; empty if it can."""

@@ -230,9 +230,9 @@ class RepeatingErrors(StatefulBase):
 
         The steps of a velocity are those of the position that it was differenced from.
         """
-        unit = next((c.unit for c in channels if c.name == self._settings.output), "")
+        output = next((c for c in channels if c.name == self._settings.output), Channel(""))
         lines = self._settings.lines
-        velocity = unit.endswith("/s") or not unit
+        velocity = output.stated_kind in ("velocity", None)
         return self._step * (np.abs(1 - 1 / lines.z) if velocity else np.ones(len(lines)))
 
     def _report(self, sample: int, time_s: float, gone: NDArray[np.bool_]) -> None:

@@ -14,7 +14,17 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.arrow import to_numpy
-from livebode.core import PER_LINE, PER_RESPONSE, DamageWarning, Event, Lines, LivebodeError, RecordError, Responses
+from livebode.core import (
+    PER_LINE,
+    PER_RESPONSE,
+    DamageWarning,
+    Event,
+    Lines,
+    LivebodeError,
+    PlantKinds,
+    RecordError,
+    Responses,
+)
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
@@ -41,6 +51,11 @@ class Files:
 def lines_in(found: Mapping[str, Any]) -> Lines:
     """The lines in `found` of run.json."""
     return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
+
+
+def kinds_in(found: Mapping[str, Any]) -> PlantKinds:
+    """The kinds of the plant in `found` of run.json; from the unit if an older version wrote it."""
+    return PlantKinds(**found["kinds"]) if "kinds" in found else PlantKinds.of_unit(found.get("unit", ""))
 
 
 @dataclass(frozen=True)
@@ -114,6 +129,11 @@ class Run:
     def lines(self) -> Lines:
         """Source of the measurement."""
         return lines_in(self.found)
+
+    @property
+    def kinds(self) -> PlantKinds:
+        """Kinds of the plant's output and input."""
+        return kinds_in(self.summary["found"])
 
     @property
     def finished(self) -> bool:

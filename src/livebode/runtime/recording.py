@@ -23,8 +23,8 @@ def run_recording(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     """Examine a recording as a whole, then track it."""
     started = time.perf_counter()
     assert axis.source.log is not None
-    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time)
-    pipeline = Pipeline.of(axis, make_follower(axis, log))
+    log = open_log(axis.source.log, rate_hz=axis.source.rate_hz, time=axis.source.time, kinds=axis.source.kinds)
+    pipeline = Pipeline.of(axis, make_follower(axis, log), log.channels)
     settings = pipeline.follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     slips = slips_of(log, settings)
