@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from math import pi
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.core import Channel, PlantKinds, UnitReading, UsageError, read_unit, split_plant_unit
-from livebode.core._unit_reading import KINDS
+from livebode.core import Channel, PlantKinds, QuantityKind, UnitReading, UsageError, read_unit, split_plant_unit
 from tests.support.errors import refused
+
+KINDS = get_args(QuantityKind)
 
 # Kind and SI units in one, from the definitions of the units: 1 N = 1 kg m/s², 1 min = 60 s, 1 rev = 2 pi rad.
 BY_HAND = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, get_args
 
@@ -32,19 +32,19 @@ class Quantities:
         The measured quantity of the run.
     unit
         Its unit.
-    kinds
-        Kinds of the plant's output and input.
     lines
         The lines of the run.
     loop
         The loop of the configuration; None if it cannot be built.
+    kinds
+        Kinds of the plant's output and input.
     """
 
     own: Quantity
     unit: str
-    kinds: PlantKinds
     lines: Lines
     loop: Loop | None
+    kinds: PlantKinds = field(default_factory=PlantKinds)
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
@@ -57,7 +57,7 @@ class Quantities:
             )
         except ValueError:  # of livebode or of pydantic
             loop = None
-        return cls(found["quantity"], found["unit"], kinds_in(found), lines, loop)
+        return cls(found["quantity"], found["unit"], lines, loop, kinds_in(found))
 
     def why_not(self, quantity: Quantity) -> str:
         """The reason why the page cannot show a quantity; empty if it can."""

@@ -6,7 +6,9 @@ import logging
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from livebode.core import (
     RecordError,
     Responses,
 )
+from livebode.core.clock import RunClock
 from livebode.records import event_lines
 from livebode.records.grouped_events import still_waiting
 from livebode.records.piece import Piece
@@ -134,6 +137,15 @@ class Run:
     def kinds(self) -> PlantKinds:
         """Kinds of the plant's output and input."""
         return kinds_in(self.summary["found"])
+
+    @property
+    def clock(self) -> RunClock:
+        """Relation of its times to the time of day; from the first response if an older version recorded it."""
+        first_s = nan
+        if "clock" not in self.summary and "clock" not in self.summary["found"]:
+            with suppress(LivebodeError):  # the clock of damaged responses has no use
+                first_s = next((float(part.time_s[0]) for part in self.batches() if len(part)), nan)
+        return RunClock.of(self.summary, first_s)
 
     @property
     def finished(self) -> bool:

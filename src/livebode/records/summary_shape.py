@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.core import QuantityKind
+from livebode.core.clock import ClockKind
 
 Text = Annotated[str, Field(max_length=100_000)]
 Count = Annotated[int, Field(ge=0, lt=1 << 62)]
@@ -33,6 +34,7 @@ class _Found(_Part):
     quiet_bins: list[Positive]
     quantity: Text
     unit: Text
+    clock: ClockKind | None = None
     kinds: _Kinds = _Kinds(output=None, input=None, input_factor=1.0)
     hop: Positive = 1
     frequency_hz: list[float] = []

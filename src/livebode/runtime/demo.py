@@ -95,7 +95,7 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
         Fits(fit, loop.build(RATE_HZ), plant_kinds(machine.channels, settings)),
         ChangeDetection(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
     )
-    about = {"configuration": configuration}
+    about = {"configuration": configuration, "found": {"clock": "relative"}}
     return RunLoop(machine, pipeline, to, about=about, block_samples=400, real_time=real_time).run()
 
 

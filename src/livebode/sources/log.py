@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError, UsageError
+from livebode.core.clock import ClockKind
 from livebode.sources.naming import resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
@@ -100,6 +101,11 @@ class Log:
     def rate_origin(self) -> str:
         """Origin of the rate: "given", "time column 't' in s", "'fs' in the file", "metadata"; and what agrees."""
         return self._clock.rate_origin
+
+    @property
+    def clock_kind(self) -> ClockKind:
+        """Whether its times are seconds since 1970 ("utc"), or since any other moment ("relative")."""
+        return self._clock.kind
 
     @property
     def timing(self) -> Timing | None:

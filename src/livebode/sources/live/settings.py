@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.core import Channel, ConfigError, QuantityKind
+from livebode.core.clock import ClockKind
 from livebode.sources.units import split_unit
 
 File = Annotated[Path, Field(strict=False)]
@@ -38,6 +39,7 @@ class SourceSettings(BaseModel):
 
     log: File | None = None
     time: str | None = None
+    clock: ClockKind | None = None
     follow: bool = False
     url: str | None = None
     rate_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
