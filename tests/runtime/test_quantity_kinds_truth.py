@@ -14,9 +14,10 @@ import pytest
 from livebode import example_axis
 from livebode.analysis.fits import fit_run
 from livebode.configuration import Axis
-from livebode.configuration.axis import FitSection
-from livebode.core import Block, Channel, ConfigError, PlantKinds, RecordingError, SourceError, SpectraLayout
+from livebode.configuration.axis import FitSection, LoopSection, PIDSection
+from livebode.core import Block, Channel, ConfigError, Event, PlantKinds, RecordingError, SourceError, SpectraLayout
 from livebode.estimation import Settings, Tracker
+from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
 from livebode.records import Run
 from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, run
@@ -25,6 +26,7 @@ from livebode.sources.live import SourceSettings, SpectraBatch, open_source
 from tests.support.command import LINES, signals, write_csv, write_parquet
 from tests.support.errors import refused
 
+LOOP = LoopSection(velocity=PIDSection(gain=0.2308, integral_time_s=0.2, rate_hz=4000.0))
 NUMBERS = ("value", "sigma", "dof", "coherence", "valid", "distortion")
 
 
@@ -67,6 +69,8 @@ def test_another_spelling_of_the_units_changes_no_number(tmp_path: Path, plain: 
         np.testing.assert_array_equal(getattr(found.responses(), name), getattr(plain.responses(), name))
     assert parameters(found) == parameters(plain)
     assert {row[0] for row in parameters(found)} == {"two-mass"}
+    machines = [MeasuredAxis(MeasuredSection(run=run.path), LOOP).machine() for run in (plain, found)]
+    assert machines[0].notes == machines[1].notes
 
 
 def test_a_torque_that_is_not_in_newton_metres_has_an_unknown_gain(tmp_path: Path) -> None:
@@ -91,6 +95,10 @@ def test_an_unknown_kind_of_the_output_names_the_key_before_anything_is_written(
         tracked(tmp_path, " [rad/s²]", " [N m]")
     named = tracked(tmp_path, " [counts]", " [N m]", output="velocity")
     assert {row[0] for row in parameters(named)} == {"two-mass"}
+    with refused(ConfigError, "kind-needed", key="measured.output", value="other"):
+        MeasuredAxis(MeasuredSection(run=named.path), LOOP).machine()
+    noted = MeasuredAxis(MeasuredSection(run=named.path, output="velocity"), LOOP).machine().notes
+    assert any("the run's plant is in counts/(N m)" in note for note in noted)
 
 
 @pytest.mark.parametrize("kind", ["speed", "Velocity", "", 1, ["velocity"]])
@@ -131,16 +139,23 @@ def test_the_steps_of_a_sensor_are_those_of_the_position_behind_a_velocity() -> 
     w, position = np.sin(angles).sum(axis=0), step * np.cos(angles).sum(axis=0)
     velocity = np.diff(step * np.round((position + 0.3 * step * rng.standard_normal(n.size)) / step), prepend=0.0)
 
+    events: list[Event] = []
+
     def without_steps(*unit: str) -> list[bool]:
         settings = Settings(lines=LINES, output="y", input="u", excitation="w")
         channels = Channel("w"), Channel("u"), Channel("y", *unit)  # type: ignore[arg-type]
-        found = Tracker(settings).process(Block(np.array([w, w, velocity]), channels, LINES.rate_hz))
+        events.clear()
+        found = Tracker(settings).process(Block(np.array([w, w, velocity]), channels, LINES.rate_hz), events.append)
         return found.valid[-1].tolist()
 
     of_velocity = [without_steps("rad/s"), without_steps("rpm"), without_steps("counts", "velocity"), without_steps()]
     assert of_velocity == [[True, True, True]] * 4
-    of_others = [without_steps("rad"), without_steps("counts"), without_steps("rad/s", "position")]
-    assert of_others == [[False, True, True]] * 3
+    assert events == []
+    hint = "if the output is a velocity, declare it in source.kinds"
+    for unit in (("rad",), ("counts",), ("rad/s", "position")):
+        assert without_steps(*unit) == [False, True, True]
+        (event,) = events
+        assert (event.kind, hint in event.message) == ("steps", unit == ("counts",))
 
 
 def test_a_run_without_recorded_kinds_is_read_by_its_unit(plain: Run) -> None:
