@@ -17,7 +17,7 @@ from livebode.core import ConfigError, Event, UsageError
 from livebode.core.clock import RunClock, date_and_time, moment, moment_of_start, moments_by
 from livebode.dashboard.state import State
 from livebode.dashboard.viewed import Viewed
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.query import query
 from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, run
@@ -132,7 +132,7 @@ def test_a_live_run_whose_sender_numbers_from_0_is_dated_everywhere_the_same(tmp
             peer.send(batch)
         until(lambda: any(event.kind == "gap" for event in session.events()), "the gap to be recorded")
         after_s = time.time()
-    run = Run.open(session.run)
+    run = RunRecord.open(session.run)
     ((_, unix_s),) = RunClock.of(run.summary).pieces
     gap = next(event for event in run.events() if event.kind == "gap")
     assert before_s - 2.6 <= unix_s + gap.time_s <= after_s
@@ -145,7 +145,7 @@ def test_a_live_run_whose_sender_numbers_from_0_is_dated_everywhere_the_same(tmp
     assert shown in (session.run / "report.html").read_text()
 
 
-def dated_run(folder: Path, first_s: float, **source: object) -> Run:
+def dated_run(folder: Path, first_s: float, **source: object) -> RunRecord:
     """A run on a recording whose time column begins at this second."""
     folder.mkdir()
     columns = signals(1000)
@@ -155,7 +155,7 @@ def dated_run(folder: Path, first_s: float, **source: object) -> Run:
         "signals": {"output": "y", "input": "u", "excitation": "w"},
         "lines": {"frequencies": "50,100,200", "window": 100},
     }
-    return Run.open(run(Axis.of(data, "test"), Destination(folder / "run", lambda *_: None)).directory)
+    return RunRecord.open(run(Axis.of(data, "test"), Destination(folder / "run", lambda *_: None)).directory)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_a_run_without_a_recorded_kind_is_dated_by_its_first_response(tmp_path: 
         older = json.loads((path / RUN).read_text())
         del older["found"]["clock"], older["crc32"]
         (path / RUN).write_bytes(to_document(older))
-        assert Run.open(path).clock.utc == utc
+        assert RunRecord.open(path).clock.utc == utc
 
 
 def test_a_kind_of_clock_without_a_time_column_or_for_a_live_source_is_rejected(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from livebode.configuration.axis import FitSection, LoopSection, PIDSection
 from livebode.core import Block, Channel, ConfigError, Event, PlantKinds, RecordingError, SourceError, SpectraLayout
 from livebode.estimation import Settings, Tracker
 from livebode.experiments.measured_axis import MeasuredAxis, MeasuredSection
-from livebode.records import Run
+from livebode.records import RunRecord
 from livebode.records.summary_file import RUN, to_document
 from livebode.runtime import Destination, run
 from livebode.sources import open_log
@@ -37,7 +37,9 @@ def recorded() -> dict[str, np.ndarray]:
     return {name: block[name] for name in ("w", "u", "velocity")}
 
 
-def tracked(folder: Path, y: str, u: str, source: Mapping[str, object] = MappingProxyType({}), **fit: object) -> Run:
+def tracked(
+    folder: Path, y: str, u: str, source: Mapping[str, object] = MappingProxyType({}), **fit: object
+) -> RunRecord:
     """A run on these samples with units in the headings, and a fit."""
     folder.mkdir(exist_ok=True)
     columns = {"w": recorded()["w"], f"u{u}": recorded()["u"], f"y{y}": recorded()["velocity"]}
@@ -48,21 +50,21 @@ def tracked(folder: Path, y: str, u: str, source: Mapping[str, object] = Mapping
         "tracking": {"average": True, "hop": 100},
         "fit": fit,
     }
-    return Run.open(run(Axis.of(given, "test"), Destination(folder / "run", lambda *_: None)).directory)
+    return RunRecord.open(run(Axis.of(given, "test"), Destination(folder / "run", lambda *_: None)).directory)
 
 
-def parameters(of: Run) -> list[tuple[str, str, float, str]]:
+def parameters(of: RunRecord) -> list[tuple[str, str, float, str]]:
     rows = [row for table in of.tables("parameters") for row in table.to_pylist()]
     return [(row["model"], row["name"], row["value"], row["status"]) for row in rows if row["value"] == row["value"]]
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def plain(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     return tracked(tmp_path_factory.mktemp("plain"), " [rad/s]", " [N m]")
 
 
 @pytest.mark.parametrize(("y", "u"), [(" [rad s^-1]", " [Nm]"), (" [1/s]", " [N·m]"), (" [rad·s⁻¹]", " [kg m²/s²]")])
-def test_another_spelling_of_the_units_changes_no_number(tmp_path: Path, plain: Run, y: str, u: str) -> None:
+def test_another_spelling_of_the_units_changes_no_number(tmp_path: Path, plain: RunRecord, y: str, u: str) -> None:
     found = tracked(tmp_path, y, u)
     assert found.kinds == plain.kinds == PlantKinds("velocity", "torque")
     for name in NUMBERS:
@@ -79,7 +81,7 @@ def test_a_torque_that_is_not_in_newton_metres_has_an_unknown_gain(tmp_path: Pat
     assert {row[0] for row in parameters(found)} == {"two-mass-gain"}
 
 
-def test_declared_kinds_win_over_units_that_say_something_else_or_nothing(tmp_path: Path, plain: Run) -> None:
+def test_declared_kinds_win_over_units_that_say_something_else_or_nothing(tmp_path: Path, plain: RunRecord) -> None:
     declared = {"kinds": {"y": "velocity", "u": "torque"}}
     for name, y, u in (("counts", " [counts]", " [%]"), ("wrong", " [m]", " [A]"), ("none", "", "")):
         found = tracked(tmp_path / name, y, u, source=declared)
@@ -158,11 +160,11 @@ def test_the_steps_of_a_sensor_are_those_of_the_position_behind_a_velocity() -> 
         assert (event.kind, hint in event.message) == ("steps", unit == ("counts",))
 
 
-def test_a_run_without_recorded_kinds_is_read_by_its_unit(plain: Run) -> None:
+def test_a_run_without_recorded_kinds_is_read_by_its_unit(plain: RunRecord) -> None:
     older = json.loads((plain.path / RUN).read_text())
     del older["found"]["kinds"]
     (plain.path / RUN).write_bytes(to_document({name: part for name, part in older.items() if name != "crc32"}))
-    assert Run.open(plain.path).kinds == PlantKinds("velocity", "torque")
+    assert RunRecord.open(plain.path).kinds == PlantKinds("velocity", "torque")
     assert fit_run(plain.path, FitSection())[0].asked.name == "two-mass"
 
 
