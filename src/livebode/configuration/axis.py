@@ -172,7 +172,7 @@ class _ControllerSection(_Section):
     ----------
     rate_hz
         Computations of the controller per second, in Hz.
-    held_ticks
+    rate_divider
         Samples of the recording for which one output is held: the sampling rate divided by rate_hz.
     hold
         "zero-order": the output is held between computations. "none": the controller interpolates.
@@ -181,7 +181,7 @@ class _ControllerSection(_Section):
     """
 
     rate_hz: Positive
-    held_ticks: Annotated[int, Field(ge=1)] = 1
+    rate_divider: Annotated[int, Field(ge=1)] = 1
     hold: Literal["zero-order", "none"] = "zero-order"
     delay_ticks: Ticks = 0
 
@@ -264,17 +264,17 @@ class LoopSection(_Section):
         """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
-            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
-                held = counted(part.held_ticks, "tick")
+            if part is not None and abs(part.rate_hz * part.rate_divider / rate_hz - 1) > SAME_RATE:
+                held = counted(part.rate_divider, "tick")
                 raise ConfigError(
                     "rate-mismatch",
                     f"loop.{name} has a rate of {part.rate_hz:g} Hz and holds {held}, which gives "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the sampling rate is {rate_hz:g} Hz",
-                    "set held_ticks to the sampling rate divided by the rate of the controller",
+                    f"{part.rate_hz * part.rate_divider:g} Hz, but the sampling rate is {rate_hz:g} Hz",
+                    "set rate_divider to the sampling rate divided by the rate of the controller",
                     key=f"loop.{name}",
                     rate_hz=rate_hz,
                     controller_rate_hz=part.rate_hz,
-                    held_ticks=part.held_ticks,
+                    rate_divider=part.rate_divider,
                 )
         return Loop(
             feedback=self._feedback(),
