@@ -27,7 +27,7 @@ CONTROLLERS = {
 EXCITATION = {"band_hz": [20, 140], "resolution_hz": 10}
 NEEDED: dict[str, dict[str, Any]] = {
     "order": {"band_hz": [20, 140], "kind": "prbs"},
-    "held_ticks": EXCITATION | {"kind": "prbs"},
+    "rate_divider": EXCITATION | {"kind": "prbs"},
     "window": {"band_hz": [20, 140]},
     "lines": {"window": 400},
     "sweep": EXCITATION | {"kind": "chirp"},

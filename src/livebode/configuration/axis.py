@@ -171,7 +171,7 @@ class _ControllerSection(_Section):
     ----------
     rate_hz
         Computations of the controller per second, in Hz.
-    held_ticks
+    rate_divider
         Samples of the recording for which one output is held: the sampling rate divided by rate_hz.
     hold
         "zero-order": the output is held between computations. "none": the controller interpolates.
@@ -180,7 +180,7 @@ class _ControllerSection(_Section):
     """
 
     rate_hz: Positive
-    held_ticks: Annotated[int, Field(ge=1)] = 1
+    rate_divider: Annotated[int, Field(ge=1)] = 1
     hold: Literal["zero-order", "none"] = "zero-order"
     delay_ticks: Ticks = 0
 
@@ -263,17 +263,17 @@ class LoopSection(_Section):
         """The Loop of this description, recorded at `rate_hz`; ConfigError if its parts do not form one."""
         for name in ("velocity", "position", "position_pd"):
             part: _ControllerSection | None = getattr(self, name)
-            if part is not None and abs(part.rate_hz * part.held_ticks / rate_hz - 1) > SAME_RATE:
-                held = counted(part.held_ticks, "tick")
+            if part is not None and abs(part.rate_hz * part.rate_divider / rate_hz - 1) > SAME_RATE:
+                held = counted(part.rate_divider, "tick")
                 raise ConfigError(
                     "rate-mismatch",
                     f"loop.{name} has a rate of {part.rate_hz:g} Hz and holds {held}, which gives "
-                    f"{part.rate_hz * part.held_ticks:g} Hz, but the sampling rate is {rate_hz:g} Hz",
-                    "set held_ticks to the sampling rate divided by the rate of the controller",
+                    f"{part.rate_hz * part.rate_divider:g} Hz, but the sampling rate is {rate_hz:g} Hz",
+                    "set rate_divider to the sampling rate divided by the rate of the controller",
                     key=f"loop.{name}",
                     rate_hz=rate_hz,
                     controller_rate_hz=part.rate_hz,
-                    held_ticks=part.held_ticks,
+                    rate_divider=part.rate_divider,
                 )
         return Loop(
             feedback=self._feedback(),
@@ -399,9 +399,9 @@ class FitSection(_Section):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the unit of the input is N m or radius_m is given, otherwise two-mass-gain.
+        The model. "auto": two-mass if the input is a torque in N m or radius_m is given, otherwise two-mass-gain.
     output
-        What the output is. "auto": by the unit of the output, velocity if it has none.
+        What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side
         Where the output is measured. Default: motor.
     radius_m

@@ -65,7 +65,7 @@ class ExperimentSpec:
         Step of the drive, N m: samples are rounded to it. Default: no rounding.
     order
         Length of the register of a PRBS, instead of a resolution.
-    held_ticks
+    rate_divider
         Ticks for which each bit of a PRBS is held. Default: chosen for the band.
     sweep
         Sweep of a chirp. Default: "linear".
@@ -95,7 +95,7 @@ class ExperimentSpec:
     crest_factor_max: Annotated[float, Ge(1)] | None = None
     resolution_n_m: Annotated[float, Ge(STEP_MIN)] | None = None
     order: Annotated[int, Ge(ORDER_MIN), Le(ORDER_MAX)] | None = None
-    held_ticks: _Count | None = None
+    rate_divider: _Count | None = None
     sweep: Sweep | None = None
     periods: _Count | None = None
     seed: Annotated[int, Ge(0)] = 0

@@ -13,7 +13,7 @@ from livebode.excitation import check_order
 if TYPE_CHECKING:
     from livebode.experiment_design.spec import ExperimentSpec
 
-KIND_OF_KEY = {"order": "prbs", "held_ticks": "prbs", "sweep": "chirp", "periods": "stepped"}
+KIND_OF_KEY = {"order": "prbs", "rate_divider": "prbs", "sweep": "chirp", "periods": "stepped"}
 RESOLUTION_MIN_HZ = 1e-6
 STEP_MIN = 1e-12
 MAINS_MIN_HZ = 1.0
@@ -52,7 +52,7 @@ def _check_numbers(spec: ExperimentSpec) -> None:
         ("resolution_n_m", STEP_MIN, "leave it out for no rounding"),
         ("crest_factor_max", 1, "allow more: a PRBS has 1"),
         ("window", 1, "give a whole number above 0"),
-        ("held_ticks", 1, "give a whole number above 0"),
+        ("rate_divider", 1, "give a whole number above 0"),
         ("periods", 1, "give a whole number above 0"),
         ("seed", 0, "give a whole number of at least 0"),
     ):

@@ -165,10 +165,10 @@ class Experiment(BaseModel):
             return _finite(self._measured_axis.loop_tables())
         drive = axis.drive
         velocity = {"gain": drive.velocity_gain_n_m_s, "integral_time_s": drive.integral_time_s,
-                    "rate_hz": drive.velocity_rate_hz, "held_ticks": drive.velocity_ticks,
+                    "rate_hz": drive.velocity_rate_hz, "rate_divider": drive.velocity_ticks,
                     "delay_ticks": drive.delay_ticks}  # fmt: skip
         position = {"gain": drive.position_gain_per_s, "rate_hz": drive.position_rate_hz,
-                    "held_ticks": drive.position_ticks}  # fmt: skip
+                    "rate_divider": drive.position_ticks}  # fmt: skip
         return {"velocity": velocity, "position": position}
 
     def motion_table(self, window_s: float) -> dict[str, Any]:

@@ -146,12 +146,12 @@ class Drive:
             gain=self.velocity_gain_n_m_s,
             integral_time_s=self.integral_time_s,
             rate_hz=self.velocity_rate_hz,
-            held_ticks=self.velocity_ticks,
+            rate_divider=self.velocity_ticks,
             delay_ticks=self.delay_ticks,
         )
         ratio = round(self.velocity_rate_hz / self.position_rate_hz)
         return Loop(
-            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, held_ticks=ratio))
+            Cascade(velocity, PID(gain=self.position_gain_per_s, rate_hz=self.position_rate_hz, rate_divider=ratio))
         )
 
 
